@@ -1,0 +1,61 @@
+#include <gtest/gtest.h>
+
+#include <numeric>
+#include <stdexcept>
+#include <vector>
+
+#include "pencilscan/core/error.h"
+#include "pencilscan/core/parallel.h"
+#include "pencilscan/core/random.h"
+
+namespace pencilscan {
+namespace {
+
+TEST(ParallelFor, VisitsEveryIndexOnceForAnyThreadCount) {
+  for (const int threads : {1, 2, 4}) {
+    const ThreadLimit limit(threads);
+    std::vector<int> visits(1000, 0);
+    parallel_for(visits.size(), [&](std::size_t i) { ++visits[i]; });
+    EXPECT_EQ(std::accumulate(visits.begin(), visits.end(), 0), 1000);
+    EXPECT_EQ(*std::max_element(visits.begin(), visits.end()), 1);
+  }
+}
+
+TEST(ParallelFor, PassesExceptionsOn) {
+  EXPECT_THROW(parallel_for(10, [](std::size_t i) { if (i == 7) throw StageError("seven"); }),
+               StageError);
+}
+
+TEST(Random, NormalHasUnitVarianceAndUniformItsMoments) {
+  Random random(7);
+  double sum = 0;
+  double squares = 0;
+  double uniform_sum = 0;
+  constexpr int kDraws = 100000;
+  for (int i = 0; i < kDraws; ++i) {
+    const double x = random.normal();
+    sum += x;
+    squares += x * x;
+    uniform_sum += random.uniform();
+  }
+  // Five standard errors of each mean.
+  EXPECT_NEAR(sum / kDraws, 0, 5 / std::sqrt(kDraws));
+  EXPECT_NEAR(squares / kDraws, 1, 5 * std::sqrt(2.0 / kDraws));
+  EXPECT_NEAR(uniform_sum / kDraws, 0.5, 5 * std::sqrt(1.0 / 12 / kDraws));
+}
+
+TEST(Random, StreamsOfOneSeedDiffer) {
+  Random a(1, 0);
+  Random b(1, 1);
+  int equal = 0;
+  for (int i = 0; i < 100; ++i) equal += a.bits() == b.bits();
+  EXPECT_LT(equal, 3);
+}
+
+TEST(InputError, NamesFileFieldValueAndRule) {
+  const InputError error("rig.json", "cameras[0].K", "nan", "must be finite");
+  EXPECT_STREQ(error.what(), "rig.json: cameras[0].K = nan: must be finite");
+}
+
+}  // namespace
+}  // namespace pencilscan

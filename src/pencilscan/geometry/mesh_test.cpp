@@ -1,0 +1,50 @@
+#include "pencilscan/geometry/mesh.h"
+
+#include <gtest/gtest.h>
+
+#include <numbers>
+
+#include "pencilscan/core/random.h"
+#include "pencilscan/geometry/ray_scene.h"
+
+namespace pencilscan {
+namespace {
+
+TEST(TriangleMesh, BoxAndSphereAreClosedOutwardAndOfTheRightVolume) {
+  const TriangleMesh box = make_box({2, 3, 4});
+  EXPECT_NEAR(signed_volume(box), 24, 1e-12);
+  EXPECT_NEAR(surface_area(box), 52, 1e-12);
+  EXPECT_EQ(count_edges(box).boundary, 0U);
+  const TriangleMesh sphere = make_sphere(10, 64);
+  EXPECT_NEAR(signed_volume(sphere), 4.0 / 3 * std::numbers::pi * 1000, 10);  // faceted: < 0.3 %
+  EXPECT_EQ(count_edges(sphere).boundary, 0U);
+  EXPECT_EQ(count_edges(sphere).non_manifold, 0U);
+}
+
+TEST(RayScene, HitsTheBoxWhereGeometrySays) {
+  const RayScene scene(make_box({100, 100, 100}));
+  const auto hit = scene.first_hit({{500, 10, 20}, {-1, 0, 0}});
+  ASSERT_TRUE(hit);
+  EXPECT_NEAR(hit->distance, 450, 1e-9);
+  EXPECT_FALSE(scene.first_hit({{500, 60, 20}, {-1, 0, 0}}));
+  EXPECT_TRUE(scene.visible({500, 0, 0}, {50, 0, 0}, 0.1));
+  EXPECT_FALSE(scene.visible({500, 0, 0}, {-50, 0, 0}, 0.1));
+}
+
+TEST(RayScene, ClosestPointAgreesWithBruteForceOverSamples) {
+  const TriangleMesh sphere = make_sphere(50, 24);
+  const RayScene scene(sphere);
+  Random random(3);
+  for (int i = 0; i < 50; ++i) {
+    const Vec3 p(random.uniform(-90, 90), random.uniform(-90, 90), random.uniform(-90, 90));
+    const auto closest = scene.closest_point(p);
+    ASSERT_TRUE(closest);
+    double nearest_vertex = 1e9;
+    for (const Vec3& v : sphere.vertices) nearest_vertex = std::min(nearest_vertex, (v - p).norm());
+    EXPECT_LE(closest->distance, nearest_vertex + 1e-9);
+    EXPECT_NEAR(closest->distance, std::abs(p.norm() - 50), 0.5);  // facet sagitta below 0.5 mm
+  }
+}
+
+}  // namespace
+}  // namespace pencilscan

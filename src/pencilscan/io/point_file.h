@@ -1,0 +1,28 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <vector>
+
+namespace pencilscan {
+
+/// One measured curve pixel: a vertex of points.ply (docs/formats.md).
+struct MeasuredPoint {
+  float x = 0, y = 0, z = 0;   ///< world, mm
+  float u = 0, v = 0;          ///< camera pixel
+  std::uint8_t camera = 0;     ///< index in the rig
+  std::uint8_t projector = 0;  ///< index in the rig
+  std::uint8_t pattern = 0;    ///< index in the projector's patterns
+  std::uint16_t line = 0;      ///< line index in the pattern
+  float sigma = 0;             ///< mm, one standard deviation along the camera ray
+  float confidence = 0;        ///< 0..1
+  float plane = 0;             ///< triangulated line coordinate
+};
+
+/// Writes points.ply, binary little endian, whole or not at all. The property `pattern` is written always.
+void write_points(const std::filesystem::path& path, const std::vector<MeasuredPoint>& points);
+/// Reads any points.ply with at least x y z u v camera projector line, in any order and with more
+/// properties; missing sigma, confidence, pattern, plane get 0, 1, 0, line. InputError otherwise.
+[[nodiscard]] std::vector<MeasuredPoint> read_points(const std::filesystem::path& path);
+
+}  // namespace pencilscan

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "pencilscan/geometry/device.h"
+#include "pencilscan/pattern/line_pattern.h"
+
+namespace pencilscan {
+
+struct Camera : Device {
+  /// camera RGB = matrix * projector RGB, for every projector or by projector name.
+  std::optional<Mat3> color_matrix;
+  std::map<std::string, Mat3> color_matrix_by_projector;
+  double gamma = 1;                 ///< linear = value^gamma on [0, 1]; > 0
+  bool sees_texture_only = false;   ///< "role": "texture"
+
+  /// The matrix for one projector; identity where the rig states none.
+  [[nodiscard]] Mat3 color_matrix_for(const std::string& projector) const;
+  [[nodiscard]] bool states_color_matrix() const {
+    return color_matrix.has_value() || !color_matrix_by_projector.empty();
+  }
+};
+
+struct Projector : Device {
+  std::vector<LinePattern> patterns;  ///< empty where nothing needs it (calibration)
+
+  /// Panel size across the lines of a pattern, px.
+  [[nodiscard]] int size_across(const LinePattern& pattern) const {
+    return pattern.axis == Axis::kColumn ? width : height;
+  }
+  [[nodiscard]] int line_count(const LinePattern& pattern) const {
+    return pattern.line_count(size_across(pattern));
+  }
+};
+
+/// All devices and what they show, as one value (rig.json).
+struct Rig {
+  std::vector<Camera> cameras;
+  std::vector<Projector> projectors;
+  std::optional<Sphere> volume;     ///< as stated by the file
+  bool unit_known = true;           ///< "unit": "mm"; false: "unknown"
+};
+
+/// Reads rig.json; InputError names file, field, value and rule.
+[[nodiscard]] Rig read_rig(const std::filesystem::path& path);
+/// Writes rig.json whole or not at all; read_rig() of it gives the same doubles.
+void write_rig(const Rig& rig, const std::filesystem::path& path);
+
+/// The sphere that holds the object: the stated one, or else derived from the devices: the point
+/// nearest to all optical axes (least squares), with the radius that the median device sees whole.
+[[nodiscard]] Sphere working_volume(const Rig& rig);
+
+}  // namespace pencilscan
