@@ -8,9 +8,9 @@
 
 namespace pencilscan {
 
-/// Writes a file whole or not at all: `write` fills a temporary neighbour, which is flushed, checked
-/// and renamed over `path`. Parent folders are made. StageError (naming the file) when the disk is
-/// full or the folder cannot be written; the temporary file is removed then.
+/// Writes a file whole or not at all: `write` fills a temporary neighbour, which is flushed,
+/// checked and renamed over `path`. Parent folders are made. StageError (naming the file) when the
+/// disk is full or the folder cannot be written; the temporary file is removed then.
 void write_atomically(const std::filesystem::path& path,
                       const std::function<void(std::ostream&)>& write);
 void write_text(const std::filesystem::path& path, const std::string& text);

@@ -8,16 +8,17 @@ namespace pencilscan {
 
 /// Reads PNG, TIFF, JPEG or BMP, 8 or 16 bit, grey or colour. Result: CV_32FC3 in **RGB** order,
 /// values in [0, 1] as stored (no gamma applied); grey is replicated. InputError when the file is
-/// missing, truncated (PNG: no IEND, JPEG: no end marker, even where OpenCV would read on) or no image.
+/// missing, truncated (PNG: no IEND, JPEG: no end marker, even where OpenCV would read on) or no
+/// image.
 [[nodiscard]] cv::Mat read_image(const std::filesystem::path& path);
 
-/// Reads only the size from a file's header would cost a decoder of our own: this decodes it all.
 /// The file of `stem` in `folder` with one of the known endings (.png .tiff .tif .jpg .jpeg .bmp).
 [[nodiscard]] std::optional<std::filesystem::path> find_image(const std::filesystem::path& folder,
                                                               const std::string& stem);
 
 /// Writes an RGB (CV_32FC3 in [0,1], CV_8UC3, CV_16UC3) or one-channel (8U, 16U, 32F) image, whole
-/// or not at all. Float images become `bit_depth` (8 or 16) integers, except in .tiff, which keeps them.
+/// or not at all. Float images become `bit_depth` (8 or 16) integers, except in .tiff, which keeps
+/// them.
 void write_image(const std::filesystem::path& path, const cv::Mat& image, int bit_depth = 8);
 
 }  // namespace pencilscan

@@ -15,8 +15,8 @@ struct Camera : Device {
   /// camera RGB = matrix * projector RGB, for every projector or by projector name.
   std::optional<Mat3> color_matrix;
   std::map<std::string, Mat3> color_matrix_by_projector;
-  double gamma = 1;                 ///< linear = value^gamma on [0, 1]; > 0
-  bool sees_texture_only = false;   ///< "role": "texture"
+  double gamma = 1;                ///< linear = value^gamma on [0, 1]; > 0
+  bool sees_texture_only = false;  ///< "role": "texture"
 
   /// The matrix for one projector; identity where the rig states none.
   [[nodiscard]] Mat3 color_matrix_for(const std::string& projector) const;
@@ -41,8 +41,8 @@ struct Projector : Device {
 struct Rig {
   std::vector<Camera> cameras;
   std::vector<Projector> projectors;
-  std::optional<Sphere> volume;     ///< as stated by the file
-  bool unit_known = true;           ///< "unit": "mm"; false: "unknown"
+  std::optional<Sphere> volume;  ///< as stated by the file
+  bool unit_known = true;        ///< "unit": "mm"; false: "unknown"
 };
 
 /// Reads rig.json; InputError names file, field, value and rule.

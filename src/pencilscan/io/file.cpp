@@ -1,0 +1,201 @@
+#include "pencilscan/io/file.h"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <array>
+#include <atomic>
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+#include <sstream>
+#include <streambuf>
+#include <vector>
+
+#include "pencilscan/core/error.h"
+
+namespace pencilscan {
+namespace {
+
+std::string reason(int error) { return std::strerror(error); }
+
+/// Stream buffer over a file descriptor that remembers the first error, which std::ofstream hides.
+class DescriptorBuffer : public std::streambuf {
+ public:
+  explicit DescriptorBuffer(int descriptor)
+      : descriptor_(descriptor), block_(std::size_t{1} << 16) {
+    setp(block_.data(), block_.data() + block_.size());
+  }
+  [[nodiscard]] int error() const { return error_; }
+
+ protected:
+  int overflow(int c) override {
+    if (!drain()) return traits_type::eof();
+    if (c != traits_type::eof()) {
+      *pptr() = static_cast<char>(c);
+      pbump(1);
+    }
+    return traits_type::not_eof(c);
+  }
+  int sync() override { return drain() ? 0 : -1; }
+
+ private:
+  bool drain() {
+    const char* at = pbase();
+    while (error_ == 0 && at < pptr()) {
+      const ssize_t written = ::write(descriptor_, at, static_cast<std::size_t>(pptr() - at));
+      if (written < 0) {
+        if (errno != EINTR) error_ = errno;
+      } else {
+        at += written;
+      }
+    }
+    setp(block_.data(), block_.data() + block_.size());
+    return error_ == 0;
+  }
+
+  int descriptor_;
+  int error_ = 0;
+  std::vector<char> block_;
+};
+
+/// A temporary neighbour of the target: removed unless it was renamed.
+class TemporaryFile {
+ public:
+  explicit TemporaryFile(const std::filesystem::path& target) {
+    static std::atomic<unsigned> counter{0};
+    path_ = target;
+    path_ += ".part" + std::to_string(::getpid()) + "_" + std::to_string(counter++);
+    descriptor_ = ::open(path_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+  }
+  TemporaryFile(const TemporaryFile&) = delete;
+  TemporaryFile& operator=(const TemporaryFile&) = delete;
+  ~TemporaryFile() {
+    if (descriptor_ >= 0) ::close(descriptor_);
+    if (opened_ok() && !renamed_) ::unlink(path_.c_str());
+  }
+
+  [[nodiscard]] bool opened_ok() const { return descriptor_ >= 0 || closed_; }
+  [[nodiscard]] int descriptor() const { return descriptor_; }
+  /// Flushes to the disk and closes; 0 or the errno of what failed.
+  int finish() {
+    int error = ::fsync(descriptor_) == 0 || errno == EINVAL ? 0 : errno;
+    if (::close(descriptor_) != 0 && error == 0) error = errno;
+    descriptor_ = -1;
+    closed_ = true;
+    return error;
+  }
+  int rename_to(const std::filesystem::path& target) {
+    if (::rename(path_.c_str(), target.c_str()) != 0) return errno;
+    renamed_ = true;
+    return 0;
+  }
+
+ private:
+  std::filesystem::path path_;
+  int descriptor_ = -1;
+  bool closed_ = false;
+  bool renamed_ = false;
+};
+
+[[noreturn]] void cannot_write(const std::filesystem::path& path, int error) {
+  throw StageError(path.string() + ": cannot be written: " + reason(error));
+}
+
+}  // namespace
+
+void write_atomically(const std::filesystem::path& path,
+                      const std::function<void(std::ostream&)>& write) {
+  std::error_code made;
+  if (path.has_parent_path()) std::filesystem::create_directories(path.parent_path(), made);
+  if (made) cannot_write(path, made.value());
+  TemporaryFile file(path);
+  if (!file.opened_ok()) cannot_write(path, errno);
+  DescriptorBuffer buffer(file.descriptor());
+  std::ostream stream(&buffer);
+  write(stream);
+  stream.flush();
+  if (buffer.error() != 0) cannot_write(path, buffer.error());
+  if (!stream) throw StageError(path.string() + ": cannot be written: the stream failed");
+  if (const int error = file.finish(); error != 0) cannot_write(path, error);
+  if (const int error = file.rename_to(path); error != 0) cannot_write(path, error);
+}
+
+void write_text(const std::filesystem::path& path, const std::string& text) {
+  write_atomically(path, [&](std::ostream& stream) { stream << text; });
+}
+
+void write_json(const std::filesystem::path& path, const nlohmann::ordered_json& value) {
+  write_text(path, value.dump(2) + "\n");
+}
+
+std::string read_file(const std::filesystem::path& path) {
+  std::error_code error;
+  const auto status = std::filesystem::status(path, error);
+  if (!std::filesystem::exists(status)) {
+    throw InputError(path.string(), "", "", "the file does not exist");
+  }
+  if (std::filesystem::is_directory(status)) {
+    throw InputError(path.string(), "", "", "must be a file, is a folder");
+  }
+  std::ifstream stream(path, std::ios::binary);
+  if (!stream) throw InputError(path.string(), "", "", "cannot be opened: " + reason(errno));
+  std::ostringstream bytes;
+  // An empty file sets the fail bit of `<<`, which is no error here.
+  if (stream.peek() != std::ifstream::traits_type::eof()) bytes << stream.rdbuf();
+  if (stream.bad() || bytes.bad()) throw InputError(path.string(), "", "", "cannot be read");
+  return std::move(bytes).str();
+}
+
+namespace {
+
+/// nlohmann's message without its "[json.exception...]" tag: "parse error at line 1, column 9:
+/// ...".
+std::string without_tag(const std::string& message) {
+  const auto end = message.find("] ");
+  std::string text = end == std::string::npos ? message : message.substr(end + 2);
+  for (char& c : text) {
+    if (static_cast<unsigned char>(c) < 0x20) c = ' ';
+  }
+  return text;
+}
+
+/// The last key of an object that a parser event saw twice; JSON leaves it open, a rig cannot mean
+/// it.
+struct DuplicateKeyFinder {
+  std::vector<std::vector<std::string>> open;
+  std::string duplicate;
+
+  bool operator()(int /*depth*/, nlohmann::json::parse_event_t event, nlohmann::json& parsed) {
+    using Event = nlohmann::json::parse_event_t;
+    if (event == Event::object_start) open.emplace_back();
+    if (event == Event::object_end) open.pop_back();
+    if (event == Event::key) {
+      const auto key = parsed.get<std::string>();
+      for (const std::string& earlier : open.back()) {
+        if (earlier == key) duplicate = key;
+      }
+      open.back().push_back(key);
+    }
+    return true;
+  }
+};
+
+}  // namespace
+
+nlohmann::json read_json(const std::filesystem::path& path) {
+  const std::string text = read_file(path);
+  DuplicateKeyFinder finder;
+  try {
+    nlohmann::json value = nlohmann::json::parse(text, std::ref(finder));
+    if (!finder.duplicate.empty()) {
+      throw InputError(path.string(), finder.duplicate, "", "this key must not stand twice");
+    }
+    return value;
+  } catch (const nlohmann::json::exception& error) {
+    throw InputError(path.string(), "", "",
+                     "must be JSON (which has no NaN or Infinity): " + without_tag(error.what()));
+  }
+}
+
+}  // namespace pencilscan

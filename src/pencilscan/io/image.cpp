@@ -1,0 +1,166 @@
+#include "pencilscan/io/image.h"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cstring>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "pencilscan/core/check.h"
+#include "pencilscan/core/error.h"
+#include "pencilscan/io/file.h"
+
+namespace pencilscan {
+namespace {
+
+using std::string_view_literals::operator""sv;
+
+constexpr std::array<const char*, 6> kEndings = {".png", ".tiff", ".tif", ".jpg", ".jpeg", ".bmp"};
+
+std::uint32_t big_endian_32(std::string_view bytes, std::size_t at) {
+  std::uint32_t value = 0;
+  for (std::size_t k = 0; k < 4; ++k) {
+    value = value << 8 | static_cast<unsigned char>(bytes[at + k]);
+  }
+  return value;
+}
+
+/// Walks the chunks (length, type, data, checksum) to IEND. PNG specification, section 5.
+bool png_is_whole(std::string_view bytes) {
+  std::size_t at = 8;
+  while (at + 12 <= bytes.size()) {
+    const std::size_t length = big_endian_32(bytes, at);
+    if (length > bytes.size() - at - 12) return false;
+    if (bytes.substr(at + 4, 4) == "IEND"sv) return true;
+    at += 12 + length;
+  }
+  return false;
+}
+
+/// True when an end-of-image marker follows the last start-of-scan. Cameras append bytes after it.
+bool jpeg_is_whole(std::string_view bytes) {
+  const auto scan = bytes.rfind("\xff\xda"sv);
+  return scan != std::string_view::npos && bytes.find("\xff\xd9"sv, scan) != std::string_view::npos;
+}
+
+/// BMP header: bytes 2..5 hold the file's size (some writers leave 0).
+bool bmp_is_whole(std::string_view bytes) {
+  if (bytes.size() < 26) return false;
+  std::uint32_t size = 0;
+  for (std::size_t k = 0; k < 4; ++k) {
+    size |= static_cast<std::uint32_t>(static_cast<unsigned char>(bytes[2 + k])) << (8 * k);
+  }
+  return size <= bytes.size();
+}
+
+void check_whole(const std::filesystem::path& path, std::string_view bytes) {
+  const auto fail = [&](const char* rule) { throw InputError(path.string(), "", "", rule); };
+  if (bytes.empty()) fail("the image file is empty");
+  if (bytes.starts_with("\x89PNG\r\n\x1a\n"sv)) {
+    if (!png_is_whole(bytes)) fail("truncated PNG: it must end with an IEND chunk");
+  } else if (bytes.starts_with("\xff\xd8"sv)) {
+    if (!jpeg_is_whole(bytes)) fail("truncated JPEG: it must end with an end-of-image marker");
+  } else if (bytes.starts_with("BM"sv)) {
+    if (!bmp_is_whole(bytes)) fail("truncated BMP: it is shorter than its header says");
+  } else if (!bytes.starts_with("II*\0"sv) && !bytes.starts_with("MM\0*"sv)) {
+    fail("must be a PNG, TIFF, JPEG or BMP image");
+  }
+}
+
+/// Decoded as stored: without rotation by EXIF, alpha dropped, palette expanded.
+cv::Mat decode(const std::filesystem::path& path, const std::string& bytes) {
+  const cv::Mat encoded(1, static_cast<int>(bytes.size()), CV_8UC1,
+                        const_cast<char*>(bytes.data()));  // NOLINT: imdecode only reads
+  cv::Mat image;
+  try {
+    image = cv::imdecode(encoded,
+                         cv::IMREAD_ANYDEPTH | cv::IMREAD_ANYCOLOR | cv::IMREAD_IGNORE_ORIENTATION);
+  } catch (const cv::Exception&) {
+    image.release();
+  }
+  if (image.empty()) throw InputError(path.string(), "", "", "cannot be decoded as an image");
+  return image;
+}
+
+/// RGB to OpenCV's BGR for encoding; one-channel images as they are.
+cv::Mat encodable(const cv::Mat& image, const std::string& ending, int bit_depth) {
+  cv::Mat result = image;
+  if (image.depth() == CV_32F && ending != ".tiff") {
+    const double top = bit_depth == 16 ? 65535 : 255;
+    image.convertTo(result, bit_depth == 16 ? CV_16U : CV_8U, top);
+  }
+  if (result.channels() == 3) cv::cvtColor(result, result, cv::COLOR_RGB2BGR);
+  return result;
+}
+
+std::string lower_ending(const std::filesystem::path& path) {
+  std::string ending = path.extension().string();
+  std::transform(ending.begin(), ending.end(), ending.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return ending;
+}
+
+}  // namespace
+
+cv::Mat read_image(const std::filesystem::path& path) {
+  const std::string bytes = read_file(path);
+  check_whole(path, bytes);
+  cv::Mat stored = decode(path, bytes);
+  double scale = 1;
+  if (stored.depth() == CV_8U) {
+    scale = 1.0 / 255;
+  } else if (stored.depth() == CV_16U) {
+    scale = 1.0 / 65535;
+  } else if (stored.depth() != CV_32F) {
+    throw InputError(path.string(), "", "", "must have 8 or 16 bit per channel");
+  }
+  cv::Mat image;
+  stored.convertTo(image, CV_32F, scale);
+  if (image.channels() == 1) {
+    cv::cvtColor(image, image, cv::COLOR_GRAY2RGB);
+  } else if (image.channels() == 4) {
+    cv::cvtColor(image, image, cv::COLOR_BGRA2RGB);
+  } else if (image.channels() == 3) {
+    cv::cvtColor(image, image, cv::COLOR_BGR2RGB);
+  } else {
+    throw InputError(path.string(), "", "", "must be grey or colour");
+  }
+  return image;
+}
+
+std::optional<std::filesystem::path> find_image(const std::filesystem::path& folder,
+                                                const std::string& stem) {
+  for (const char* ending : kEndings) {
+    std::error_code ignored;
+    std::filesystem::path path = folder / (stem + ending);
+    if (std::filesystem::is_regular_file(path, ignored)) return path;
+  }
+  return std::nullopt;
+}
+
+void write_image(const std::filesystem::path& path, const cv::Mat& image, int bit_depth) {
+  PENCILSCAN_CHECK(!image.empty() && (image.channels() == 1 || image.channels() == 3));
+  PENCILSCAN_CHECK(bit_depth == 8 || bit_depth == 16);
+  const std::string ending = lower_ending(path);
+  if (std::find(kEndings.begin(), kEndings.end(), ending) == kEndings.end()) {
+    throw InputError(path.string(), "", "", "must end with .png, .tiff, .jpg or .bmp");
+  }
+  std::vector<unsigned char> bytes;
+  bool encoded = false;
+  try {
+    encoded = cv::imencode(ending, encodable(image, ending, bit_depth), bytes);
+  } catch (const cv::Exception& error) {
+    throw StageError(path.string() + ": cannot be encoded: " + error.err);
+  }
+  if (!encoded) throw StageError(path.string() + ": cannot be encoded");
+  write_atomically(path, [&](std::ostream& stream) {
+    stream.write(reinterpret_cast<const char*>(bytes.data()),
+                 static_cast<std::streamsize>(bytes.size()));
+  });
+}
+
+}  // namespace pencilscan

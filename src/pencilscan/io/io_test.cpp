@@ -1,0 +1,301 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+
+#include <cmath>
+#include <csignal>
+#include <fstream>
+#include <opencv2/core.hpp>
+
+#include "pencilscan/core/error.h"
+#include "pencilscan/io/file.h"
+#include "pencilscan/io/image.h"
+#include "pencilscan/io/mesh_file.h"
+#include "pencilscan/io/ply.h"
+#include "pencilscan/io/point_file.h"
+
+namespace pencilscan {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A folder of its own per test, removed afterwards.
+class Io : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ =
+        fs::path(::testing::TempDir()) /
+        (std::string("io_") + ::testing::UnitTest::GetInstance()->current_test_info()->name());
+    fs::remove_all(folder_);
+    fs::create_directories(folder_);
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  fs::path put(const std::string& name, const std::string& bytes) {
+    std::ofstream(folder_ / name, std::ios::binary) << bytes;
+    return folder_ / name;
+  }
+  void truncate(const fs::path& path, double share) {
+    fs::resize_file(path, static_cast<std::uintmax_t>(share * double(fs::file_size(path))));
+  }
+  std::size_t file_count() {
+    return static_cast<std::size_t>(
+        std::distance(fs::directory_iterator(folder_), fs::directory_iterator{}));
+  }
+
+  fs::path folder_;
+};
+
+/// The one-line error of reading; empty when nothing was thrown.
+template <class Read>
+std::string error_of(Read read) {
+  try {
+    (void)read();
+  } catch (const InputError& error) {
+    EXPECT_EQ(std::string(error.what()).find('\n'), std::string::npos) << error.what();
+    return error.what();
+  }
+  return "";
+}
+
+cv::Mat test_image() {
+  cv::Mat image(30, 40, CV_32FC3);
+  for (int y = 0; y < image.rows; ++y) {
+    for (int x = 0; x < image.cols; ++x) {
+      image.at<cv::Vec3f>(y, x) = {float(x) / 39, float(y) / 29, float((x * 7 + y * 3) % 11) / 10};
+    }
+  }
+  return image;
+}
+
+double max_difference(const cv::Mat& a, const cv::Mat& b) { return cv::norm(a, b, cv::NORM_INF); }
+
+TEST_F(Io, AtomicWriteReplacesAndLeavesNoTemporary) {
+  write_text(folder_ / "deep/er/a.txt", "one");
+  write_text(folder_ / "deep/er/a.txt", "two");
+  EXPECT_EQ(read_file(folder_ / "deep/er/a.txt"), "two");
+  folder_ /= "deep/er";
+  EXPECT_EQ(file_count(), 1U);
+  folder_ = folder_.parent_path().parent_path();
+}
+
+TEST_F(Io, AtomicWriteKeepsTheOldFileWhenTheWriterThrows) {
+  write_text(folder_ / "a.txt", "old");
+  EXPECT_THROW(write_atomically(folder_ / "a.txt",
+                                [](std::ostream& stream) {
+                                  stream << std::string(1 << 20, 'x');
+                                  throw StageError("no");
+                                }),
+               StageError);
+  EXPECT_EQ(read_file(folder_ / "a.txt"), "old");
+  EXPECT_EQ(file_count(), 1U);
+}
+
+TEST_F(Io, WhatCannotBeReplacedIsAStageErrorAndLeavesNoTemporary) {
+  fs::create_directories(folder_ / "taken" / "x");
+  EXPECT_THROW(write_text(folder_ / "taken", "text"), StageError);
+  EXPECT_THROW(write_text("/proc/none/a.txt", "text"), StageError);
+  EXPECT_EQ(file_count(), 1U);
+}
+
+TEST_F(Io, AFullDiskIsAStageErrorAndKeepsTheOldFile) {
+  write_text(folder_ / "a.png", "old");
+  // A file size limit stands in for the full disk: write() fails half-way in the same manner.
+  rlimit before{};
+  ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &before), 0);
+  const auto old_handler = std::signal(SIGXFSZ, SIG_IGN);
+  const rlimit small{10000, before.rlim_max};
+  ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &small), 0);
+  std::string message;
+  try {
+    write_text(folder_ / "a.png", std::string(100000, 'x'));
+  } catch (const StageError& error) {
+    message = error.what();
+  }
+  setrlimit(RLIMIT_FSIZE, &before);
+  std::signal(SIGXFSZ, old_handler);
+  EXPECT_THAT(message, ::testing::HasSubstr("a.png: cannot be written"));
+  EXPECT_EQ(read_file(folder_ / "a.png"), "old");
+  EXPECT_EQ(file_count(), 1U);
+}
+
+TEST_F(Io, JsonErrorsNameTheFileAndThePlace) {
+  const auto path = put("a.json", "{\"a\": NaN}");
+  const std::string message = error_of([&] { return read_json(path); });
+  EXPECT_THAT(message, ::testing::HasSubstr("a.json"));
+  EXPECT_THAT(message, ::testing::HasSubstr("line 1"));
+  EXPECT_THAT(error_of([&] { return read_json(put("b.json", "{\"k\": 1, \"k\": 2}")); }),
+              ::testing::HasSubstr("k: this key must not stand twice"));
+  EXPECT_THAT(error_of([&] { return read_json(folder_ / "none.json"); }),
+              ::testing::HasSubstr("does not exist"));
+  EXPECT_THAT(error_of([&] { return read_json(put("c.json", "")); }),
+              ::testing::HasSubstr("c.json"));
+}
+
+TEST_F(Io, PngRoundTripKeepsRgbOrderAndDepth) {
+  const cv::Mat image = test_image();
+  for (const auto& [bits, step] : {std::pair{8, 1.0 / 255}, std::pair{16, 1.0 / 65535}}) {
+    write_image(folder_ / "a.png", image, bits);
+    const cv::Mat back = read_image(folder_ / "a.png");
+    ASSERT_EQ(back.type(), CV_32FC3);
+    // Rounding to the nearest step; float32 adds a little.
+    EXPECT_LE(max_difference(back, image), 0.5 * step + 1e-6);
+  }
+}
+
+TEST_F(Io, FloatTiffRoundTripIsExactAndGreyIsReplicated) {
+  cv::Mat grey(5, 7, CV_32FC1);
+  for (int i = 0; i < 35; ++i) grey.at<float>(i / 7, i % 7) = 0.01F * float(i) + 1e-6F;
+  write_image(folder_ / "d.tiff", grey);
+  const cv::Mat back = read_image(folder_ / "d.tiff");
+  ASSERT_EQ(back.channels(), 3);
+  cv::Mat channel;
+  cv::extractChannel(back, channel, 2);
+  EXPECT_EQ(max_difference(channel, grey), 0);
+}
+
+TEST_F(Io, TruncatedImagesAreRejectedAtEveryLength) {
+  for (const char* name : {"a.png", "a.jpg", "a.bmp", "a.tiff"}) {
+    for (const double share : {0.0, 0.01, 0.2, 0.5, 0.9, 0.99}) {
+      write_image(folder_ / name, test_image());
+      truncate(folder_ / name, share);
+      const std::string message = error_of([&] { return read_image(folder_ / name); });
+      EXPECT_THAT(message, ::testing::HasSubstr(name)) << share;
+    }
+  }
+}
+
+TEST_F(Io, WhatIsNoImageIsRejected) {
+  EXPECT_THAT(error_of([&] { return read_image(put("a.png", "hello")); }),
+              ::testing::HasSubstr("must be a PNG, TIFF, JPEG or BMP image"));
+  EXPECT_THAT(error_of([&] { return read_image(folder_); }), ::testing::HasSubstr("folder"));
+}
+
+TEST_F(Io, FindImageTriesAllEndings) {
+  EXPECT_FALSE(find_image(folder_, "cam0").has_value());
+  put("cam0.jpeg", "x");
+  EXPECT_EQ(find_image(folder_, "cam0"), folder_ / "cam0.jpeg");
+}
+
+TEST_F(Io, PointsRoundTrip) {
+  std::vector<MeasuredPoint> points(1000);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const auto f = static_cast<float>(i);
+    points[i] = {f,
+                 -f,
+                 0.5F * f,
+                 2 * f,
+                 3 * f,
+                 static_cast<std::uint8_t>(i % 6),
+                 static_cast<std::uint8_t>(i % 5),
+                 static_cast<std::uint8_t>(i % 2),
+                 static_cast<std::uint16_t>(i * 60),
+                 0.1F,
+                 0.25F,
+                 f + 0.25F};
+  }
+  write_points(folder_ / "p.ply", points);
+  const auto back = read_points(folder_ / "p.ply");
+  ASSERT_EQ(back.size(), points.size());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    EXPECT_EQ(back[i].y, points[i].y);
+    EXPECT_EQ(back[i].camera, points[i].camera);
+    EXPECT_EQ(back[i].pattern, points[i].pattern);
+    EXPECT_EQ(back[i].line, points[i].line);
+    EXPECT_EQ(back[i].plane, points[i].plane);
+  }
+}
+
+TEST_F(Io, PointsOfOtherOrderAndMorePropertiesAreRead) {
+  const auto path = put("p.ply",
+                        "ply\nformat ascii 1.0\nelement vertex 1\nproperty ushort line\n"
+                        "property uchar red\nproperty int projector\nproperty uchar camera\n"
+                        "property double x\nproperty double y\nproperty double z\n"
+                        "property float v\nproperty float u\nend_header\n"
+                        "7 255 2 1 1.5 2.5 3.5 20 10\n");
+  const auto points = read_points(path);
+  ASSERT_EQ(points.size(), 1U);
+  EXPECT_EQ(points[0].line, 7);
+  EXPECT_EQ(points[0].projector, 2);
+  EXPECT_EQ(points[0].camera, 1);
+  EXPECT_EQ(points[0].u, 10);
+  EXPECT_EQ(points[0].z, 3.5F);
+  EXPECT_EQ(points[0].confidence, 1);
+  EXPECT_EQ(points[0].plane, 7);
+}
+
+TEST_F(Io, BrokenPointFilesAreRejected) {
+  write_points(folder_ / "p.ply", std::vector<MeasuredPoint>(10));
+  truncate(folder_ / "p.ply", 0.95);
+  EXPECT_THAT(error_of([&] { return read_points(folder_ / "p.ply"); }),
+              ::testing::HasSubstr("truncated"));
+  const std::string header =
+      "ply\nformat ascii 1.0\nelement vertex 99999999999\nproperty float x\n";
+  EXPECT_THAT(error_of([&] { return read_points(put("q.ply", header + "end_header\n1\n")); }),
+              ::testing::HasSubstr("truncated"));
+  EXPECT_THAT(error_of([&] {
+                return read_points(put("r.ply",
+                                       "ply\nformat ascii 1.0\nelement vertex 0\n"
+                                       "property float x\nend_header\n"));
+              }),
+              ::testing::HasSubstr("y: the vertices must have this property"));
+}
+
+TEST_F(Io, MeshRoundTripKeepsVerticesAndSigma) {
+  TriangleMesh box = make_box({10, 20, 30});
+  box.sigma.assign(box.vertices.size(), 0.5F);
+  write_mesh(folder_ / "m.ply", box);
+  const TriangleMesh back = read_mesh(folder_ / "m.ply");
+  EXPECT_EQ(back.faces, box.faces);
+  EXPECT_EQ(back.sigma, box.sigma);
+  EXPECT_TRUE(back.confidence.empty());
+  EXPECT_DOUBLE_EQ(signed_volume(back), 6000);
+}
+
+TEST_F(Io, ObjStlAndOffGiveOneClosedTetrahedron) {
+  const auto obj = put("t.obj",
+                       "v 0 0 0\nv 6 0 0\nv 0 6 0\nv 0 0 6\nvn 0 0 1\nf 1//1 3//1 2//1\n"
+                       "f 1 2 4\nf 1 4 3\nf 2 3 4\n");
+  const auto off = put("t.off",
+                       "OFF\n4 4 0\n0 0 0\n6 0 0\n0 6 0\n0 0 6\n3 0 2 1\n3 0 1 3\n"
+                       "3 0 3 2\n3 1 2 3\n");
+  std::string stl = "solid t\n";
+  const char* corners[] = {"0 0 0", "6 0 0", "0 6 0", "0 0 6"};
+  for (const auto& face : {std::array{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}}) {
+    stl += "facet normal 0 0 0\nouter loop\n";
+    for (const int corner : face) stl += std::string("vertex ") + corners[corner] + "\n";
+    stl += "endloop\nendfacet\n";
+  }
+  for (const auto& path : {obj, off, put("t.stl", stl + "endsolid t\n")}) {
+    const TriangleMesh mesh = read_mesh(path);
+    EXPECT_EQ(mesh.vertices.size(), 4U) << path;
+    EXPECT_EQ(count_edges(mesh).boundary, 0U) << path;
+    EXPECT_NEAR(signed_volume(mesh), 36, 1e-9) << path;
+  }
+}
+
+TEST_F(Io, UnusableMeshesAreRejected) {
+  const std::string vertices =
+      "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+      "property float z\nelement face ";
+  const std::string list = "\nproperty list uchar int vertex_indices\nend_header\n";
+  EXPECT_THAT(error_of([&] {
+                return read_mesh(put("a.ply", vertices + "0" + list + "0 0 0\n1 0 0\n0 1 0\n"));
+              }),
+              ::testing::HasSubstr("must have faces"));
+  EXPECT_THAT(
+      error_of([&] {
+        return read_mesh(put("b.ply", vertices + "1" + list + "0 0 0\n1 0 0\n0 1 0\n3 0 1 3\n"));
+      }),
+      ::testing::HasSubstr("face[0] = 3"));
+  EXPECT_THAT(
+      error_of([&] {
+        return read_mesh(put("c.ply", vertices + "1" + list + "0 0 0\nnan 0 0\n0 1 0\n3 0 1 2\n"));
+      }),
+      ::testing::HasSubstr("vertex[1]: coordinates must be finite"));
+  EXPECT_NE(error_of([&] { return read_mesh(put("d.obj", "nothing here")); }), "");
+  EXPECT_NE(error_of([&] { return read_mesh(put("e.txt", "x")); }), "");
+}
+
+}  // namespace
+}  // namespace pencilscan

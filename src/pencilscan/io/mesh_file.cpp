@@ -1,0 +1,189 @@
+#include "pencilscan/io/mesh_file.h"
+
+#include <assimp/postprocess.h>
+#include <assimp/scene.h>
+
+#include <algorithm>
+#include <assimp/Importer.hpp>
+#include <cctype>
+#include <cmath>
+#include <map>
+#include <span>
+#include <string>
+
+#include "pencilscan/core/check.h"
+#include "pencilscan/core/error.h"
+#include "pencilscan/io/file.h"
+#include "pencilscan/io/little_endian.h"
+#include "pencilscan/io/ply.h"
+
+namespace pencilscan {
+namespace {
+
+std::vector<float> optional_column(const PlyElement& vertices, const char* name) {
+  const PlyColumn* column = vertices.find(name);
+  if (column == nullptr || column->is_list) return {};
+  std::vector<float> values(column->values.size());
+  std::transform(column->values.begin(), column->values.end(), values.begin(),
+                 [](double value) { return static_cast<float>(value); });
+  return values;
+}
+
+/// Appends a polygon as a fan of triangles.
+void append_polygon(const std::string& path, std::span<const double> corners, std::size_t face,
+                    TriangleMesh& mesh) {
+  for (const double corner : corners) {
+    if (!(corner >= 0) || corner >= static_cast<double>(mesh.vertices.size())) {
+      throw InputError(path, "face[" + std::to_string(face) + "]",
+                       std::to_string(static_cast<long long>(corner)),
+                       "vertex indices must lie below the number of vertices");
+    }
+  }
+  for (std::size_t k = 2; k < corners.size(); ++k) {
+    mesh.faces.push_back({static_cast<int>(corners[0]), static_cast<int>(corners[k - 1]),
+                          static_cast<int>(corners[k])});
+  }
+}
+
+/// PLY is read here rather than by Assimp to keep shared vertices, doubles, sigma and confidence.
+TriangleMesh read_ply_mesh(const std::filesystem::path& path) {
+  const PlyFile file = read_ply(path);
+  const PlyElement* vertices = file.find("vertex");
+  if (vertices == nullptr) throw InputError(path.string(), "", "", "must have an element `vertex`");
+  TriangleMesh mesh;
+  mesh.vertices.resize(vertices->count);
+  const char* names[] = {"x", "y", "z"};
+  for (int axis = 0; axis < 3; ++axis) {
+    const PlyColumn* column = vertices->find(names[axis]);
+    if (column == nullptr || column->is_list) {
+      throw InputError(path.string(), names[axis], "", "the vertices must have this property");
+    }
+    for (std::size_t i = 0; i < vertices->count; ++i) mesh.vertices[i](axis) = column->values[i];
+  }
+  mesh.sigma = optional_column(*vertices, "sigma");
+  mesh.confidence = optional_column(*vertices, "confidence");
+  const PlyElement* faces = file.find("face");
+  if (faces == nullptr) return mesh;
+  const PlyColumn* corners = faces->find("vertex_indices");
+  if (corners == nullptr) corners = faces->find("vertex_index");
+  if (corners == nullptr || !corners->is_list) return mesh;
+  const std::span<const double> all(corners->values);
+  for (std::size_t f = 0; f < faces->count; ++f) {
+    const std::size_t begin = corners->begin[f];
+    append_polygon(path.string(), all.subspan(begin, corners->begin[f + 1] - begin), f, mesh);
+  }
+  return mesh;
+}
+
+/// Joins vertices of equal position, in order of first use. STL has one vertex per corner, and
+/// Assimp makes one per corner of an OBJ.
+TriangleMesh with_joined_vertices(const TriangleMesh& mesh) {
+  TriangleMesh joined;
+  std::map<std::array<double, 3>, int> index_of;
+  std::vector<int> new_index(mesh.vertices.size());
+  for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
+    const Vec3& x = mesh.vertices[i];
+    // + 0.0 makes -0 and 0 one key.
+    const auto [at, is_new] = index_of.try_emplace({x[0] + 0.0, x[1] + 0.0, x[2] + 0.0},
+                                                   static_cast<int>(joined.vertices.size()));
+    if (is_new) joined.vertices.push_back(x);
+    new_index[i] = at->second;
+  }
+  for (const auto& face : mesh.faces) {
+    std::array<int, 3> corner{};
+    for (std::size_t k = 0; k < 3; ++k) corner[k] = new_index[static_cast<std::size_t>(face[k])];
+    if (corner[0] != corner[1] && corner[1] != corner[2] && corner[2] != corner[0]) {
+      joined.faces.push_back(corner);
+    }
+  }
+  return joined;
+}
+
+TriangleMesh read_with_assimp(const std::filesystem::path& path, const std::string& ending) {
+  const std::string bytes = read_file(path);
+  Assimp::Importer importer;
+  const aiScene* scene = importer.ReadFileFromMemory(
+      bytes.data(), bytes.size(), aiProcess_Triangulate | aiProcess_PreTransformVertices,
+      ending.substr(1).c_str());
+  if (scene == nullptr) {
+    std::string reason = importer.GetErrorString();
+    std::replace(reason.begin(), reason.end(), '\n', ' ');
+    throw InputError(path.string(), "", "", "cannot be read as a mesh: " + reason);
+  }
+  TriangleMesh mesh;
+  for (unsigned m = 0; m < scene->mNumMeshes; ++m) {
+    const aiMesh& part = *scene->mMeshes[m];
+    const int first = static_cast<int>(mesh.vertices.size());
+    for (unsigned i = 0; i < part.mNumVertices; ++i) {
+      const aiVector3D& x = part.mVertices[i];
+      mesh.vertices.emplace_back(x.x, x.y, x.z);
+    }
+    for (unsigned f = 0; f < part.mNumFaces; ++f) {
+      const aiFace& face = part.mFaces[f];
+      if (face.mNumIndices != 3) continue;  // points and lines
+      mesh.faces.push_back({first + static_cast<int>(face.mIndices[0]),
+                            first + static_cast<int>(face.mIndices[1]),
+                            first + static_cast<int>(face.mIndices[2])});
+    }
+  }
+  return with_joined_vertices(mesh);
+}
+
+void check_mesh(const std::filesystem::path& path, const TriangleMesh& mesh) {
+  for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
+    if (!mesh.vertices[i].allFinite()) {
+      throw InputError(path.string(), "vertex[" + std::to_string(i) + "]", "",
+                       "coordinates must be finite");
+    }
+  }
+  if (mesh.faces.empty()) throw InputError(path.string(), "faces", "0", "the mesh must have faces");
+}
+
+}  // namespace
+
+TriangleMesh read_mesh(const std::filesystem::path& path) {
+  std::string ending = path.extension().string();
+  std::transform(ending.begin(), ending.end(), ending.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  TriangleMesh mesh;
+  if (ending == ".ply") {
+    mesh = read_ply_mesh(path);
+  } else if (ending == ".obj" || ending == ".stl" || ending == ".off") {
+    mesh = read_with_assimp(path, ending);
+  } else {
+    throw InputError(path.string(), "", "", "a mesh file must end with .ply, .obj, .stl or .off");
+  }
+  check_mesh(path, mesh);
+  return mesh;
+}
+
+void write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh) {
+  const bool has_sigma = !mesh.sigma.empty();
+  const bool has_confidence = !mesh.confidence.empty();
+  PENCILSCAN_CHECK(!has_sigma || mesh.sigma.size() == mesh.vertices.size());
+  PENCILSCAN_CHECK(!has_confidence || mesh.confidence.size() == mesh.vertices.size());
+  std::string bytes;
+  for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
+    for (int axis = 0; axis < 3; ++axis) {
+      append_little_endian(bytes, static_cast<float>(mesh.vertices[i](axis)));
+    }
+    if (has_sigma) append_little_endian(bytes, mesh.sigma[i]);
+    if (has_confidence) append_little_endian(bytes, mesh.confidence[i]);
+  }
+  for (const auto& face : mesh.faces) {
+    append_little_endian(bytes, std::uint8_t{3});
+    for (const int corner : face) append_little_endian(bytes, static_cast<std::int32_t>(corner));
+  }
+  write_atomically(path, [&](std::ostream& stream) {
+    stream << "ply\nformat binary_little_endian 1.0\ncomment unit mm, world frame of rig.json\n"
+           << "element vertex " << mesh.vertices.size()
+           << "\nproperty float x\nproperty float y\nproperty float z\n";
+    if (has_sigma) stream << "property float sigma\n";
+    if (has_confidence) stream << "property float confidence\n";
+    stream << "element face " << mesh.faces.size()
+           << "\nproperty list uchar int vertex_indices\nend_header\n"
+           << bytes;
+  });
+}
+
+}  // namespace pencilscan

@@ -1,0 +1,106 @@
+#include "pencilscan/rig/rig.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+namespace pencilscan {
+namespace {
+
+/// Axes closer to parallel than this (smallest eigenvalue per device) have no meeting point.
+constexpr double kParallelAxes = 1e-4;
+/// Where the axes do not meet, the object is guessed at this many baselines in front.
+constexpr double kGuessedBaselines = 5;
+/// Depth guessed for a single device, mm.
+constexpr double kGuessedDepth = 1000;
+/// Share of the distance taken as the radius where the devices do not look at the centre.
+constexpr double kGuessedRadiusShare = 0.2;
+
+std::vector<const Device*> all_devices(const Rig& rig) {
+  std::vector<const Device*> devices;
+  for (const Camera& camera : rig.cameras) devices.push_back(&camera);
+  for (const Projector& projector : rig.projectors) devices.push_back(&projector);
+  return devices;
+}
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>((values.size() - 1) / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+/// Radius of the largest sphere about `center` inside the device's view: the distance to the
+/// nearest of the four planes through the image's edges. Negative when the centre itself is
+/// outside.
+double visible_radius(const Device& device, const Vec3& center) {
+  const Vec3 x = device.device_from_world * center;
+  const double column = 0.5 * (device.width - 1), row = 0.5 * (device.height - 1);
+  const double left = device.normalized_from_pixel({-0.5, row}).x();
+  const double right = device.normalized_from_pixel({device.width - 0.5, row}).x();
+  const double top = device.normalized_from_pixel({column, -0.5}).y();
+  const double bottom = device.normalized_from_pixel({column, device.height - 0.5}).y();
+  return std::min({(x.x() - left * x.z()) / std::hypot(1, left),
+                   (right * x.z() - x.x()) / std::hypot(1, right),
+                   (x.y() - top * x.z()) / std::hypot(1, top),
+                   (bottom * x.z() - x.y()) / std::hypot(1, bottom)});
+}
+
+/// In front of the devices where their axes tell nothing.
+Vec3 guessed_center(const std::vector<const Device*>& devices) {
+  Vec3 mean = Vec3::Zero(), forward = Vec3::Zero();
+  double baseline = 0;
+  for (const Device* device : devices) {
+    mean += device->center() / static_cast<double>(devices.size());
+    forward += device->forward();
+    baseline = std::max(baseline, (device->center() - devices.front()->center()).norm());
+  }
+  const double depth = baseline > 0 ? kGuessedBaselines * baseline : kGuessedDepth;
+  return mean + depth * forward.normalized();
+}
+
+/// min_x sum_i |(I - f_i f_i')(x - c_i)|^2 over the optical axes (c_i, f_i).
+Vec3 nearest_to_axes(const std::vector<const Device*>& devices) {
+  Mat3 normal = Mat3::Zero();
+  Vec3 right = Vec3::Zero();
+  for (const Device* device : devices) {
+    const Vec3 forward = device->forward();
+    const Mat3 across = Mat3::Identity() - forward * forward.transpose();
+    normal += across;
+    right += across * device->center();
+  }
+  const Eigen::SelfAdjointEigenSolver<Mat3> eigen(normal);
+  if (eigen.eigenvalues()(0) < kParallelAxes * static_cast<double>(devices.size())) {
+    return guessed_center(devices);
+  }
+  const Vec3 center = normal.ldlt().solve(right);
+  const auto in_front = std::count_if(devices.begin(), devices.end(), [&](const Device* device) {
+    return (device->device_from_world * center).z() > 0;
+  });
+  return 2 * static_cast<std::size_t>(in_front) > devices.size() ? center : guessed_center(devices);
+}
+
+}  // namespace
+
+Mat3 Camera::color_matrix_for(const std::string& projector) const {
+  const auto at = color_matrix_by_projector.find(projector);
+  if (at != color_matrix_by_projector.end()) return at->second;
+  return color_matrix.value_or(Mat3::Identity());
+}
+
+Sphere working_volume(const Rig& rig) {
+  if (rig.volume) return *rig.volume;
+  const auto devices = all_devices(rig);
+  if (devices.empty()) return {};
+  Sphere volume;
+  volume.center = nearest_to_axes(devices);
+  std::vector<double> radii, distances;
+  for (const Device* device : devices) {
+    radii.push_back(visible_radius(*device, volume.center));
+    distances.push_back((device->center() - volume.center).norm());
+  }
+  volume.radius = median(radii);
+  if (!(volume.radius > 0)) volume.radius = kGuessedRadiusShare * median(distances);
+  return volume;
+}
+
+}  // namespace pencilscan

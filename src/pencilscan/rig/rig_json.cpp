@@ -1,0 +1,358 @@
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "pencilscan/io/file.h"
+#include "pencilscan/pattern/de_bruijn.h"
+#include "pencilscan/rig/json_field.h"
+#include "pencilscan/rig/rig.h"
+
+namespace pencilscan {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+/// |R R' - I| (Frobenius) above this is no rotation.
+constexpr double kRotationTolerance = 1e-4;
+constexpr int kLargestImage = 1 << 16;     ///< px a side
+constexpr int kLongestPeriod = 1 << 20;    ///< symbols of a de Bruijn sequence
+constexpr std::size_t kMostDevices = 256;  ///< points.ply numbers them in one byte
+constexpr int kMostLines = 1 << 16;        ///< points.ply numbers them in two bytes
+
+// ---- reading ------------------------------------------------------------------------------------
+
+Mat3 parse_camera_matrix(const JsonField& field) {
+  const Mat3 K = field.matrix3();
+  const auto rows = field.entries(3);
+  const auto entry = [&](std::size_t row, std::size_t column) {
+    return rows[row].entries(3)[column];
+  };
+  for (std::size_t k = 0; k < 2; ++k) (void)entry(k, k).positive();
+  const Mat3 lower = K.triangularView<Eigen::StrictlyLower>();
+  for (std::size_t row = 1; row < 3; ++row) {
+    for (std::size_t column = 0; column < row; ++column) {
+      if (lower(static_cast<int>(row), static_cast<int>(column)) != 0) {
+        entry(row, column).fail("must be 0");
+      }
+    }
+  }
+  if (K(2, 2) != 1) entry(2, 2).fail("must be 1");
+  return K;
+}
+
+Mat3 parse_rotation(const JsonField& field) {
+  const Mat3 R = field.matrix3();
+  const double error = (R * R.transpose() - Mat3::Identity()).norm();
+  if (error > kRotationTolerance) field.fail("must be a rotation: |R R' - I| must be <= 1e-4");
+  if (R.determinant() < 0) field.fail("must be a rotation, is a reflection: det R must be 1");
+  return R;
+}
+
+/// The name becomes a file or folder name.
+std::string parse_name(const JsonField& field) {
+  std::string name = field.text();
+  const bool usable = !name.empty() && name != "." && name != ".." &&
+                      std::none_of(name.begin(), name.end(), [](char c) {
+                        return c == '/' || c == '\\' || static_cast<unsigned char>(c) < 0x20;
+                      });
+  if (!usable) field.fail("must be usable as a file name");
+  return name;
+}
+
+/// What cameras and projectors have in common.
+void parse_device(const JsonField& field, Device& device) {
+  device.name = parse_name(field.at("name"));
+  device.width = field.at("width").integer(1, kLargestImage);
+  device.height = field.at("height").integer(1, kLargestImage);
+  device.K = parse_camera_matrix(field.at("K"));
+  const auto distortion = field.at("distortion").entries(5);
+  for (std::size_t k = 0; k < 5; ++k) device.distortion[k] = distortion[k].number();
+  device.device_from_world = {parse_rotation(field.at("R")), field.at("t").vector3()};
+}
+
+/// Shortest length at which all windows of the cyclic sequence differ (the whole period if none).
+int distinguishing_order(const std::vector<int>& sequence) {
+  const std::size_t period = sequence.size();
+  for (std::size_t order = 1; order < period; ++order) {
+    std::set<std::vector<int>> windows;
+    for (std::size_t i = 0; i < period; ++i) {
+      std::vector<int> window;
+      for (std::size_t k = 0; k < order; ++k) window.push_back(sequence[(i + k) % period]);
+      windows.insert(std::move(window));
+    }
+    if (windows.size() == period) return static_cast<int>(order);
+  }
+  return static_cast<int>(period);
+}
+
+void parse_sequence(const JsonField& field, LinePattern& pattern) {
+  const auto symbols = field.entries();
+  if (symbols.empty() || symbols.size() > kLongestPeriod) {
+    field.fail("must have 1 to 2^20 symbols");
+  }
+  pattern.sequence.clear();
+  for (const JsonField& symbol : symbols) {
+    pattern.sequence.push_back(symbol.integer(0, pattern.alphabet - 1));
+  }
+}
+
+/// colors, alphabet, order and sequence.
+void parse_code(const JsonField& field, LinePattern& pattern) {
+  const auto colors = field.at("colors").entries();
+  if (colors.empty()) field.at("colors").fail("must have at least one colour");
+  pattern.colors.clear();
+  for (const JsonField& color : colors) {
+    pattern.colors.push_back(color.text());
+    if (!color_from_name(pattern.colors.back())) {
+      color.fail("must be blue, cyan, red, yellow, green, magenta or white");
+    }
+  }
+  pattern.alphabet = static_cast<int>(colors.size());
+  const bool coded = pattern.alphabet > 1;
+  if (coded || field.has("alphabet")) {
+    const JsonField alphabet = field.at("alphabet");
+    if (alphabet.integer(1, kLongestPeriod) != pattern.alphabet) {
+      alphabet.fail("must be the number of colors, " + std::to_string(pattern.alphabet));
+    }
+  }
+  const bool own_sequence = field.has("sequence");
+  pattern.order = 1;
+  if (field.has("order") || (coded && !own_sequence)) {
+    pattern.order = field.at("order").integer(1, 20);
+    if (std::pow(pattern.alphabet, pattern.order) > kLongestPeriod) {
+      field.at("order").fail("alphabet^order must be <= 2^20");
+    }
+  }
+  if (own_sequence) {
+    parse_sequence(field.at("sequence"), pattern);
+    pattern.has_own_sequence = coded;
+    if (!field.has("order")) pattern.order = distinguishing_order(pattern.sequence);
+  } else if (coded) {
+    pattern.sequence = de_bruijn_sequence(pattern.alphabet, pattern.order);
+  }
+  if (!coded) {  // lines without a code: one local ID
+    pattern.sequence = {0};
+    pattern.order = 1;
+  }
+}
+
+LinePattern parse_pattern(const JsonField& field, const Projector& projector) {
+  field.check_keys({"orientation", "colors", "pitch_px", "line_width_px", "offset_px"},
+                   {"alphabet", "order", "sequence", "lines"});
+  LinePattern pattern;
+  const std::string orientation = field.at("orientation").text();
+  if (orientation != "vertical" && orientation != "horizontal") {
+    field.at("orientation").fail("must be \"vertical\" or \"horizontal\"");
+  }
+  pattern.axis = orientation == "vertical" ? Axis::kColumn : Axis::kRow;
+  parse_code(field, pattern);
+  pattern.pitch_px = field.at("pitch_px").positive();
+  pattern.line_width_px = field.at("line_width_px").positive();
+  if (pattern.line_width_px > pattern.pitch_px) {
+    field.at("line_width_px").fail("must be <= pitch_px");
+  }
+  pattern.offset_px = field.at("offset_px").number();
+  const int size = projector.size_across(pattern);
+  if (pattern.offset_px < -0.5 || pattern.offset_px > size - 0.5) {
+    field.at("offset_px")
+        .fail("the first line must lie on the panel: from -0.5 to " + std::to_string(size) +
+              " - 0.5");
+  }
+  if (field.has("lines")) pattern.max_lines = field.at("lines").integer(1, kMostLines);
+  if ((size - pattern.offset_px) / pattern.pitch_px >= kMostLines) {
+    field.at("pitch_px").fail("must give at most 65536 lines");
+  }
+  return pattern;
+}
+
+Projector parse_projector(const JsonField& field) {
+  field.check_keys({"name", "width", "height", "K", "distortion", "R", "t"}, {"pattern"});
+  Projector projector;
+  parse_device(field, projector);
+  if (!field.has("pattern")) return projector;
+  const JsonField pattern = field.at("pattern");
+  if (pattern.is_object()) {
+    projector.patterns.push_back(parse_pattern(pattern, projector));
+    return projector;
+  }
+  if (!pattern.is_array()) pattern.fail("must be an object or a list of objects");
+  for (const JsonField& entry : pattern.entries()) {
+    projector.patterns.push_back(parse_pattern(entry, projector));
+  }
+  if (projector.patterns.empty()) pattern.fail("a list of patterns must not be empty");
+  return projector;
+}
+
+Camera parse_camera(const JsonField& field, const std::vector<Projector>& projectors) {
+  field.check_keys({"name", "width", "height", "K", "distortion", "R", "t"},
+                   {"color_matrix", "gamma", "role"});
+  Camera camera;
+  parse_device(field, camera);
+  if (field.has("gamma")) camera.gamma = field.at("gamma").positive();
+  if (field.has("role")) {
+    if (field.at("role").text() != "texture") field.at("role").fail("must be \"texture\"");
+    camera.sees_texture_only = true;
+  }
+  if (!field.has("color_matrix")) return camera;
+  const JsonField matrix = field.at("color_matrix");
+  if (!matrix.is_object()) {
+    if (!matrix.is_array()) matrix.fail("must be a 3x3 matrix or an object by projector name");
+    camera.color_matrix = matrix.matrix3();
+    return camera;
+  }
+  for (const auto& [name, entry] : matrix.members()) {
+    const bool known = std::any_of(projectors.begin(), projectors.end(),
+                                   [&](const Projector& p) { return p.name == name; });
+    if (!known) entry.fail("there is no projector of this name");
+    camera.color_matrix_by_projector[name] = entry.matrix3();
+  }
+  return camera;
+}
+
+std::vector<JsonField> parse_device_list(const JsonField& field) {
+  const auto entries = field.entries();
+  if (entries.empty() || entries.size() > kMostDevices) field.fail("must have 1 to 256 devices");
+  std::set<std::string> names;
+  for (const JsonField& entry : entries) {
+    if (!entry.is_object()) entry.fail("must be an object");
+    if (!names.insert(entry.at("name").text()).second) {
+      entry.at("name").fail("names must differ from each other");
+    }
+  }
+  return entries;
+}
+
+Sphere parse_volume(const JsonField& field) {
+  field.check_keys({"center", "radius"}, {});
+  return {field.at("center").vector3(), field.at("radius").positive()};
+}
+
+// ---- writing ------------------------------------------------------------------------------------
+
+Json to_json(const Vec3& v) { return Json::array({v.x(), v.y(), v.z()}); }
+
+Json to_json(const Mat3& m) {
+  Json rows = Json::array();
+  for (int row = 0; row < 3; ++row) rows.push_back(to_json(Vec3(m.row(row).transpose())));
+  return rows;
+}
+
+Json device_to_json(const Device& device) {
+  Json json;
+  json["name"] = device.name;
+  json["width"] = device.width;
+  json["height"] = device.height;
+  json["K"] = to_json(device.K);
+  json["distortion"] = device.distortion;
+  json["R"] = to_json(device.device_from_world.rotation);
+  json["t"] = to_json(device.device_from_world.translation);
+  return json;
+}
+
+Json pattern_to_json(const LinePattern& pattern) {
+  Json json;
+  json["orientation"] = pattern.axis == Axis::kColumn ? "vertical" : "horizontal";
+  json["colors"] = pattern.colors;
+  if (pattern.alphabet > 1) {
+    json["alphabet"] = pattern.alphabet;
+    json["order"] = pattern.order;
+  }
+  json["pitch_px"] = pattern.pitch_px;
+  json["line_width_px"] = pattern.line_width_px;
+  json["offset_px"] = pattern.offset_px;
+  if (pattern.has_own_sequence) json["sequence"] = pattern.sequence;
+  if (pattern.max_lines) json["lines"] = *pattern.max_lines;
+  return json;
+}
+
+Json camera_to_json(const Camera& camera) {
+  Json json = device_to_json(camera);
+  if (!camera.color_matrix_by_projector.empty()) {
+    Json matrices = Json::object();
+    for (const auto& [name, matrix] : camera.color_matrix_by_projector) {
+      matrices[name] = to_json(matrix);
+    }
+    json["color_matrix"] = matrices;
+  } else if (camera.color_matrix) {
+    json["color_matrix"] = to_json(*camera.color_matrix);
+  }
+  if (camera.gamma != 1) json["gamma"] = camera.gamma;
+  if (camera.sees_texture_only) json["role"] = "texture";
+  return json;
+}
+
+Json projector_to_json(const Projector& projector) {
+  Json json = device_to_json(projector);
+  if (projector.patterns.size() == 1) {
+    json["pattern"] = pattern_to_json(projector.patterns.front());
+  } else if (!projector.patterns.empty()) {
+    json["pattern"] = Json::array();
+    for (const LinePattern& pattern : projector.patterns) {
+      json["pattern"].push_back(pattern_to_json(pattern));
+    }
+  }
+  return json;
+}
+
+/// Indented JSON with lists of plain values, and lists of such lists, on one line.
+std::string pretty(const Json& value, int depth = 0) {
+  const auto is_flat = [](const Json& list) {
+    return std::none_of(list.begin(), list.end(), [](const Json& entry) {
+      return entry.is_object() ||
+             (entry.is_array() && std::any_of(entry.begin(), entry.end(),
+                                              [](const Json& x) { return x.is_structured(); }));
+    });
+  };
+  if (!value.is_structured() || value.empty() || (value.is_array() && is_flat(value))) {
+    return value.dump();
+  }
+  const std::string indent(static_cast<std::size_t>(depth) + 1, ' ');
+  std::string text = value.is_object() ? "{" : "[";
+  bool first = true;
+  for (const auto& [key, entry] : value.items()) {
+    text += (first ? "\n" : ",\n") + indent;
+    if (value.is_object()) text += Json(key).dump() + ": ";
+    text += pretty(entry, depth + 1);
+    first = false;
+  }
+  return text + "\n" + indent.substr(1) + (value.is_object() ? "}" : "]");
+}
+
+}  // namespace
+
+Rig read_rig(const std::filesystem::path& path) {
+  const nlohmann::json json = read_json(path);
+  const JsonField root(path.string(), json);
+  root.check_keys({"format", "unit", "cameras", "projectors"}, {"volume"});
+  if (root.at("format").text() != "rig/1") root.at("format").fail("must be \"rig/1\"");
+  const std::string unit = root.at("unit").text();
+  if (unit != "mm" && unit != "unknown") root.at("unit").fail("must be \"mm\" or \"unknown\"");
+  Rig rig;
+  rig.unit_known = unit == "mm";
+  for (const JsonField& entry : parse_device_list(root.at("projectors"))) {
+    rig.projectors.push_back(parse_projector(entry));
+  }
+  for (const JsonField& entry : parse_device_list(root.at("cameras"))) {
+    rig.cameras.push_back(parse_camera(entry, rig.projectors));
+  }
+  if (root.has("volume")) rig.volume = parse_volume(root.at("volume"));
+  return rig;
+}
+
+void write_rig(const Rig& rig, const std::filesystem::path& path) {
+  Json json;
+  json["format"] = "rig/1";
+  json["unit"] = rig.unit_known ? "mm" : "unknown";
+  json["cameras"] = Json::array();
+  for (const Camera& camera : rig.cameras) json["cameras"].push_back(camera_to_json(camera));
+  json["projectors"] = Json::array();
+  for (const Projector& projector : rig.projectors) {
+    json["projectors"].push_back(projector_to_json(projector));
+  }
+  if (rig.volume) {
+    json["volume"] = {{"center", to_json(rig.volume->center)}, {"radius", rig.volume->radius}};
+  }
+  write_text(path, pretty(json) + "\n");
+}
+
+}  // namespace pencilscan

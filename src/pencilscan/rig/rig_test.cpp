@@ -1,0 +1,278 @@
+#include "pencilscan/rig/rig.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+#include <functional>
+#include <nlohmann/json.hpp>
+
+#include "pencilscan/core/error.h"
+#include "pencilscan/io/file.h"
+#include "pencilscan/pattern/de_bruijn.h"
+
+namespace pencilscan {
+namespace {
+
+using ::testing::HasSubstr;
+
+Camera ring_camera(const std::string& name, double azimuth, double elevation) {
+  Camera camera;
+  camera.name = name;
+  camera.width = 1280;
+  camera.height = 960;
+  camera.K << 2300, 0, 639.5, 0, 2300, 479.5, 0, 0, 1;
+  const Vec3 eye = 1100 * Vec3(std::cos(elevation) * std::cos(azimuth),
+                               std::cos(elevation) * std::sin(azimuth), std::sin(elevation));
+  camera.device_from_world = look_at(eye, Vec3(10, 20, 30));
+  return camera;
+}
+
+Rig example_rig() {
+  Rig rig;
+  for (int i = 0; i < 3; ++i) {
+    rig.cameras.push_back(ring_camera("cam" + std::to_string(i), 0.3 + i * 2.1, 0.2 * i));
+  }
+  rig.cameras[1].distortion = {0.1, -0.2, 1e-3, -1e-4, 0.05};
+  rig.cameras[1].gamma = 2.2;
+  rig.cameras[2].sees_texture_only = true;
+  for (int i = 0; i < 2; ++i) {
+    Projector projector;
+    static_cast<Device&>(projector) = ring_camera("proj" + std::to_string(i), 1.3 + i, 0.5);
+    rig.projectors.push_back(projector);
+  }
+  rig.projectors[0].patterns = {LinePattern{}};
+  LinePattern rows;
+  rows.axis = Axis::kRow;
+  rows.colors = {"red", "yellow", "green"};
+  rows.alphabet = 3;
+  rows.order = 2;
+  rows.sequence = {0, 1, 2, 2};
+  rows.has_own_sequence = true;
+  rows.max_lines = 7;
+  LinePattern plain;
+  plain.colors = {"white"};
+  plain.alphabet = 1;
+  plain.order = 1;
+  plain.sequence = {0};
+  rig.projectors[1].patterns = {rows, plain};
+  rig.cameras[0].color_matrix = 0.9 * Mat3::Identity();
+  rig.cameras[1].color_matrix_by_projector["proj1"] = 0.8 * Mat3::Identity();
+  rig.volume = Sphere{{1, 2, 3}, 1.0 / 3};
+  return rig;
+}
+
+class RigFile : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ =
+        std::filesystem::path(::testing::TempDir()) /
+        (std::string("rig_") + ::testing::UnitTest::GetInstance()->current_test_info()->name());
+    std::filesystem::create_directories(folder_);
+  }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+
+  /// The error of reading the example with one change.
+  std::string error_after(const std::function<void(nlohmann::json&)>& change) {
+    write_rig(example_rig(), folder_ / "rig.json");
+    nlohmann::json json = read_json(folder_ / "rig.json");
+    change(json);
+    write_text(folder_ / "rig.json", json.dump());
+    try {
+      (void)read_rig(folder_ / "rig.json");
+    } catch (const InputError& error) {
+      EXPECT_EQ(error.path, (folder_ / "rig.json").string());
+      EXPECT_EQ(std::string(error.what()).find('\n'), std::string::npos);
+      return std::string(error.what()).substr(error.path.size() + 2);
+    }
+    return "accepted";
+  }
+
+  std::filesystem::path folder_;
+};
+
+void expect_equal(const Device& a, const Device& b) {
+  EXPECT_EQ(a.name, b.name);
+  EXPECT_EQ(a.width, b.width);
+  EXPECT_EQ(a.height, b.height);
+  EXPECT_EQ(a.K, b.K);
+  EXPECT_EQ(a.distortion, b.distortion);
+  EXPECT_EQ(a.device_from_world.rotation, b.device_from_world.rotation);
+  EXPECT_EQ(a.device_from_world.translation, b.device_from_world.translation);
+}
+
+TEST_F(RigFile, RoundTripGivesTheSameDoubles) {
+  const Rig rig = example_rig();
+  write_rig(rig, folder_ / "rig.json");
+  const Rig back = read_rig(folder_ / "rig.json");
+  ASSERT_EQ(back.cameras.size(), rig.cameras.size());
+  ASSERT_EQ(back.projectors.size(), rig.projectors.size());
+  for (std::size_t i = 0; i < rig.cameras.size(); ++i) {
+    const Camera &a = rig.cameras[i], &b = back.cameras[i];
+    expect_equal(a, b);
+    EXPECT_EQ(a.gamma, b.gamma);
+    EXPECT_EQ(a.sees_texture_only, b.sees_texture_only);
+    EXPECT_EQ(a.color_matrix_for("proj0"), b.color_matrix_for("proj0"));
+    EXPECT_EQ(a.color_matrix_for("proj1"), b.color_matrix_for("proj1"));
+  }
+  for (std::size_t i = 0; i < rig.projectors.size(); ++i) {
+    expect_equal(rig.projectors[i], back.projectors[i]);
+    ASSERT_EQ(back.projectors[i].patterns.size(), rig.projectors[i].patterns.size());
+    for (std::size_t p = 0; p < rig.projectors[i].patterns.size(); ++p) {
+      const LinePattern &a = rig.projectors[i].patterns[p], &b = back.projectors[i].patterns[p];
+      EXPECT_EQ(a.axis, b.axis);
+      EXPECT_EQ(a.colors, b.colors);
+      EXPECT_EQ(a.sequence, b.sequence);
+      EXPECT_EQ(a.order, b.order);
+      EXPECT_EQ(a.pitch_px, b.pitch_px);
+      EXPECT_EQ(a.max_lines, b.max_lines);
+    }
+  }
+  EXPECT_EQ(back.volume->center, rig.volume->center);
+  EXPECT_EQ(back.volume->radius, rig.volume->radius);
+}
+
+TEST_F(RigFile, OneColourNeedsNoCode) {
+  EXPECT_EQ(error_after([](auto& json) {
+              json["projectors"][0]["pattern"] = {{"orientation", "vertical"},
+                                                  {"colors", {"white"}},
+                                                  {"pitch_px", 10.5},
+                                                  {"line_width_px", 3.25},
+                                                  {"offset_px", 0.5}};
+            }),
+            "accepted");
+  EXPECT_EQ(read_rig(folder_ / "rig.json").projectors[0].patterns[0].period(), 1);
+}
+
+TEST_F(RigFile, StructureErrorsNameTheField) {
+  const auto at = [](nlohmann::json& json, const char* pointer) -> nlohmann::json& {
+    return json[nlohmann::json::json_pointer(pointer)];
+  };
+  EXPECT_EQ(error_after([](auto& j) { j["extra"] = 1; }), "extra = 1: unknown key");
+  EXPECT_EQ(error_after([](auto& j) { j.erase("unit"); }), "unit: this key is missing");
+  EXPECT_THAT(error_after([](auto& j) { j["unit"] = "m"; }), HasSubstr("unit = \"m\": must be"));
+  EXPECT_THAT(error_after([](auto& j) { j["format"] = "rig/2"; }), HasSubstr("format = \"rig/2\""));
+  EXPECT_EQ(error_after([](auto& j) { j["cameras"][2].erase("K"); }),
+            "cameras[2].K: this key is missing");
+  EXPECT_EQ(error_after([](auto& j) { j["cameras"][2].erase("R"); }),
+            "cameras[2].R: this key is missing");
+  EXPECT_EQ(error_after([](auto& j) { j["projectors"][1].erase("t"); }),
+            "projectors[1].t: this key is missing");
+  EXPECT_EQ(error_after([](auto& j) { j["projectors"][1]["gamma"] = 1; }),
+            "projectors[1].gamma = 1: unknown key");
+  EXPECT_EQ(error_after([&](auto& j) { at(j, "/cameras/2/K/0/0") = "a"; }),
+            "cameras[2].K[0][0] = \"a\": must be a number");
+  EXPECT_EQ(error_after([&](auto& j) { at(j, "/cameras/2/K/0/0") = nullptr; }),
+            "cameras[2].K[0][0] = null: must be a number");
+  EXPECT_EQ(error_after([&](auto& j) { at(j, "/cameras/2/K/1/1") = -5; }),
+            "cameras[2].K[1][1] = -5: must be > 0");
+  EXPECT_EQ(error_after([&](auto& j) { at(j, "/cameras/2/K/2/0") = 0.5; }),
+            "cameras[2].K[2][0] = 0.5: must be 0");
+  EXPECT_THAT(error_after([&](auto& j) {
+                at(j, "/cameras/0/distortion") = {0, 0};
+              }),
+              HasSubstr("cameras[0].distortion = [0,0]: must be a list of 5"));
+  EXPECT_THAT(error_after([&](auto& j) { at(j, "/cameras/0/width") = 0; }),
+              HasSubstr("cameras[0].width = 0: must be an integer"));
+  EXPECT_THAT(error_after([&](auto& j) { at(j, "/cameras/0/width") = 12.5; }),
+              HasSubstr("cameras[0].width = 12.5: must be an integer"));
+  EXPECT_EQ(error_after([](auto& j) { j["cameras"][1]["name"] = "cam0"; }),
+            "cameras[1].name = \"cam0\": names must differ from each other");
+  EXPECT_THAT(error_after([](auto& j) { j["cameras"][1]["name"] = "../x"; }),
+              HasSubstr("must be usable as a file name"));
+  EXPECT_THAT(error_after([](auto& j) { j["cameras"] = nlohmann::json::array(); }),
+              HasSubstr("cameras = []: must have 1 to 256 devices"));
+  EXPECT_THAT(error_after([](auto& j) { j = nlohmann::json::array(); }), HasSubstr("object"));
+}
+
+TEST_F(RigFile, NonFiniteNumbersAreRejected) {
+  for (const char* number : {"NaN", "Infinity", "1e999"}) {
+    write_rig(example_rig(), folder_ / "rig.json");
+    std::string text = read_file(folder_ / "rig.json");
+    text.replace(text.find("2300.0"), 6, number);
+    write_text(folder_ / "rig.json", text);
+    EXPECT_THROW((void)read_rig(folder_ / "rig.json"), InputError) << number;
+  }
+}
+
+TEST_F(RigFile, RotationsAreChecked) {
+  EXPECT_THAT(error_after([](auto& j) {
+                j["cameras"][1]["R"] = {{1, 0, 0}, {0, 1, 1e-3}, {0, 0, 1}};
+              }),
+              HasSubstr("cameras[1].R = [[1,0,0],[0,1,0.001],[0,0,1]]: must be a rotation"));
+  EXPECT_THAT(error_after([](auto& j) {
+                j["cameras"][1]["R"] = {{1, 0, 0}, {0, 1, 0}, {0, 0, -1}};
+              }),
+              HasSubstr("is a reflection"));
+  EXPECT_EQ(error_after([](auto& j) {
+              j["cameras"][1]["R"] = {{1, 0, 0}, {0, 1, 5e-5}, {0, 0, 1}};
+            }),
+            "accepted");
+}
+
+TEST_F(RigFile, PatternsAreChecked) {
+  const auto pattern_error = [&](const char* key, const nlohmann::json& value) {
+    return error_after([&](auto& j) { j["projectors"][0]["pattern"][key] = value; });
+  };
+  EXPECT_EQ(pattern_error("pitch_px", 0), "projectors[0].pattern.pitch_px = 0: must be > 0");
+  EXPECT_THAT(pattern_error("line_width_px", -1), HasSubstr("line_width_px = -1: must be > 0"));
+  EXPECT_THAT(pattern_error("line_width_px", 13), HasSubstr("must be <= pitch_px"));
+  EXPECT_THAT(pattern_error("offset_px", 1280), HasSubstr("offset_px = 1280: the first line"));
+  EXPECT_THAT(pattern_error("colors", {"blue", "pink"}),
+              HasSubstr("pattern.colors[1] = \"pink\": must be blue"));
+  EXPECT_THAT(pattern_error("colors", {"blue", "cyan", "red"}),
+              HasSubstr("pattern.alphabet = 2: must be the number of colors, 3"));
+  EXPECT_THAT(pattern_error("sequence", {0, 1, 2}),
+              HasSubstr("pattern.sequence[2] = 2: must be an integer from 0 to 1"));
+  EXPECT_THAT(pattern_error("sequence", nlohmann::json::array()), HasSubstr("must have 1 to"));
+  EXPECT_THAT(pattern_error("orientation", "diagonal"), HasSubstr("orientation = \"diagonal\""));
+  EXPECT_THAT(pattern_error("order", 0), HasSubstr("order = 0: must be an integer from 1"));
+  EXPECT_THAT(pattern_error("lines", 0), HasSubstr("lines = 0: must be an integer from 1"));
+  EXPECT_EQ(pattern_error("colour", 1), "projectors[0].pattern.colour = 1: unknown key");
+  EXPECT_THAT(error_after([](auto& j) { j["projectors"][1]["pattern"][0]["pitch_px"] = -2; }),
+              HasSubstr("projectors[1].pattern[0].pitch_px = -2"));
+  EXPECT_THAT(error_after([](auto& j) { j["projectors"][0]["pattern"].erase("order"); }),
+              HasSubstr("pattern.order: this key is missing"));
+  EXPECT_EQ(error_after([](auto& j) { j["projectors"][0].erase("pattern"); }), "accepted");
+}
+
+TEST_F(RigFile, OptionalCameraKeysAreChecked) {
+  const auto camera_error = [&](const char* key, const nlohmann::json& value) {
+    return error_after([&](auto& j) { j["cameras"][0][key] = value; });
+  };
+  EXPECT_THAT(camera_error("gamma", 0), HasSubstr("cameras[0].gamma = 0: must be > 0"));
+  EXPECT_THAT(camera_error("role", "x"), HasSubstr("cameras[0].role = \"x\""));
+  EXPECT_THAT(camera_error("color_matrix", {{1, 0}, {0, 1}}), HasSubstr("must be a list of 3"));
+  EXPECT_THAT(camera_error("color_matrix", {{"nobody", 1}}),
+              HasSubstr("color_matrix.nobody = 1: there is no projector of this name"));
+  EXPECT_THAT(error_after([](auto& j) { j["volume"]["radius"] = 0; }),
+              HasSubstr("volume.radius = 0: must be > 0"));
+}
+
+TEST(WorkingVolume, IsWhereTheAxesMeet) {
+  Rig rig = example_rig();
+  const Sphere stated = working_volume(rig);
+  EXPECT_EQ(stated.radius, 1.0 / 3);
+  rig.volume.reset();
+  for (Camera& camera : rig.cameras) camera.distortion = {};
+  const Sphere derived = working_volume(rig);
+  // All axes go through one point exactly.
+  EXPECT_LT((derived.center - Vec3(10, 20, 30)).norm(), 1e-6);
+  // Half the image height, 480 px at f = 2300, from about 1100 mm: 1100 sin(atan(480 / 2300)).
+  EXPECT_NEAR(derived.radius, 225, 10);
+}
+
+TEST(WorkingVolume, IsFiniteAndInFrontForParallelAxes) {
+  Rig rig;
+  rig.cameras.assign(2, ring_camera("a", 0, 0));
+  rig.cameras[1].name = "b";
+  rig.cameras[1].device_from_world.translation += Vec3(-100, 0, 0);
+  const Sphere volume = working_volume(rig);
+  EXPECT_GT((rig.cameras[0].device_from_world * volume.center).z(), 0);
+  EXPECT_GT(volume.radius, 0);
+  EXPECT_TRUE(volume.center.allFinite());
+}
+
+}  // namespace
+}  // namespace pencilscan
