@@ -1,0 +1,19 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "pencilscan/geometry/mesh.h"
+
+namespace pencilscan {
+
+/// Connected component of every face (faces that share a vertex), numbered by first face.
+[[nodiscard]] std::vector<int> face_components(const TriangleMesh& mesh);
+
+/// The faces whose keep flag is set, with the vertices they use in the same order, properties too.
+[[nodiscard]] TriangleMesh submesh(const TriangleMesh& mesh, std::span<const char> keep_face);
+
+/// Area of one face, mm^2.
+[[nodiscard]] double face_area(const TriangleMesh& mesh, std::size_t face);
+
+}  // namespace pencilscan

@@ -1,0 +1,77 @@
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <span>
+#include <unordered_map>
+#include <utility>
+#include <vector>
+
+#include "pencilscan/geometry/types.h"
+
+namespace pencilscan {
+
+/// Points in equal cubes, for queries of a radius of about one cube. Visits neighbours in an order
+/// that depends on nothing but the points.
+class PointGrid {
+ public:
+  /// cell_mm > 0.
+  PointGrid(std::span<const Vec3> points, double cell_mm) : cell_(cell_mm) {
+    points_.assign(points.begin(), points.end());
+    std::vector<std::pair<std::uint64_t, std::uint32_t>> order(points.size());
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      order[i] = {key(cell_of(points_[i])), static_cast<std::uint32_t>(i)};
+    }
+    std::sort(order.begin(), order.end());
+    index_.reserve(order.size());
+    for (std::size_t i = 0; i < order.size(); ++i) {
+      if (i == 0 || order[i].first != order[i - 1].first) first_[order[i].first] = i;
+      index_.push_back(order[i].second);
+      keys_.push_back(order[i].first);
+    }
+  }
+
+  /// Calls visit(index, squared distance) for every point within `radius` of `center`.
+  template <typename Visit>
+  void for_each_within(const Vec3& center, double radius, Visit&& visit) const {
+    const Cell low = cell_of(center - Vec3::Constant(radius));
+    const Cell high = cell_of(center + Vec3::Constant(radius));
+    for (std::int64_t x = low[0]; x <= high[0]; ++x) {
+      for (std::int64_t y = low[1]; y <= high[1]; ++y) {
+        for (std::int64_t z = low[2]; z <= high[2]; ++z) {
+          const std::uint64_t wanted = key({x, y, z});
+          const auto found = first_.find(wanted);
+          if (found == first_.end()) continue;
+          for (std::size_t i = found->second; i < keys_.size() && keys_[i] == wanted; ++i) {
+            const double d2 = (points_[index_[i]] - center).squaredNorm();
+            if (d2 <= radius * radius) visit(static_cast<std::size_t>(index_[i]), d2);
+          }
+        }
+      }
+    }
+  }
+
+ private:
+  using Cell = std::array<std::int64_t, 3>;
+  [[nodiscard]] Cell cell_of(const Vec3& x) const {
+    return {static_cast<std::int64_t>(std::floor(x[0] / cell_)),
+            static_cast<std::int64_t>(std::floor(x[1] / cell_)),
+            static_cast<std::int64_t>(std::floor(x[2] / cell_))};
+  }
+  /// 21 bits per axis: unique within two million cells, which is any sensible scene.
+  [[nodiscard]] static std::uint64_t key(const Cell& c) {
+    constexpr std::uint64_t kMask = (1u << 21) - 1;
+    return (static_cast<std::uint64_t>(c[0]) & kMask) << 42 |
+           (static_cast<std::uint64_t>(c[1]) & kMask) << 21 |
+           (static_cast<std::uint64_t>(c[2]) & kMask);
+  }
+
+  double cell_;
+  std::vector<Vec3> points_;
+  std::vector<std::uint32_t> index_;  ///< points sorted by key
+  std::vector<std::uint64_t> keys_;
+  std::unordered_map<std::uint64_t, std::size_t> first_;
+};
+
+}  // namespace pencilscan

@@ -1,0 +1,39 @@
+#include "pencilscan/surface/poisson.h"
+
+#include <open3d/geometry/PointCloud.h>
+#include <open3d/geometry/TriangleMesh.h>
+#include <open3d/utility/Logging.h>
+
+#include <utility>
+
+#include "pencilscan/core/error.h"
+
+namespace pencilscan {
+
+TriangleMesh poisson_surface(std::span<const CurveSample> samples, int depth, double scale) {
+  const open3d::utility::VerbosityContextManager quiet(open3d::utility::VerbosityLevel::Error);
+  open3d::geometry::PointCloud cloud;
+  cloud.points_.reserve(samples.size());
+  cloud.normals_.reserve(samples.size());
+  for (const CurveSample& sample : samples) {
+    cloud.points_.push_back(sample.position);
+    cloud.normals_.push_back(sample.normal);
+  }
+  TriangleMesh mesh;
+  try {
+    const auto result = open3d::geometry::TriangleMesh::CreateFromPointCloudPoisson(
+        cloud, static_cast<std::size_t>(depth), 0.0F, static_cast<float>(scale), false, 1);
+    const open3d::geometry::TriangleMesh& made = *std::get<0>(result);
+    mesh.vertices.assign(made.vertices_.begin(), made.vertices_.end());
+    mesh.faces.reserve(made.triangles_.size());
+    for (const Eigen::Vector3i& t : made.triangles_) mesh.faces.push_back({t[0], t[1], t[2]});
+  } catch (const std::runtime_error& error) {
+    throw StageError(std::string("surface: Poisson reconstruction failed: ") + error.what());
+  }
+  if (signed_volume(mesh) < 0) {
+    for (auto& face : mesh.faces) std::swap(face[1], face[2]);
+  }
+  return mesh;
+}
+
+}  // namespace pencilscan

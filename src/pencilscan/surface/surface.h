@@ -1,0 +1,78 @@
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "pencilscan/core/progress.h"
+#include "pencilscan/geometry/mesh.h"
+#include "pencilscan/io/point_file.h"
+#include "pencilscan/rig/rig.h"
+
+namespace pencilscan {
+
+/// From measured curve pixels to one closed surface.
+///
+/// 1. Points of one curve within a short piece of it become one sample (sample.h): positions are
+///    averaged with weights 1 / sigma^2, and the curves' dense sampling along themselves no longer
+///    outweighs the sparse one across them.
+/// 2. Samples vote on each other (filter.h): samples of other curves on the same local surface
+///    support, samples whose sight or light line passes through one contradict it.
+/// 3. A local quadric per sample gives its normal and its place across the surface (local_fit.h).
+/// 4. Screened Poisson (Kazhdan and Hoppe, 2013; Open3D's build of it) gives a closed surface.
+/// 5. Each vertex learns from the samples near it whether it was measured, and how well.
+///
+/// The bytes are the same for any thread count: Open3D's solver runs on one thread, since its sums
+/// depend on the number of threads.
+struct SurfaceOptions {
+  bool filter = true;            ///< votes on; off takes every point as it is
+  int max_depth = 8;             ///< of the octree, in [5, 10]; 8 takes about 5 s, 9 about 20 s
+  double cell_spacings = 0.25;   ///< wished octree cell in line spacings, > 0
+  double sample_spacings = 0.3;  ///< length of curve per sample in line spacings, > 0
+  double reach_spacings = 1.0;   ///< a vertex farther from all samples was not measured, > 0
+  double min_component_share = 0.05;  ///< of the largest component's measured area, in [0, 1]
+};
+
+enum class SurfaceStatus {
+  kDone,
+  kTooFewPoints,  ///< meshes are empty
+  kNotClosed,     ///< mesh.ply has boundary or non-manifold edges (see warnings)
+};
+
+struct SurfaceReport {
+  SurfaceStatus status = SurfaceStatus::kDone;
+  std::size_t points = 0;       ///< input points with finite coordinates
+  std::size_t points_used = 0;  ///< of them, those whose sample survived the votes
+  std::size_t samples = 0;
+  std::size_t samples_used = 0;
+  double spacing_mm = 0;  ///< median distance of neighbouring light sheets at the object
+  int depth = 0;          ///< of the octree
+  double scale = 0;       ///< octree cube / bounding cube of the samples
+  std::size_t components_removed = 0;
+  std::size_t vertices = 0;
+  std::size_t faces = 0;
+  EdgeCounts edges;           ///< of the closed mesh; all zero when it is watertight
+  double measured_share = 0;  ///< area of mesh_measured / area of mesh
+  double seconds_filter = 0;
+  double seconds_poisson = 0;
+  double seconds = 0;
+  std::vector<std::string> warnings;
+};
+
+struct SurfaceResult {
+  TriangleMesh mesh;       ///< closed; confidence 0 = invented
+  TriangleMesh measured;   ///< the same faces without those that touch an invented vertex
+  std::vector<char> used;  ///< per input point: 1 when the surface rests on it
+  SurfaceReport report;
+};
+
+/// InputError when a point names a camera, projector or pattern that the rig does not have.
+[[nodiscard]] SurfaceResult reconstruct_surface(const Rig& rig,
+                                                std::span<const MeasuredPoint> points,
+                                                const SurfaceOptions& options = {},
+                                                const Progress& progress = {});
+
+[[nodiscard]] std::string to_string(SurfaceStatus status);
+
+}  // namespace pencilscan

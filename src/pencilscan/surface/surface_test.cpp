@@ -1,0 +1,274 @@
+#include "pencilscan/surface/surface.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <numbers>
+
+#include "pencilscan/core/error.h"
+#include "pencilscan/core/parallel.h"
+#include "pencilscan/core/random.h"
+#include "pencilscan/surface/mesh_parts.h"
+
+namespace pencilscan {
+namespace {
+
+constexpr double kRadius = 45;     // mm
+constexpr double kDistance = 900;  // mm, of the devices from the centre
+constexpr double kNoise = 0.1;     // mm along the camera ray
+constexpr float kSigma = 0.1F;
+
+Device device_at(const Vec3& direction, const std::string& name) {
+  Device device;
+  device.name = name;
+  device.width = 640;
+  device.height = 640;
+  device.K << 2400, 0, 319.5, 0, 2400, 319.5, 0, 0, 1;
+  device.device_from_world = look_at(kDistance * direction.normalized(), Vec3::Zero());
+  return device;
+}
+
+/// Five cameras and five projectors all around; projectors alternate between line directions.
+Rig ball_rig() {
+  Rig rig;
+  const std::vector<Vec3> directions = {{1, 0, 0.1},  {0.1, 1, 0.2}, {-1, 0.1, 0},
+                                        {0, -1, 0.2}, {0.2, 0.1, 1}, {0.1, 0.2, -1}};
+  for (std::size_t i = 0; i < directions.size(); ++i) {
+    Camera camera;
+    static_cast<Device&>(camera) = device_at(directions[i], "cam" + std::to_string(i));
+    rig.cameras.push_back(camera);
+    Projector projector;
+    const Mat3 turn = Eigen::AngleAxisd(0.5, Vec3(0.3, 0.2, 1).normalized()).toRotationMatrix();
+    static_cast<Device&>(projector) = device_at(turn * directions[i], "proj" + std::to_string(i));
+    LinePattern pattern;
+    pattern.pitch_px = 10;
+    pattern.axis = i % 2 == 0 ? Axis::kColumn : Axis::kRow;
+    projector.patterns.push_back(pattern);
+    rig.projectors.push_back(projector);
+  }
+  return rig;
+}
+
+std::optional<Vec3> hit_ball(const Ray& ray) {
+  const double b = ray.origin.dot(ray.direction);
+  const double d = b * b - ray.origin.squaredNorm() + kRadius * kRadius;
+  if (d < 0) return std::nullopt;
+  return ray.origin + (-b - std::sqrt(d)) * ray.direction;
+}
+
+/// What noisy cameras would measure of the ball: along each line of each projector, every point
+/// that a camera sees at less than 72 degrees.
+std::vector<MeasuredPoint> ball_points(const Rig& rig, std::uint64_t seed = 1) {
+  std::vector<MeasuredPoint> points;
+  Random random(seed);
+  for (std::size_t k = 0; k < rig.projectors.size(); ++k) {
+    const Projector& projector = rig.projectors[k];
+    const LinePattern& pattern = projector.patterns[0];
+    for (int line = 0; line < projector.line_count(pattern); ++line) {
+      for (int along = 0; along < 640; along += 3) {
+        const double c = pattern.position_px(line);
+        const Vec2 pixel = pattern.axis == Axis::kColumn ? Vec2(c, along) : Vec2(along, c);
+        const auto x = hit_ball(projector.ray(pixel));
+        if (!x || x->normalized().dot((projector.center() - *x).normalized()) < 0.3) continue;
+        for (std::size_t camera = 0; camera < rig.cameras.size(); ++camera) {
+          const Vec3 to_camera = (rig.cameras[camera].center() - *x).normalized();
+          if (x->normalized().dot(to_camera) < 0.3) continue;
+          const Vec3 seen = *x + kNoise * random.normal() * to_camera;
+          const auto uv = rig.cameras[camera].project(seen);
+          MeasuredPoint p;
+          p.x = static_cast<float>(seen.x());
+          p.y = static_cast<float>(seen.y());
+          p.z = static_cast<float>(seen.z());
+          p.u = static_cast<float>((*uv)[0]);
+          p.v = static_cast<float>((*uv)[1]);
+          p.camera = static_cast<std::uint8_t>(camera);
+          p.projector = static_cast<std::uint8_t>(k);
+          p.line = static_cast<std::uint16_t>(line);
+          p.plane = static_cast<float>(line);
+          p.sigma = kSigma;
+          p.confidence = 1;
+          points.push_back(p);
+        }
+      }
+    }
+  }
+  return points;
+}
+
+/// Moves pieces of curves (camera, projector, line) along their camera rays by 8 to 30 mm, as a
+/// wrong line label does.
+void mislabel(const Rig& rig, double share, std::vector<MeasuredPoint>& points) {
+  for (MeasuredPoint& p : points) {
+    const std::uint64_t piece = (((p.camera * 64ULL + p.projector) * 1024ULL) + p.line) * 64ULL +
+                                static_cast<std::uint64_t>(p.v / 40);
+    Random random(7, piece);
+    if (random.uniform() >= share) continue;
+    const double shift = random.uniform(8, 30) * (random.uniform() < 0.5 ? -1 : 1);
+    const Vec3 x(p.x, p.y, p.z);
+    const Vec3 moved = x + shift * (rig.cameras[p.camera].center() - x).normalized();
+    p.x = static_cast<float>(moved.x());
+    p.y = static_cast<float>(moved.y());
+    p.z = static_cast<float>(moved.z());
+  }
+}
+
+/// Coarser than the default: the ball needs no finer cells, and the tests run under sanitizers.
+SurfaceOptions test_options() {
+  SurfaceOptions options;
+  options.cell_spacings = 0.5;
+  return options;
+}
+
+double worst_deviation(const TriangleMesh& mesh) {
+  double worst = 0;
+  for (const Vec3& v : mesh.vertices) worst = std::max(worst, std::abs(v.norm() - kRadius));
+  return worst;
+}
+
+double share_beyond(const TriangleMesh& mesh, double limit_mm) {
+  std::size_t count = 0;
+  for (const Vec3& v : mesh.vertices) count += std::abs(v.norm() - kRadius) > limit_mm;
+  return static_cast<double>(count) / static_cast<double>(mesh.vertices.size());
+}
+
+bool equal_bytes(const TriangleMesh& a, const TriangleMesh& b) {
+  const auto same = [](const auto& x, const auto& y) {
+    return x.size() == y.size() &&
+           (x.empty() || std::memcmp(x.data(), y.data(), x.size() * sizeof(x[0])) == 0);
+  };
+  return same(a.vertices, b.vertices) && same(a.faces, b.faces) && same(a.sigma, b.sigma) &&
+         same(a.confidence, b.confidence);
+}
+
+void expect_watertight(const SurfaceResult& result) {
+  EXPECT_EQ(result.report.status, SurfaceStatus::kDone);
+  const EdgeCounts edges = count_edges(result.mesh);
+  EXPECT_EQ(edges.boundary, 0u);
+  EXPECT_EQ(edges.non_manifold, 0u);
+  EXPECT_GT(signed_volume(result.mesh), 0);
+}
+
+TEST(Surface, BallIsClosedAndAccurate) {
+  const Rig rig = ball_rig();
+  const std::vector<MeasuredPoint> points = ball_points(rig);
+  const SurfaceResult result = reconstruct_surface(rig, points, test_options());
+  expect_watertight(result);
+  // Three sigma of the noise, which the fit averages down except at the rims.
+  EXPECT_LT(worst_deviation(result.mesh), 0.3);
+  const double volume = 4.0 / 3 * std::numbers::pi * std::pow(kRadius, 3);
+  EXPECT_NEAR(signed_volume(result.mesh) / volume, 1, 0.005);
+  EXPECT_GT(result.report.measured_share, 0.98);
+  EXPECT_GT(result.report.points_used, points.size() * 99 / 100);
+}
+
+TEST(Surface, SameBytesForAnyThreadCount) {
+  const Rig rig = ball_rig();
+  const std::vector<MeasuredPoint> points = ball_points(rig);
+  std::vector<SurfaceResult> results;
+  for (const int threads : {1, 2, 4}) {
+    const ThreadLimit limit(threads);
+    results.push_back(reconstruct_surface(rig, points, test_options()));
+  }
+  for (std::size_t i = 1; i < results.size(); ++i) {
+    EXPECT_TRUE(equal_bytes(results[0].mesh, results[i].mesh));
+    EXPECT_TRUE(equal_bytes(results[0].measured, results[i].measured));
+  }
+}
+
+TEST(Surface, WrongLabelsAreVotedOut) {
+  const Rig rig = ball_rig();
+  std::vector<MeasuredPoint> points = ball_points(rig);
+  const std::vector<MeasuredPoint> truth = points;
+  mislabel(rig, 0.15, points);
+  const SurfaceResult result = reconstruct_surface(rig, points, test_options());
+  expect_watertight(result);
+  // The few wrong pieces that stay bend the surface here and there, by far less than they are off.
+  EXPECT_LT(worst_deviation(result.mesh), 1.5);
+  EXPECT_LT(share_beyond(result.mesh, 0.3), 0.02);
+  std::size_t wrong = 0;
+  std::size_t wrong_used = 0;
+  std::size_t right_used = 0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const bool moved = points[i].x != truth[i].x;
+    wrong += moved;
+    wrong_used += moved && result.used[i];
+    right_used += !moved && result.used[i];
+  }
+  EXPECT_LT(wrong_used, wrong / 30);
+  EXPECT_GT(right_used, (points.size() - wrong) * 95 / 100);
+}
+
+TEST(Surface, HalfBallIsMeasuredHalfAndClosed) {
+  const Rig rig = ball_rig();
+  std::vector<MeasuredPoint> points = ball_points(rig);
+  std::erase_if(points, [](const MeasuredPoint& p) { return p.x < 0; });
+  const SurfaceResult result = reconstruct_surface(rig, points, test_options());
+  expect_watertight(result);
+  const double half = 2 * std::numbers::pi * kRadius * kRadius;
+  // The rim lies within one line spacing (3.8 mm) of the last points: 8 % of the half's height.
+  EXPECT_NEAR(surface_area(result.measured) / half, 1, 0.08);
+  EXPECT_GT(count_edges(result.measured).boundary, 0u);
+  for (const Vec3& v : result.measured.vertices) EXPECT_GT(v.x(), -6);
+  double guessed = 0;
+  for (std::size_t v = 0; v < result.mesh.vertices.size(); ++v) {
+    if (result.mesh.vertices[v].x() < -10) {
+      EXPECT_EQ(result.mesh.confidence[v], 0.0F);
+      EXPECT_GT(result.mesh.sigma[v], 1.0F);
+      ++guessed;
+    }
+  }
+  EXPECT_GT(guessed, 100);
+}
+
+TEST(Surface, TwoCamerasAndOneProjectorGiveAClosedSurface) {
+  Rig rig = ball_rig();
+  std::vector<MeasuredPoint> points = ball_points(rig);
+  std::erase_if(points, [](const MeasuredPoint& p) { return p.camera > 1 || p.projector != 0; });
+  const SurfaceResult result = reconstruct_surface(rig, points, test_options());
+  EXPECT_EQ(count_edges(result.mesh).boundary, 0u);
+  EXPECT_LT(worst_deviation(result.measured), 1.0);
+  EXPECT_GT(surface_area(result.measured), 0.15 * surface_area(result.mesh));
+}
+
+TEST(Surface, TooFewPointsIsAStatus) {
+  const Rig rig = ball_rig();
+  const std::vector<MeasuredPoint> points = ball_points(rig);
+  for (const std::size_t count : {std::size_t{0}, std::size_t{1}, std::size_t{20}}) {
+    const SurfaceResult result = reconstruct_surface(rig, std::span(points).first(count));
+    EXPECT_EQ(result.report.status, SurfaceStatus::kTooFewPoints);
+    EXPECT_TRUE(result.mesh.faces.empty());
+    EXPECT_FALSE(result.report.warnings.empty());
+  }
+}
+
+TEST(Surface, BadPointsAreLeftOutOrNamed) {
+  const Rig rig = ball_rig();
+  std::vector<MeasuredPoint> points = ball_points(rig);
+  points.resize(10);
+  points[3].x = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_EQ(reconstruct_surface(rig, points).report.points, 9u);
+  points[4].camera = 77;
+  EXPECT_THROW(static_cast<void>(reconstruct_surface(rig, points)), InputError);
+}
+
+TEST(MeshParts, ComponentsAndSubmeshOfTwoBoxes) {
+  TriangleMesh mesh = make_box(Vec3::Ones());
+  const TriangleMesh other = make_box(Vec3::Ones(), Vec3(5, 0, 0));
+  const int shift = static_cast<int>(mesh.vertices.size());
+  mesh.vertices.insert(mesh.vertices.end(), other.vertices.begin(), other.vertices.end());
+  for (auto face : other.faces)
+    mesh.faces.push_back({face[0] + shift, face[1] + shift, face[2] + shift});
+  const std::vector<int> component = face_components(mesh);
+  std::vector<char> keep;
+  for (const int c : component) keep.push_back(c == 1);
+  const TriangleMesh part = submesh(mesh, keep);
+  EXPECT_EQ(part.vertices.size(), other.vertices.size());
+  EXPECT_EQ(part.faces, other.faces);
+}
+
+}  // namespace
+}  // namespace pencilscan
