@@ -1,0 +1,49 @@
+#pragma once
+
+#include <span>
+
+#include "pencilscan/geometry/ray_scene.h"
+
+namespace pencilscan {
+
+enum class AlignmentKind { kNone, kRigid, kSimilarity };
+
+/// x_in_truth = scale * (rotation * x_in_result) + translation.
+struct Similarity {
+  double scale = 1;  ///< > 0
+  Mat3 rotation = Mat3::Identity();
+  Vec3 translation = Vec3::Zero();  ///< mm
+
+  [[nodiscard]] Vec3 operator*(const Vec3& x) const { return scale * (rotation * x) + translation; }
+  [[nodiscard]] Similarity inverse() const {
+    const double s = 1 / scale;
+    return {s, rotation.transpose(), -s * (rotation.transpose() * translation)};
+  }
+};
+
+struct AlignmentOptions {
+  std::size_t max_points = 20000;  ///< an even subset of the points is used
+  int max_iterations = 60;
+};
+struct AlignmentReport {
+  Similarity truth_from_result;
+  double median_mm = 0;  ///< distance of the aligned points to the truth
+  int iterations = 0;
+};
+
+/// Moves measured points onto the true surface: iterative closest points with the exact closest
+/// point of the mesh and the distance along its normal. For p moved by a small rotation w,
+/// translation t and growth l about the centroid c, the residual is n . (p + w x (p - c) + l (p -
+/// c) + t - q) (Chen and Medioni 1992; l only for a similarity), weighted by Tukey's biweight with
+/// a scale of 1.4826 times the median residual, so that wrong points count nothing. Starts from
+/// where the points are; where that ends far from the surface, also from the poses that match
+/// centroid, size and principal axes (four signs), a point-to-point step (Umeyama 1991) first.
+/// Points: at least 10.
+[[nodiscard]] AlignmentReport align_to_surface(std::span<const Vec3> points, const RayScene& truth,
+                                               AlignmentKind kind,
+                                               const AlignmentOptions& options = {});
+
+/// The mesh moved by a similarity.
+[[nodiscard]] TriangleMesh transformed(TriangleMesh mesh, const Similarity& b_from_a);
+
+}  // namespace pencilscan

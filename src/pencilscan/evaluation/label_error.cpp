@@ -1,0 +1,146 @@
+#include "pencilscan/evaluation/label_error.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <numeric>
+#include <tuple>
+
+#include "pencilscan/core/parallel.h"
+
+namespace pencilscan {
+namespace {
+
+Vec2 pixel_of(const MeasuredPoint& p) {
+  return {static_cast<double>(p.u), static_cast<double>(p.v)};
+}
+
+/// Offsets in a unit disc: the centre, six at half radius, twelve on the rim.
+std::vector<Vec2> disc_offsets() {
+  std::vector<Vec2> offsets = {Vec2::Zero()};
+  for (const auto& [radius, count] : {std::pair{0.5, 6}, std::pair{1.0, 12}}) {
+    for (int i = 0; i < count; ++i) {
+      const double angle = 2 * std::numbers::pi * i / count;
+      offsets.emplace_back(radius * std::cos(angle), radius * std::sin(angle));
+    }
+  }
+  return offsets;
+}
+
+void mark_duplicates(std::span<const MeasuredPoint> points, std::vector<PointVerdict>& verdicts) {
+  const auto key = [&](std::size_t i) {
+    const MeasuredPoint& p = points[i];
+    return std::tuple(p.camera, p.projector, p.pattern, p.line, std::lround(p.u), std::lround(p.v));
+  };
+  std::vector<std::size_t> order(points.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t i, std::size_t j) { return key(i) < key(j); });
+  for (std::size_t k = 1; k < order.size(); ++k) {
+    verdicts[order[k]].counted = key(order[k]) != key(order[k - 1]);
+  }
+}
+
+/// Error along the ray of (u, v): where the vertex lies on it against where the surface does.
+double ray_error(const TruthScene& truth, const MeasuredPoint& p) {
+  const Ray ray = truth.rig().cameras[p.camera].ray(pixel_of(p));
+  const auto hit = truth.scene().first_hit(ray);
+  if (!hit) return std::numeric_limits<double>::infinity();
+  const Vec3 vertex(static_cast<double>(p.x), static_cast<double>(p.y), static_cast<double>(p.z));
+  return std::abs((vertex - ray.origin).dot(ray.direction) - hit->distance);
+}
+
+void judge(const TruthScene& truth, const MeasuredPoint& p, const std::vector<Vec2>& disc,
+           const LabelOptions& options, PointVerdict& verdict) {
+  const PatternChannel channel{p.projector, p.pattern};
+  const Vec2 pixel = pixel_of(p);
+  verdict.ray_error_mm = ray_error(truth, p);
+  for (const Vec2& offset : disc) {
+    const Vec2 at = pixel + options.disc_px * offset;
+    const auto sample = sample_line(truth, p.camera, channel, at);
+    if (!sample) continue;
+    const double per_px = sample->gradient.norm();
+    if (!verdict.spacing_px && &offset == disc.data()) verdict.spacing_px = 1 / per_px;
+    const double tolerance = std::max(options.tolerance_px * per_px, options.tolerance_lines);
+    if (std::abs(sample->coordinate - p.line) > tolerance) continue;
+    verdict.right = true;
+    const double from_center = distance_to_true_line(truth, p.camera, channel, p.line, pixel);
+    verdict.line_error_px =
+        std::min(from_center, offset.norm() * options.disc_px +
+                                  distance_to_true_line(truth, p.camera, channel, p.line, at));
+    return;
+  }
+}
+
+}  // namespace
+
+std::vector<PointVerdict> judge_points(const TruthScene& truth,
+                                       std::span<const MeasuredPoint> points,
+                                       const LabelOptions& options) {
+  std::vector<PointVerdict> verdicts(points.size());
+  mark_duplicates(points, verdicts);
+  const auto disc = disc_offsets();
+  constexpr std::size_t kChunk = 512;
+  parallel_for((points.size() + kChunk - 1) / kChunk, [&](std::size_t chunk) {
+    const std::size_t end = std::min(points.size(), (chunk + 1) * kChunk);
+    for (std::size_t i = chunk * kChunk; i < end; ++i) {
+      if (verdicts[i].counted) judge(truth, points[i], disc, options, verdicts[i]);
+    }
+  });
+  return verdicts;
+}
+
+LabelFigures label_figures(const TruthScene& truth, std::span<const MeasuredPoint> points,
+                           std::span<const PointVerdict> verdicts) {
+  LabelFigures figures;
+  figures.wrong_by_projector.resize(truth.rig().projectors.size());
+  figures.wrong_by_spacing.resize(kSpacingBandCount);
+  std::vector<double> errors;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const PointVerdict& v = verdicts[i];
+    if (!v.counted) continue;
+    figures.wrong.add(!v.right);
+    figures.wrong_by_projector[points[i].projector].add(!v.right);
+    if (v.spacing_px) {
+      figures.wrong_by_spacing[spacing_band(*v.spacing_px)].add(!v.right);
+    } else {
+      figures.wrong_unlit.add(!v.right);
+    }
+    if (v.right && std::isfinite(v.line_error_px)) errors.push_back(v.line_error_px);
+  }
+  figures.line_error_median_px = quantile(errors, 0.5);
+  figures.line_error_p90_px = quantile(errors, 0.9);
+  figures.largest_wrong_patch_mm2 = largest_wrong_patch_mm2(truth, points, verdicts);
+  return figures;
+}
+
+SigmaFigures sigma_figures(std::span<const MeasuredPoint> points,
+                           std::span<const PointVerdict> verdicts) {
+  SigmaFigures figures;
+  std::vector<double> sigmas;
+  std::vector<double> errors;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (!verdicts[i].counted || !(points[i].sigma > 0)) continue;
+    sigmas.push_back(static_cast<double>(points[i].sigma));
+    errors.push_back(verdicts[i].ray_error_mm);
+    figures.below_one.add(errors.back() < sigmas.back());
+    figures.below_two.add(errors.back() < 2 * sigmas.back());
+  }
+  figures.rank_correlation = rank_correlation(sigmas, errors);
+  std::vector<std::size_t> order(sigmas.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t i, std::size_t j) { return sigmas[i] < sigmas[j]; });
+  constexpr std::size_t kTenths = 10;
+  for (std::size_t k = 0; k < kTenths; ++k) {
+    Share share;
+    for (std::size_t i = k * order.size() / kTenths; i < (k + 1) * order.size() / kTenths; ++i) {
+      share.add(errors[order[i]] < sigmas[order[i]]);
+    }
+    figures.tenths.push_back(share.value());
+  }
+  return figures;
+}
+
+}  // namespace pencilscan

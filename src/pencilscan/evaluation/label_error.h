@@ -1,0 +1,70 @@
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "pencilscan/evaluation/line_recall.h"
+
+namespace pencilscan {
+
+/// What the truth says about one vertex of points.ply.
+struct PointVerdict {
+  bool counted =
+      true;  ///< false: repeats (camera, projector, pattern, line, pixel) of an earlier one
+  bool right = false;  ///< the label is true
+  double line_error_px =
+      0;  ///< distance in the image to the true line of the label; right ones only
+  double ray_error_mm =
+      0;  ///< along the camera ray of (u, v) to the true surface; infinite: missed
+  /// Image spacing of the projector's lines at (u, v); nothing where it does not light.
+  std::optional<double> spacing_px;
+};
+
+struct LabelOptions {
+  double disc_px = 1;             ///< radius of the disc of camera rays that may find the line
+  double tolerance_px = 1;        ///< of the true line coordinate, by its local gradient,
+  double tolerance_lines = 0.15;  ///< or this, whichever is more
+};
+
+/// Judges every vertex by ray tracing: the centre of the disc first, then rings at half and at its
+/// whole radius. Needs camera, projector and pattern within the rig.
+[[nodiscard]] std::vector<PointVerdict> judge_points(const TruthScene& truth,
+                                                     std::span<const MeasuredPoint> points,
+                                                     const LabelOptions& options = {});
+
+/// Label error as docs/figures.md defines it: the share is of *wrong* vertices.
+struct LabelFigures {
+  Share wrong;
+  std::vector<Share> wrong_by_projector;
+  std::vector<Share> wrong_by_spacing;  ///< kSpacingBandCount bands
+  Share wrong_unlit;                    ///< vertices where the projector does not light at (u, v)
+  double line_error_median_px = 0;      ///< of the right ones
+  double line_error_p90_px = 0;
+  double largest_wrong_patch_mm2 = 0;
+};
+[[nodiscard]] LabelFigures label_figures(const TruthScene& truth,
+                                         std::span<const MeasuredPoint> points,
+                                         std::span<const PointVerdict> verdicts);
+
+/// Area on the true surface of the largest connected patch of wrong vertices. In each camera and
+/// for each channel a pixel belongs to its nearest vertex within half a line spacing (plus a
+/// pixel); pixels of wrong vertices are connected to their four neighbours unless the depth steps
+/// between.
+[[nodiscard]] double largest_wrong_patch_mm2(const TruthScene& truth,
+                                             std::span<const MeasuredPoint> points,
+                                             std::span<const PointVerdict> verdicts);
+
+/// How well sigma predicts the error along the camera ray.
+struct SigmaFigures {
+  Share below_one;              ///< ideal 0.683
+  Share below_two;              ///< ideal 0.954
+  std::vector<double> tenths;   ///< below_one within each tenth of the vertices by sigma
+  double rank_correlation = 0;  ///< of sigma with the error
+};
+/// Counts every counted vertex with sigma > 0; a ray that misses the true surface is an error
+/// beyond any sigma.
+[[nodiscard]] SigmaFigures sigma_figures(std::span<const MeasuredPoint> points,
+                                         std::span<const PointVerdict> verdicts);
+
+}  // namespace pencilscan

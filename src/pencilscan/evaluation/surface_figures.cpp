@@ -1,0 +1,186 @@
+#include "pencilscan/evaluation/surface_figures.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "pencilscan/core/parallel.h"
+#include "pencilscan/core/random.h"
+
+namespace pencilscan {
+namespace {
+
+constexpr std::size_t kChunk = 1024;
+
+double cos_deg(double degrees) { return std::cos(degrees * std::numbers::pi / 180); }
+
+/// Calls body(i) for i in [0, count) on chunks.
+template <class Body>
+void for_each_index(std::size_t count, const Body& body) {
+  parallel_for((count + kChunk - 1) / kChunk, [&](std::size_t chunk) {
+    const std::size_t end = std::min(count, (chunk + 1) * kChunk);
+    for (std::size_t i = chunk * kChunk; i < end; ++i) body(i);
+  });
+}
+
+Coverage cover(const TruthScene& truth, const std::vector<PatternChannel>& channels,
+               const SurfaceSample& sample, const CoverageOptions& options) {
+  const Rig& rig = truth.rig();
+  const double limit = cos_deg(options.max_incidence_deg);
+  std::vector<std::optional<Lighting>> lights(rig.projectors.size());
+  Coverage coverage;
+  for (std::size_t p = 0; p < rig.projectors.size(); ++p) {
+    lights[p] = truth.lighting(static_cast<int>(p), sample.point, sample.normal);
+    coverage.lit_by += lights[p] ? 1 : 0;
+  }
+  for (std::size_t c = 0; c < rig.cameras.size() && !coverage.measurable; ++c) {
+    const Camera& camera = rig.cameras[c];
+    if (camera.sees_texture_only) continue;
+    const Vec3 way = sample.point - camera.center();
+    const double cos_camera = -sample.normal.dot(way.normalized());
+    const auto pixel = camera.project(sample.point);
+    if (!(cos_camera > 0) || !pixel || !camera.contains(*pixel) ||
+        !truth.scene().visible(camera.center(), sample.point, truth.margin_mm())) {
+      continue;
+    }
+    coverage.seen = true;
+    if (!(cos_camera > limit)) continue;
+    const SurfaceHit hit{sample.point, sample.normal, way.norm(), cos_camera};
+    for (const PatternChannel& channel : channels) {
+      const auto& light = lights[static_cast<std::size_t>(channel.projector)];
+      if (!light || !(light->cos_projector > limit)) continue;
+      if (!truth.line_coordinate(channel, light->pixel)) continue;
+      const Vec2 gradient = truth.line_gradient(static_cast<int>(c), channel, *pixel, hit);
+      if (!(gradient.norm() * options.min_spacing_px <= 1)) continue;
+      coverage.measurable = true;
+      break;
+    }
+  }
+  return coverage;
+}
+
+/// Distance to the nearest facet and whether its normal agrees.
+struct Nearest {
+  double distance = std::numeric_limits<double>::infinity();
+  bool normal_agrees = false;
+};
+
+std::vector<Nearest> nearest_facets(const RayScene& scene,
+                                    const std::vector<SurfaceSample>& samples, double max_deg) {
+  std::vector<Nearest> nearest(samples.size());
+  const double limit = cos_deg(max_deg);
+  for_each_index(samples.size(), [&](std::size_t i) {
+    const auto closest = scene.closest_point(samples[i].point);
+    if (!closest) return;
+    const Vec3 normal = face_normal(scene.mesh(), closest->face);
+    nearest[i] = {closest->distance, normal.dot(samples[i].normal) >= limit};
+  });
+  return nearest;
+}
+
+}  // namespace
+
+std::vector<SurfaceSample> sample_surface(const TriangleMesh& mesh, std::size_t count,
+                                          std::uint64_t seed) {
+  std::vector<double> cumulative;
+  cumulative.reserve(mesh.faces.size());
+  double area = 0;
+  const auto corner = [&](std::size_t f, std::size_t k) -> const Vec3& {
+    return mesh.vertices[static_cast<std::size_t>(mesh.faces[f][k])];
+  };
+  for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
+    area += 0.5 * (corner(f, 1) - corner(f, 0)).cross(corner(f, 2) - corner(f, 0)).norm();
+    cumulative.push_back(area);
+  }
+  if (!(area > 0)) return {};
+  std::vector<SurfaceSample> samples;
+  samples.reserve(count);
+  Random random(seed);
+  for (std::size_t i = 0; i < count; ++i) {
+    const double at =
+        area * (static_cast<double>(i) + random.uniform()) / static_cast<double>(count);
+    const auto it = std::upper_bound(cumulative.begin(), cumulative.end(), at);
+    const auto f =
+        std::min(static_cast<std::size_t>(it - cumulative.begin()), mesh.faces.size() - 1);
+    // Uniform in a triangle. Osada et al., "Shape distributions" (2002), equation (1).
+    const double root = std::sqrt(random.uniform());
+    const double r = random.uniform();
+    samples.push_back(
+        {(1 - root) * corner(f, 0) + root * (1 - r) * corner(f, 1) + root * r * corner(f, 2),
+         face_normal(mesh, f)});
+  }
+  return samples;
+}
+
+std::vector<Coverage> surface_coverage(const TruthScene& truth,
+                                       const std::vector<SurfaceSample>& samples,
+                                       const CoverageOptions& options) {
+  const auto channels = pattern_channels(truth.rig());
+  std::vector<Coverage> coverage(samples.size());
+  for_each_index(samples.size(),
+                 [&](std::size_t i) { coverage[i] = cover(truth, channels, samples[i], options); });
+  return coverage;
+}
+
+std::vector<double> distances_to(const RayScene& scene, const std::vector<Vec3>& points) {
+  std::vector<double> distances(points.size(), std::numeric_limits<double>::infinity());
+  for_each_index(points.size(), [&](std::size_t i) {
+    if (const auto closest = scene.closest_point(points[i])) distances[i] = closest->distance;
+  });
+  return distances;
+}
+
+SurfaceFigures surface_figures(const TruthScene& truth, const TriangleMesh& measured,
+                               const CompletenessOptions& options, double mm_per_unit) {
+  SurfaceFigures figures;
+  // Precision and distance: from the measured surface to the truth.
+  std::vector<Vec3> measured_points;
+  for (const auto& s : sample_surface(measured, options.sample_count, options.seed)) {
+    measured_points.push_back(s.point);
+  }
+  auto distances = distances_to(truth.scene(), measured_points);
+  for (double& d : distances) d *= mm_per_unit;
+  figures.distance = distance_figures(distances);
+
+  // Completeness: from the truth to the measured surface.
+  const auto samples = sample_surface(truth.scene().mesh(), options.sample_count, options.seed);
+  const auto coverage = surface_coverage(truth, samples);
+  const RayScene measured_scene(measured);
+  const auto nearest = nearest_facets(measured_scene, samples, options.max_normal_deg);
+
+  Share measurable;
+  Share one;
+  Share two;
+  for (const Coverage& c : coverage) {
+    measurable.add(c.measurable);
+    one.add(c.seen && c.lit_by >= 1);
+    two.add(c.seen && c.lit_by >= 2);
+  }
+  figures.measurable_share = measurable.value();
+  figures.lit_by_one_share = one.value();
+  figures.lit_by_two_share = two.value();
+  figures.measurable_mm2 =
+      measurable.value() * surface_area(truth.scene().mesh()) * mm_per_unit * mm_per_unit;
+
+  for (const double threshold : options.thresholds_mm) {
+    Share found;
+    Share found_one;
+    Share found_two;
+    for (std::size_t i = 0; i < samples.size(); ++i) {
+      const bool near = nearest[i].distance * mm_per_unit < threshold && nearest[i].normal_agrees;
+      if (coverage[i].measurable) found.add(near);
+      if (coverage[i].seen && coverage[i].lit_by >= 1) found_one.add(near);
+      if (coverage[i].seen && coverage[i].lit_by >= 2) found_two.add(near);
+    }
+    Share precise;
+    for (const double d : distances) precise.add(d < threshold);
+    const double recall = found.value();
+    const double precision = precise.count > 0 ? precise.value() : 0;
+    const double sum = recall + precision;
+    figures.completeness.push_back({threshold, recall, found_one.value(), found_two.value(),
+                                    precision, sum > 0 ? 2 * recall * precision / sum : 0});
+  }
+  return figures;
+}
+
+}  // namespace pencilscan

@@ -1,0 +1,219 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "pencilscan/core/error.h"
+#include "pencilscan/core/parallel.h"
+#include "pencilscan/core/random.h"
+#include "pencilscan/evaluation/evaluate.h"
+#include "pencilscan/evaluation/synthetic_oracle.h"
+
+namespace pencilscan {
+namespace {
+
+constexpr int kRings = 60;
+constexpr double kSagMm = 0.05;  // of the facets of such a sphere below the ideal one
+
+CompletenessOptions few_samples() {
+  CompletenessOptions options;
+  options.sample_count = 10000;
+  return options;
+}
+
+TEST(SampleSurface, PointsLieOnTheSurfaceUniformly) {
+  const auto samples = sample_surface(make_box({10, 20, 30}), 22000, 5);
+  ASSERT_EQ(samples.size(), 22000U);
+  std::size_t on_x = 0;
+  for (const auto& s : samples) {
+    EXPECT_NEAR((s.point.array() / Eigen::Array3d(5, 10, 15)).abs().maxCoeff(), 1, 1e-9);
+    on_x += std::abs(s.normal.x()) > 0.5 ? 1 : 0;
+  }
+  EXPECT_NEAR(static_cast<double>(on_x) / 22000, 1200.0 / 2200, 0.001);  // stratified by face
+}
+
+TEST(SurfaceFigures, SphereLargerByOneMillimetreIsOneMillimetreAway) {
+  const TruthScene truth(make_sphere(oracle::kRadiusMm, kRings), oracle::ring(3));
+  const auto figures =
+      surface_figures(truth, make_sphere(oracle::kRadiusMm + 1, kRings), few_samples());
+  EXPECT_NEAR(figures.distance.median_mm, 1, kSagMm);
+  EXPECT_NEAR(figures.distance.p90_mm, 1, kSagMm);
+  EXPECT_NEAR(figures.distance.rms_mm, 1, kSagMm);
+  EXPECT_EQ(figures.distance.share_above_2mm, 0);
+  ASSERT_EQ(figures.completeness.size(), 3U);
+  EXPECT_EQ(figures.completeness[0].measurable, 0);  // at 0.5 mm
+  EXPECT_EQ(figures.completeness[2].measurable, 1);  // at 2 mm
+  EXPECT_EQ(figures.completeness[2].f_score, 1);
+}
+
+TEST(SurfaceFigures, HalfASphereIsHalfComplete) {
+  const TriangleMesh whole = make_sphere(oracle::kRadiusMm, kRings);
+  TriangleMesh half = whole;
+  std::erase_if(half.faces, [&](const std::array<int, 3>& f) {
+    double z = 0;
+    for (const int v : f) z += whole.vertices[static_cast<std::size_t>(v)].z();
+    return z < 0;
+  });
+  Rig rig = oracle::ring(6);
+  // Level projectors make the measurable surface symmetric about z = 0.
+  for (Projector& p : rig.projectors) {
+    p.device_from_world = look_at({p.center().x(), p.center().y(), 0}, Vec3::Zero());
+  }
+  const TruthScene truth(whole, rig);
+  const auto figures = surface_figures(truth, half, few_samples());
+  constexpr double kSampling = 0.02;  // four standard errors of a share of 10000
+  EXPECT_NEAR(figures.completeness[0].measurable, 0.5, kSampling);
+  EXPECT_NEAR(figures.completeness[0].lit_by_one, 0.5, kSampling);
+  EXPECT_NEAR(figures.completeness[0].lit_by_two, 0.5, kSampling);
+  EXPECT_EQ(figures.completeness[0].precision, 1);
+  EXPECT_NEAR(figures.completeness[0].f_score, 2.0 / 3, kSampling);
+  // Turned inside out it is near but faces the wrong way.
+  for (auto& f : half.faces) std::swap(f[0], f[1]);
+  EXPECT_LT(surface_figures(truth, half, few_samples()).completeness[0].measurable, 0.001);
+}
+
+TEST(SurfaceFigures, MeasurableCapOfASphereIsTheClosedForm) {
+  Rig rig = oracle::ring(1, 40);  // lines 27 px apart: spacing never limits below 75 degrees
+  rig.projectors[0].device_from_world = rig.cameras[0].device_from_world;
+  const TruthScene truth(make_sphere(oracle::kRadiusMm, 120), rig);
+  const auto samples = sample_surface(truth.scene().mesh(), 20000, 1);
+  Share measurable;
+  Share seen;
+  for (const auto& c : surface_coverage(truth, samples)) {
+    measurable.add(c.measurable);
+    seen.add(c.seen && c.lit_by >= 1);
+  }
+  // Incidence i is reached at the polar angle i - asin(R sin i / D); a cap holds (1 - cos) / 2.
+  const auto cap = [](double incidence) {
+    const double ratio = oracle::kRadiusMm / oracle::kDeviceDistanceMm;
+    const double polar = incidence - std::asin(ratio * std::sin(incidence));
+    return (1 - std::cos(polar)) / 2;
+  };
+  constexpr double kSampling = 0.01;
+  EXPECT_NEAR(measurable.value(), cap(75 * std::numbers::pi / 180), kSampling);
+  EXPECT_NEAR(seen.value(), cap(std::numbers::pi / 2), kSampling);
+}
+
+/// A body without symmetry, and points of it in another frame, some of them wrong.
+struct Displaced {
+  TriangleMesh mesh = make_box({100, 150, 220});
+  std::vector<Vec3> points;
+};
+Displaced displaced(const Similarity& truth_from_result) {
+  Displaced d;
+  d.mesh.vertices[0] += Vec3(30, 40, 50);
+  d.mesh.vertices[5] += Vec3(-20, 10, 5);
+  Random random(7);
+  const Similarity result_from_truth = truth_from_result.inverse();
+  for (const auto& s : sample_surface(d.mesh, 3000, 3)) {
+    Vec3 p = s.point;
+    if (random.uniform() < 0.1) p += 30 * Vec3(random.normal(), random.normal(), random.normal());
+    d.points.push_back(result_from_truth * p);
+  }
+  return d;
+}
+
+void expect_near(const Similarity& a, const Similarity& b, double scale_tolerance,
+                 double length_tolerance_mm) {
+  EXPECT_NEAR(a.scale, b.scale, scale_tolerance * b.scale);
+  EXPECT_NEAR((a.rotation - b.rotation).norm(), 0, scale_tolerance);
+  EXPECT_NEAR((a.translation - b.translation).norm(), 0, length_tolerance_mm);
+}
+
+TEST(Alignment, RecoversASmallRigidMotionDespiteOutliers) {
+  Similarity truth_from_result;
+  truth_from_result.rotation =
+      Eigen::AngleAxisd(0.05, Vec3(1, 2, 3).normalized()).toRotationMatrix();
+  truth_from_result.translation = {3, -2, 4};
+  const auto d = displaced(truth_from_result);
+  const auto report = align_to_surface(d.points, RayScene(d.mesh), AlignmentKind::kRigid);
+  expect_near(report.truth_from_result, truth_from_result, 1e-4, 0.01);
+  EXPECT_LT(report.median_mm, 1e-3);
+}
+
+TEST(Alignment, RecoversALargeSimilarity) {
+  Similarity truth_from_result;
+  truth_from_result.scale = 250;  // a result without known unit
+  truth_from_result.rotation =
+      Eigen::AngleAxisd(2.2, Vec3(-1, 0.5, 2).normalized()).toRotationMatrix();
+  truth_from_result.translation = {300, -120, 45};
+  const auto d = displaced(truth_from_result);
+  const auto report = align_to_surface(d.points, RayScene(d.mesh), AlignmentKind::kSimilarity);
+  expect_near(report.truth_from_result, truth_from_result, 1e-4, 0.05);
+}
+
+TEST(Evaluate, PerfectPointsHavePerfectFigures) {
+  const Rig rig = oracle::ring(3);
+  EvaluationInput input;
+  input.points = oracle::sphere_points(rig);
+  input.mesh = make_sphere(oracle::kRadiusMm, kRings);
+  EvaluationOptions options;
+  options.completeness = few_samples();
+  const auto json =
+      figures_json(evaluate(make_sphere(oracle::kRadiusMm, kRings), rig, input, options), rig);
+  constexpr double kRim = 0.001;  // rays at the rim of the ideal sphere that miss the faceted one
+  EXPECT_LT(json.at("label_error").get<double>(), kRim);
+  EXPECT_GT(json.at("line_recall").get<double>(), 0.99);
+  EXPECT_LT(json.at("distance_median_mm").get<double>(), kSagMm);
+  EXPECT_EQ(json.at("share_above_2mm"), 0);
+  EXPECT_EQ(json.at("completeness_0.5mm"), 1);
+  EXPECT_EQ(json.at("completeness_1mm"), 1);
+  EXPECT_EQ(json.at("f_score_2mm"), 1);
+  EXPECT_EQ(json.at("sigma_rank_correlation"), 0);
+  EXPECT_EQ(json.at("by_projector").size(), 3U);
+}
+
+TEST(Evaluate, SimilarityAlignmentCountsInTheUnitOfTheTruth) {
+  const Rig rig = oracle::ring(3);
+  EvaluationInput input;
+  input.points = oracle::sphere_points(rig);
+  input.mesh = make_sphere(oracle::kRadiusMm, kRings);
+  // The truth is ten times as large and elsewhere: the result's unit is a centimetre.
+  Similarity truth_from_result;
+  truth_from_result.scale = 10;
+  truth_from_result.translation = {50, 5000, -70};
+  EvaluationOptions options;
+  options.align = AlignmentKind::kSimilarity;
+  options.completeness = few_samples();
+  const auto evaluation = evaluate(
+      transformed(make_sphere(oracle::kRadiusMm, 90), truth_from_result), rig, input, options);
+  EXPECT_NEAR(evaluation.alignment->truth_from_result.scale, 10, 0.01);
+  EXPECT_LT(evaluation.labels->wrong.value(), 0.001);
+  EXPECT_GT(evaluation.recall->recall.value(), 0.99);
+  EXPECT_LT(evaluation.point_distance->median_mm, 10 * kSagMm);
+  EXPECT_EQ(evaluation.surface->completeness[2].measurable, 1);
+}
+
+TEST(Evaluate, FiguresAreTheSameForAnyThreadCount) {
+  const Rig rig = oracle::ring(2);
+  EvaluationInput input;
+  input.points = oracle::sphere_points(rig);
+  input.mesh = make_sphere(oracle::kRadiusMm + 0.3, 20);
+  EvaluationOptions options;
+  options.align = AlignmentKind::kRigid;
+  options.completeness.sample_count = 3000;
+  const auto run = [&](int threads) {
+    const ThreadLimit limit(threads);
+    return figures_json(evaluate(make_sphere(oracle::kRadiusMm, 40), rig, input, options), rig)
+        .dump();
+  };
+  EXPECT_EQ(run(1), run(3));
+}
+
+TEST(Evaluate, NamesTheVertexThatTheRigCannotHold) {
+  const Rig rig = oracle::ring(2);
+  EvaluationInput input;
+  input.points = std::vector<MeasuredPoint>(1);
+  input.points->front().projector = 7;
+  try {
+    (void)evaluate(make_sphere(oracle::kRadiusMm, 8), rig, input);
+    FAIL() << "no InputError";
+  } catch (const InputError& error) {
+    EXPECT_THAT(error.field, ::testing::HasSubstr("projector"));
+    EXPECT_EQ(error.value, "7");
+  }
+}
+
+}  // namespace
+}  // namespace pencilscan
