@@ -1,0 +1,350 @@
+#include <algorithm>
+#include <filesystem>
+#include <iomanip>
+#include <memory>
+#include <optional>
+#include <sstream>
+#include <vector>
+
+#include "pencilscan/cli/command.h"
+#include "pencilscan/core/error.h"
+#include "pencilscan/core/parallel.h"
+#include "pencilscan/core/stopwatch.h"
+#include "pencilscan/io/file.h"
+#include "pencilscan/io/image.h"
+#include "pencilscan/io/mesh_file.h"
+#include "pencilscan/simulation/placement.h"
+#include "pencilscan/simulation/povray.h"
+#include "pencilscan/simulation/render.h"
+#include "pencilscan/simulation/sensor.h"
+#include "pencilscan/simulation/truth.h"
+
+namespace pencilscan::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct SimulateOptions {
+  CommonOptions common;
+  std::string rig_path;
+  std::string mesh_path;
+  std::string out;
+  bool overwrite = false;
+
+  bool fit = false;
+  UpAxis up = UpAxis::kZ;
+  int frame_count = 1;
+  double rotate_deg = 0;
+  std::vector<double> translate_mm = {0, 0, 0};
+
+  bool gray_code = false;
+  bool truth_maps = false;
+  bool export_povray = false;
+
+  SurfaceOptions surface;
+  bool flat = false;
+  RenderOptions render;
+  bool no_falloff = false;
+  FilmOptions film;
+  std::optional<double> black_level;
+
+  std::string noise = "none";
+  std::optional<double> crosstalk;
+  std::optional<double> ambient;
+  std::optional<double> blur_px;
+  std::optional<double> full_well;
+  std::optional<double> read_noise;
+  double gain = 1;
+  int bits = 8;
+};
+
+/// Light that a projector shows where its panel is black, in Gray-code captures.
+constexpr double kCaptureBlackLevel = 0.004;
+/// First image number of the captures: their noise never repeats that of a frame.
+constexpr std::uint32_t kFirstCaptureImage = 0x40000000;
+
+std::string frame_name(int frame) {
+  std::ostringstream name;
+  name << std::setw(6) << std::setfill('0') << frame;
+  return name.str();
+}
+
+SensorOptions sensor_of(const SimulateOptions& options, const Camera& camera) {
+  SensorOptions sensor = *sensor_preset(options.noise);
+  // A rig that states how colours mix describes its cameras whole; a preset adds nothing to it.
+  if (camera.states_color_matrix()) sensor.crosstalk = 0;
+  sensor.crosstalk = options.crosstalk.value_or(sensor.crosstalk);
+  sensor.ambient = options.ambient.value_or(sensor.ambient);
+  sensor.blur_px = options.blur_px.value_or(sensor.blur_px);
+  sensor.full_well = options.full_well.value_or(sensor.full_well);
+  sensor.read_noise = options.read_noise.value_or(sensor.read_noise);
+  sensor.gain = options.gain;
+  sensor.gamma = camera.gamma;
+  sensor.bit_depth = options.bits;
+  return sensor;
+}
+
+void check_rig(const SimulateOptions& options, const Rig& rig) {
+  for (std::size_t p = 0; p < rig.projectors.size(); ++p) {
+    if (rig.projectors[p].patterns.empty()) {
+      throw InputError(options.rig_path, "projectors[" + std::to_string(p) + "].pattern", "",
+                       "this key is missing: there is nothing to show");
+    }
+  }
+}
+
+/// The mesh where frame 0 has it; InputError when no camera would see any of it.
+TriangleMesh placed_mesh(const SimulateOptions& options, const Rig& rig) {
+  TriangleMesh mesh = turned_upright(read_mesh(options.mesh_path), options.up);
+  if (options.fit) mesh = fitted(std::move(mesh), working_volume(rig));
+  for (const Camera& camera : rig.cameras) {
+    for (const Vec3& vertex : mesh.vertices) {
+      const auto pixel = camera.project(vertex);
+      if (pixel && camera.contains(*pixel)) return mesh;
+    }
+  }
+  const BoundingBox box = bounding_box(mesh);
+  std::ostringstream extent;
+  extent << "[" << box.low.transpose() << "] to [" << box.high.transpose() << "] mm";
+  throw InputError(options.mesh_path, "vertices", extent.str(),
+                   "must lie in the view of at least one camera (--fit moves them there)");
+}
+
+/// Refuses, or with --overwrite clears, what an earlier run left.
+void prepare_output(const SimulateOptions& options) {
+  const fs::path out(options.out);
+  std::error_code ignored;
+  if (!fs::exists(out, ignored)) return;
+  if (!fs::is_directory(out, ignored)) {
+    throw InputError("--out", "", options.out, "must be a folder, not a file");
+  }
+  if (fs::is_empty(out, ignored)) return;
+  if (!options.overwrite) {
+    throw InputError("--out", "", options.out, "must be new or empty (or give --overwrite)");
+  }
+  for (const char* name : {"frames", "truth", "captures", "povray"}) fs::remove_all(out / name);
+}
+
+cv::Mat as_float(const cv::Mat& map) {
+  cv::Mat result;
+  map.convertTo(result, CV_32F);
+  return result;
+}
+
+void write_truth_maps(const fs::path& folder, const Rig& rig, std::size_t c,
+                      const CameraTruth& truth) {
+  const std::string& camera = rig.cameras[c].name;
+  write_image(folder / "depth" / (camera + ".tiff"), as_float(truth.depth));
+  write_image(folder / "cosine" / (camera + ".tiff"), truth.cosine);
+  for (std::size_t p = 0; p < rig.projectors.size(); ++p) {
+    const ProjectorTruth& light = truth.projectors[p];
+    const fs::path place = folder / rig.projectors[p].name;
+    write_image(place / "lit" / (camera + ".png"), light.lit * 255);
+    write_image(place / "cosine" / (camera + ".tiff"), light.cosine);
+    for (std::size_t i = 0; i < light.line.size(); ++i) {
+      const std::string name = light.line.size() == 1 ? "line" : "line" + std::to_string(i);
+      write_image(place / name / (camera + ".tiff"), as_float(light.line[i]));
+    }
+  }
+}
+
+/// What each camera's picture is lit with: a texture camera sees white light instead of patterns.
+std::vector<PanelLight> lights_for(const Camera& camera, const Rig& rig, const FilmOptions& film) {
+  std::vector<PanelLight> lights = line_lights(rig, film);
+  if (!camera.sees_texture_only) return lights;
+  for (std::size_t p = 0; p < lights.size(); ++p) {
+    lights[p] = gray_code_light(rig.projectors[p], {GrayCodeImage::Kind::kWhite});
+  }
+  return lights;
+}
+
+void write_frames(const SimulateOptions& options, const Rig& rig, const TriangleMesh& mesh,
+                  const Progress& progress) {
+  const fs::path out(options.out);
+  FilmOptions film = options.film;
+  film.black_level = options.black_level.value_or(0);
+  const Motion motion{
+      options.rotate_deg * M_PI / 180,
+      Vec3(options.translate_mm[0], options.translate_mm[1], options.translate_mm[2]),
+      working_volume(rig).center};
+  const std::size_t total = static_cast<std::size_t>(options.frame_count) * rig.cameras.size();
+  for (int frame = 0; frame < options.frame_count; ++frame) {
+    const SimulatedObject object(mesh, options.surface, motion.at(frame));
+    const fs::path truth =
+        options.frame_count == 1 ? out / "truth" : out / "truth" / frame_name(frame);
+    write_mesh(truth / "mesh.ply", object.mesh());
+    for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
+      const Camera& camera = rig.cameras[c];
+      const auto image =
+          static_cast<std::uint32_t>(static_cast<std::size_t>(frame) * rig.cameras.size() + c);
+      progress("rendering frames", static_cast<double>(image) / static_cast<double>(total));
+      const cv::Mat light =
+          render_camera(rig, c, object, lights_for(camera, rig, film), options.render);
+      write_image(out / "frames" / frame_name(frame) / (camera.name + ".png"),
+                  apply_sensor(light, sensor_of(options, camera), options.common.seed, image),
+                  options.bits);
+      if (options.truth_maps) write_truth_maps(truth, rig, c, camera_truth(rig, c, object));
+    }
+    if (options.export_povray) {
+      write_povray_scene(out / "povray" / frame_name(frame), rig, object, options.render);
+    }
+  }
+  progress("rendering frames", 1);
+}
+
+/// Returns the number of camera-projector pairs with captures.
+int write_captures(const SimulateOptions& options, const Rig& rig, const TriangleMesh& mesh,
+                   const Progress& progress) {
+  const SimulatedObject object(mesh, options.surface);
+  FilmOptions film = options.film;
+  film.black_level = options.black_level.value_or(kCaptureBlackLevel);
+  const std::size_t pairs = rig.projectors.size() * rig.cameras.size();
+  int written = 0;
+  for (std::size_t pair = 0; pair < pairs; ++pair) {
+    progress("rendering captures", static_cast<double>(pair) / static_cast<double>(pairs));
+    const Projector& projector = rig.projectors[pair / rig.cameras.size()];
+    const std::size_t c = pair % rig.cameras.size();
+    std::vector<PanelLight> sequence;
+    for (const auto& image : gray_code_sequence(projector.width, projector.height)) {
+      sequence.push_back(gray_code_light(projector, image, film));
+    }
+    const auto images =
+        render_sequence(rig, c, pair / rig.cameras.size(), object, sequence, options.render);
+    if (images.empty()) continue;  // the camera cannot see this projector's light
+    ++written;
+    const fs::path folder =
+        fs::path(options.out) / "captures" / projector.name / rig.cameras[c].name;
+    const SensorOptions sensor = sensor_of(options, rig.cameras[c]);
+    parallel_for(images.size(), [&](std::size_t i) {
+      const auto number = kFirstCaptureImage + static_cast<std::uint32_t>(pair * 64 + i);
+      write_image(folder / (frame_name(static_cast<int>(i)).substr(3) + ".png"),
+                  apply_sensor(images[i], sensor, options.common.seed, number), options.bits);
+    });
+  }
+  progress("rendering captures", 1);
+  return written;
+}
+
+void run_simulate(SimulateOptions options) {
+  const ThreadLimit threads(options.common.threads);
+  const Stopwatch watch;
+  options.surface.smooth = !options.flat;
+  options.render.inverse_square = !options.no_falloff;
+  const Rig rig = read_rig(options.rig_path);
+  check_rig(options, rig);
+  const TriangleMesh mesh = placed_mesh(options, rig);
+  if (options.export_povray) check_povray_can_show(rig, options.surface, options.rig_path);
+  const std::string rig_text = read_file(options.rig_path);  // before an --overwrite may touch it
+  prepare_output(options);
+  write_text(fs::path(options.out) / "rig.json", rig_text);
+  const Progress progress = stderr_progress();
+  write_frames(options, rig, mesh, progress);
+  nlohmann::ordered_json figures;
+  figures["frames"] = options.frame_count;
+  figures["cameras"] = rig.cameras.size();
+  figures["projectors"] = rig.projectors.size();
+  figures["mesh_faces"] = mesh.faces.size();
+  if (options.gray_code) figures["capture_pairs"] = write_captures(options, rig, mesh, progress);
+  figures["seconds"] = watch.seconds();
+  print_figures(options.common, figures);
+}
+
+void add_scene_options(CLI::App& command, SimulateOptions& options) {
+  const std::map<std::string, UpAxis> axes{{"x", UpAxis::kX}, {"y", UpAxis::kY}, {"z", UpAxis::kZ}};
+  const std::map<std::string, TextureKind> textures{{"none", TextureKind::kNone},
+                                                    {"noise", TextureKind::kNoise},
+                                                    {"stripes", TextureKind::kStripes},
+                                                    {"checker", TextureKind::kChecker}};
+  command.add_flag("--fit", options.fit, "Centre and scale the mesh into the rig's volume");
+  command.add_option("--up", options.up, "Axis of the mesh that points up: x, y, z")
+      ->transform(CLI::CheckedTransformer(axes))
+      ->default_str("z");
+  command.add_option("--frame-count", options.frame_count, "Frames of a moving object")
+      ->check(CLI::Range(1, 999999))
+      ->capture_default_str();
+  command.add_option("--rotate-deg", options.rotate_deg, "Turn about the vertical per frame");
+  command.add_option("--translate-mm", options.translate_mm, "Shift x y z per frame")->expected(3);
+  command.add_option("--albedo", options.surface.albedo)
+      ->check(CLI::Range(0.0, 1.0))
+      ->capture_default_str();
+  command.add_option("--texture", options.surface.texture.kind, "none, noise, stripes, checker")
+      ->transform(CLI::CheckedTransformer(textures))
+      ->default_str("none");
+  command.add_option("--contrast", options.surface.texture.contrast, "Contrast of the texture")
+      ->check(CLI::Range(0.0, 1.0))
+      ->capture_default_str();
+  command
+      .add_option("--texture-mm", options.surface.texture.period_mm, "Period of the texture, mm")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  command.add_option("--specular", options.surface.specular, "Weight of the Blinn-Phong lobe")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  command.add_option("--roughness", options.surface.roughness, "1 / exponent of that lobe")
+      ->check(CLI::Range(1e-4, 1.0))
+      ->capture_default_str();
+  command.add_flag("--flat", options.flat, "One normal per face (cubes); else smooth shading");
+}
+
+void add_device_options(CLI::App& command, SimulateOptions& options) {
+  command.add_option("--samples", options.render.samples, "Rays per pixel and axis")
+      ->check(CLI::Range(1, 16))
+      ->capture_default_str();
+  command
+      .add_option("--exposure", options.render.exposure,
+                  "Image value of a white surface that faces a projector at the centre")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  command.add_flag("--no-falloff", options.no_falloff, "Light does not weaken with distance");
+  command.add_flag("--pixelated", options.film.pixelated, "Projector pixels, no continuous film");
+  command.add_option("--projector-blur", options.film.blur_px, "Standard deviation, panel px")
+      ->check(CLI::Range(0.0, 50.0));
+  command
+      .add_option("--black-level", options.black_level,
+                  "Light of a black panel pixel (default 0; 0.004 in captures)")
+      ->check(CLI::Range(0.0, 0.9));
+  command
+      .add_option("--noise", options.noise,
+                  "Sensor preset: crosstalk, ambient light, blur and noise together")
+      ->check(CLI::IsMember({"none", "low", "medium", "high"}))
+      ->capture_default_str();
+  command.add_option("--crosstalk", options.crosstalk, "Share that colour filters leak")
+      ->check(CLI::Range(0.0, 0.5));
+  command.add_option("--ambient", options.ambient, "Light everywhere")->check(CLI::Range(0.0, 1.0));
+  command.add_option("--blur", options.blur_px, "Camera blur, standard deviation, px")
+      ->check(CLI::Range(0.0, 50.0));
+  command.add_option("--full-well", options.full_well, "Electrons at value 1; 0: no noise")
+      ->check(CLI::NonNegativeNumber);
+  command.add_option("--read-noise", options.read_noise, "Standard deviation, electrons")
+      ->check(CLI::NonNegativeNumber);
+  command.add_option("--gain", options.gain)->check(CLI::PositiveNumber)->capture_default_str();
+  command.add_option("--bits", options.bits, "8 or 16")
+      ->check(CLI::IsMember({8, 16}))
+      ->capture_default_str();
+}
+
+}  // namespace
+
+void add_simulate_command(CLI::App& app) {
+  auto options = std::make_shared<SimulateOptions>();
+  CLI::App* command =
+      app.add_subcommand("simulate", "Render what the cameras of a rig would see of a mesh");
+  command->add_option("--rig", options->rig_path, "The rig (rig.json)")->required();
+  command->add_option("--mesh", options->mesh_path, "PLY, OBJ, STL or OFF, in mm")->required();
+  command->add_option("--out", options->out, "New folder: rig.json, frames/, truth/, captures/")
+      ->required();
+  command->add_flag("--overwrite", options->overwrite, "Replace an earlier result in --out");
+  command->add_flag("--gray-code", options->gray_code, "Also write Gray-code captures");
+  command->add_flag("--truth-maps", options->truth_maps,
+                    "Also write depth, line coordinates, lit masks and cosines");
+  command->add_flag("--export-povray", options->export_povray,
+                    "Also write the scene for POV-Ray 3.7");
+  add_scene_options(*command, *options);
+  add_device_options(*command, *options);
+  add_common_options(*command, options->common,
+                     "pencilscan simulate --rig rig.json --mesh bunny.obj --up y --fit "
+                     "--noise medium --out scene");
+  command->callback([options] { run_simulate(*options); });
+}
+
+}  // namespace pencilscan::cli

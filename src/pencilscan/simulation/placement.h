@@ -1,0 +1,26 @@
+#pragma once
+
+#include "pencilscan/geometry/mesh.h"
+
+namespace pencilscan {
+
+/// The axis of a mesh file that points up; the world's is z.
+enum class UpAxis { kX, kY, kZ };
+/// The mesh turned so that `up` becomes z.
+[[nodiscard]] TriangleMesh turned_upright(TriangleMesh mesh, UpAxis up);
+
+/// The mesh centred in the volume (middle of its bounding box) and scaled so that its farthest
+/// vertex lies at `fill` of the radius, 0 < fill <= 1. A mesh without extent is only centred.
+[[nodiscard]] TriangleMesh fitted(TriangleMesh mesh, const Sphere& volume, double fill = 0.95);
+
+/// Rigid motion per frame: a turn about the vertical through `pivot`, then a shift.
+struct Motion {
+  double rotate_rad = 0;             ///< counter-clockwise seen from above, per frame
+  Vec3 translate_mm = Vec3::Zero();  ///< per frame
+  Vec3 pivot = Vec3::Zero();         ///< world, mm
+
+  /// Where frame `frame` (0: not moved) has the object.
+  [[nodiscard]] RigidTransform at(int frame) const;
+};
+
+}  // namespace pencilscan
