@@ -68,31 +68,23 @@ void put_surface(Json& json, const SurfaceFigures& surface) {
   }
 }
 
+Json breakdown(const Share& wrong, const Share& found) {
+  return {{"label_error", number(wrong.value())},
+          {"labelled_pixels", wrong.count},
+          {"line_recall", number(found.value())},
+          {"true_line_pixels", found.count}};
+}
+
 void put_breakdown(Json& json, const LabelFigures& labels, const RecallFigures& recall,
                    const Rig& rig) {
-  Json projectors = Json::array();
   for (std::size_t p = 0; p < rig.projectors.size(); ++p) {
-    projectors.push_back({{"projector", rig.projectors[p].name},
-                          {"label_error", number(labels.wrong_by_projector[p].value())},
-                          {"labelled_pixels", labels.wrong_by_projector[p].count},
-                          {"line_recall", number(recall.by_projector[p].value())},
-                          {"true_line_pixels", recall.by_projector[p].count}});
+    json["by_projector"][rig.projectors[p].name] =
+        breakdown(labels.wrong_by_projector[p], recall.by_projector[p]);
   }
-  json["by_projector"] = projectors;
-  Json bands = Json::array();
   for (std::size_t b = 0; b < kSpacingBandCount; ++b) {
-    bands.push_back({{"spacing", band_name(b)},
-                     {"label_error", number(labels.wrong_by_spacing[b].value())},
-                     {"labelled_pixels", labels.wrong_by_spacing[b].count},
-                     {"line_recall", number(recall.by_spacing[b].value())},
-                     {"true_line_pixels", recall.by_spacing[b].count}});
+    json["by_spacing"][band_name(b)] = breakdown(labels.wrong_by_spacing[b], recall.by_spacing[b]);
   }
-  bands.push_back({{"spacing", "unlit"},
-                   {"label_error", number(labels.wrong_unlit.value())},
-                   {"labelled_pixels", labels.wrong_unlit.count},
-                   {"line_recall", nullptr},
-                   {"true_line_pixels", 0}});
-  json["by_spacing"] = bands;
+  json["by_spacing"]["unlit"] = breakdown(labels.wrong_unlit, {});
 }
 
 void put_alignment(Json& json, const AlignmentReport& alignment) {
