@@ -11,9 +11,9 @@ namespace pencilscan::cli {
 
 /// Options that every command has.
 struct CommonOptions {
-  int threads = 0;          ///< 0: all cores
+  int threads = 0;  ///< 0: all cores
   std::uint64_t seed = 1;
-  std::string json_path;    ///< --json F: figures as JSON
+  std::string json_path;  ///< --json F: figures as JSON
 };
 
 /// Adds --threads, --seed, --json to a command, and an example to its help.
@@ -25,8 +25,8 @@ void add_common_options(CLI::App& command, CommonOptions& options, const std::st
 /// Prints figures to stdout as aligned "key value" lines and writes --json when asked for.
 void print_figures(const CommonOptions& options, const nlohmann::ordered_json& figures);
 
-// One per command, each in its own <name>_command.cpp. They register a sub-command whose callback runs
-// it; bad input is thrown as InputError, a failed stage as StageError, both caught in main().
+// One per command, each in its own <name>_command.cpp. They register a sub-command whose callback
+// runs it; bad input is thrown as InputError, a failed stage as StageError, both caught in main().
 void add_pattern_command(CLI::App& app);
 void add_rig_command(CLI::App& app);
 void add_simulate_command(CLI::App& app);

@@ -8,6 +8,6 @@ namespace pencilscan {
 }  // namespace pencilscan
 
 /// Aborts with expression and place when an invariant does not hold. On in every build type.
-#define PENCILSCAN_CHECK(expression)                                                   \
-  (static_cast<bool>(expression) ? static_cast<void>(0)                                \
+#define PENCILSCAN_CHECK(expression)                    \
+  (static_cast<bool>(expression) ? static_cast<void>(0) \
                                  : ::pencilscan::check_failed(#expression, __FILE__, __LINE__))

@@ -24,7 +24,10 @@ TEST(ParallelFor, VisitsEveryIndexOnceForAnyThreadCount) {
 }
 
 TEST(ParallelFor, PassesExceptionsOn) {
-  EXPECT_THROW(parallel_for(10, [](std::size_t i) { if (i == 7) throw StageError("seven"); }),
+  EXPECT_THROW(parallel_for(10,
+                            [](std::size_t i) {
+                              if (i == 7) throw StageError("seven");
+                            }),
                StageError);
 }
 

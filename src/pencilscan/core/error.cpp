@@ -15,8 +15,7 @@ std::string message(const std::string& path, const std::string& field, const std
 
 }  // namespace
 
-InputError::InputError(std::string path_, std::string field_, std::string value_,
-                       std::string rule_)
+InputError::InputError(std::string path_, std::string field_, std::string value_, std::string rule_)
     : std::runtime_error(message(path_, field_, value_, rule_)),
       path(std::move(path_)),
       field(std::move(field_)),

@@ -15,7 +15,9 @@
 namespace pencilscan {
 namespace {
 
-int hardware_threads() { return std::max(1, static_cast<int>(std::thread::hardware_concurrency())); }
+int hardware_threads() {
+  return std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+}
 
 #ifdef PENCILSCAN_STD_THREADS
 std::atomic<int> limit{0};
@@ -33,7 +35,8 @@ ThreadLimit::~ThreadLimit() { limit = 0; }
 int thread_count() { return limit > 0 ? limit.load() : hardware_threads(); }
 
 void parallel_for(std::size_t count, const std::function<void(std::size_t)>& body) {
-  const std::size_t threads = std::min<std::size_t>(count, static_cast<std::size_t>(thread_count()));
+  const std::size_t threads =
+      std::min<std::size_t>(count, static_cast<std::size_t>(thread_count()));
   std::atomic<std::size_t> next{0};
   std::exception_ptr failure;
   std::mutex failure_mutex;

@@ -4,7 +4,8 @@
 
 namespace pencilscan {
 
-Random::Random(std::uint64_t seed, std::uint64_t stream) : state_(0), increment_((stream << 1) | 1) {
+Random::Random(std::uint64_t seed, std::uint64_t stream)
+    : state_(0), increment_((stream << 1) | 1) {
   bits();
   state_ += seed;
   bits();

@@ -12,11 +12,11 @@ class Random {
   explicit Random(std::uint64_t seed, std::uint64_t stream = 0);
 
   std::uint32_t bits();
-  double uniform();                                ///< in [0, 1)
+  double uniform();  ///< in [0, 1)
   double uniform(double low, double high) { return low + (high - low) * uniform(); }
-  double normal();                                 ///< mean 0, standard deviation 1
+  double normal();  ///< mean 0, standard deviation 1
   double normal(double mean, double sigma) { return mean + sigma * normal(); }
-  std::uint32_t below(std::uint32_t n);            ///< in [0, n), n >= 1
+  std::uint32_t below(std::uint32_t n);  ///< in [0, n), n >= 1
 
  private:
   std::uint64_t state_;

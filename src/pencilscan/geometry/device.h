@@ -12,14 +12,14 @@ namespace pencilscan {
 /// x right, y down, z forward; pixel centres at integers). A projector is a camera that shines.
 struct Device {
   std::string name;
-  int width = 0;    ///< px, >= 1
-  int height = 0;   ///< px, >= 1
-  Mat3 K = Mat3::Identity();                       ///< upper triangular, K(2,2) = 1, focal > 0
-  std::array<double, 5> distortion{};              ///< k1, k2, p1, p2, k3
+  int width = 0;                       ///< px, >= 1
+  int height = 0;                      ///< px, >= 1
+  Mat3 K = Mat3::Identity();           ///< upper triangular, K(2,2) = 1, focal > 0
+  std::array<double, 5> distortion{};  ///< k1, k2, p1, p2, k3
   RigidTransform device_from_world;
 
   [[nodiscard]] bool has_distortion() const;
-  [[nodiscard]] Vec3 center() const;               ///< in world, mm
+  [[nodiscard]] Vec3 center() const;  ///< in world, mm
   [[nodiscard]] Vec3 forward() const { return device_from_world.rotation.row(2).transpose(); }
   /// Pixel of a world point; nothing when the point is not in front of the device.
   [[nodiscard]] std::optional<Vec2> project(const Vec3& x_in_world) const;
@@ -36,7 +36,8 @@ struct Device {
 };
 
 /// Applies Brown-Conrady distortion to normalised coordinates. OpenCV, "Camera Calibration and 3D
-/// Reconstruction": x' = x (1 + k1 r^2 + k2 r^4 + k3 r^6) + 2 p1 x y + p2 (r^2 + 2 x^2), y' likewise.
+/// Reconstruction": x' = x (1 + k1 r^2 + k2 r^4 + k3 r^6) + 2 p1 x y + p2 (r^2 + 2 x^2), y'
+/// likewise.
 [[nodiscard]] Vec2 distort(const std::array<double, 5>& distortion, const Vec2& normalized);
 
 /// Inverse of distort() by Newton's method, to 1e-12 in normalised units where it converges.

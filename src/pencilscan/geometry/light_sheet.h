@@ -10,12 +10,12 @@ namespace pencilscan {
 enum class Axis { kColumn = 0, kRow = 1 };
 
 /// A pencil of planes in a camera's frame (equations (1)-(3) of the paper): the plane of the line
-/// at projector coordinate c (px) is w(u) = omega(c) . u with u = (x, y, 1) the normalised pixel and
-/// w = 1 / z the inverse depth of the point where the camera ray meets the plane. In the paper's
-/// form p'x + 1 = 0 this is omega = -p, hence v = v0 + mu v_inf.
+/// at projector coordinate c (px) is w(u) = omega(c) . u with u = (x, y, 1) the normalised pixel
+/// and w = 1 / z the inverse depth of the point where the camera ray meets the plane. In the
+/// paper's form p'x + 1 = 0 this is omega = -p, hence v = v0 + mu v_inf.
 ///
-/// With the plane pi(c) = a + c b (4-vectors, rows of the projector's 3x4 matrix in the camera frame:
-/// b = -P row 3, a = P row 1 or 2) every c gives n . x + d = 0, so omega(c) = -n(c) / d(c).
+/// With the plane pi(c) = a + c b (4-vectors, rows of the projector's 3x4 matrix in the camera
+/// frame: b = -P row 3, a = P row 1 or 2) every c gives n . x + d = 0, so omega(c) = -n(c) / d(c).
 /// Valid without lens distortion of the projector; LightSheet below is exact with it.
 struct PencilOfPlanes {
   Eigen::Vector4d a = Eigen::Vector4d::Zero();

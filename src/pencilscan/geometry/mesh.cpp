@@ -37,7 +37,8 @@ double surface_area(const TriangleMesh& mesh) {
 double signed_volume(const TriangleMesh& mesh) {
   double volume = 0;
   for (const auto& face : mesh.faces) {
-    volume += mesh.vertices[static_cast<std::size_t>(face[0])].dot(doubled_area_vector(mesh, face)) / 6;
+    volume +=
+        mesh.vertices[static_cast<std::size_t>(face[0])].dot(doubled_area_vector(mesh, face)) / 6;
   }
   return volume;
 }

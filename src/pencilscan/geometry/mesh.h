@@ -10,10 +10,10 @@ namespace pencilscan {
 /// Triangle mesh as a value. Invariant kept by its makers: indices lie in [0, vertices.size()).
 /// Optional per-vertex properties are empty or as long as `vertices`.
 struct TriangleMesh {
-  std::vector<Vec3> vertices;              ///< mm
-  std::vector<std::array<int, 3>> faces;   ///< counter-clockwise seen from outside
-  std::vector<float> sigma;                ///< mm along the normal
-  std::vector<float> confidence;           ///< 0..1
+  std::vector<Vec3> vertices;             ///< mm
+  std::vector<std::array<int, 3>> faces;  ///< counter-clockwise seen from outside
+  std::vector<float> sigma;               ///< mm along the normal
+  std::vector<float> confidence;          ///< 0..1
 };
 
 struct BoundingBox {
@@ -22,8 +22,8 @@ struct BoundingBox {
 };
 
 [[nodiscard]] BoundingBox bounding_box(const TriangleMesh& mesh);
-[[nodiscard]] double surface_area(const TriangleMesh& mesh);      ///< mm^2
-[[nodiscard]] double signed_volume(const TriangleMesh& mesh);     ///< mm^3, > 0 for outward faces
+[[nodiscard]] double surface_area(const TriangleMesh& mesh);   ///< mm^2
+[[nodiscard]] double signed_volume(const TriangleMesh& mesh);  ///< mm^3, > 0 for outward faces
 /// Area-weighted unit normals per vertex (zero for a vertex without area).
 [[nodiscard]] std::vector<Vec3> vertex_normals(const TriangleMesh& mesh);
 [[nodiscard]] Vec3 face_normal(const TriangleMesh& mesh, std::size_t face);  ///< unit, or zero

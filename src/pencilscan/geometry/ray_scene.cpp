@@ -168,8 +168,8 @@ std::optional<RayScene::Closest> RayScene::closest_point(const Vec3& point,
       [](RTCPointQueryFunctionArguments* arguments) {
         auto& s = *static_cast<Query*>(arguments->userPtr);
         const std::size_t face = arguments->primID;
-        const Vec3 candidate = closest_on_triangle(s.point, s.state->vertex(face, 0),
-                                                   s.state->vertex(face, 1), s.state->vertex(face, 2));
+        const Vec3 candidate = closest_on_triangle(
+            s.point, s.state->vertex(face, 0), s.state->vertex(face, 1), s.state->vertex(face, 2));
         const double distance = (candidate - s.point).norm();
         const bool better = distance < s.best.distance ||
                             (s.found && distance == s.best.distance && face < s.best.face);

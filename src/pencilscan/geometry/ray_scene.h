@@ -18,7 +18,7 @@ class RayScene {
   RayScene& operator=(RayScene&&) noexcept;
 
   struct Hit {
-    double distance = 0;    ///< mm along the unit direction
+    double distance = 0;  ///< mm along the unit direction
     std::size_t face = 0;
     Vec3 barycentric = Vec3::Zero();  ///< weights of the face's three vertices
     Vec3 point = Vec3::Zero();

@@ -14,7 +14,8 @@ std::vector<int> de_bruijn_sequence(int alphabet, int order) {
   // Appends, in lexicographic order, the Lyndon words whose length divides the order.
   const std::function<void(int, int)> extend = [&](int t, int period) {
     if (t > order) {
-      if (order % period == 0) sequence.insert(sequence.end(), word.begin() + 1, word.begin() + 1 + period);
+      if (order % period == 0)
+        sequence.insert(sequence.end(), word.begin() + 1, word.begin() + 1 + period);
       return;
     }
     const auto at = static_cast<std::size_t>(t);

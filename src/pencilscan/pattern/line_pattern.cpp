@@ -32,7 +32,8 @@ Rgb LinePattern::value(double px, int size_px, double box_px) const {
   Rgb sum{0, 0, 0};
   const double reach = 0.5 * (line_width_px + box_px);
   const int first = std::max(0, static_cast<int>(std::ceil(coordinate(px - reach))));
-  const int last = std::min(line_count(size_px) - 1, static_cast<int>(std::floor(coordinate(px + reach))));
+  const int last =
+      std::min(line_count(size_px) - 1, static_cast<int>(std::floor(coordinate(px + reach))));
   for (int line = first; line <= last; ++line) {
     const double center = position_px(line);
     double cover = 1;

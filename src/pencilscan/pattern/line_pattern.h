@@ -21,7 +21,7 @@ using Rgb = std::array<double, 3>;
 /// colors.size() == alphabet >= 1, pitch_px > 0, 0 < line_width_px <= pitch_px, symbols of
 /// `sequence` in [0, alphabet).
 struct LinePattern {
-  Axis axis = Axis::kColumn;               ///< kColumn: vertical lines, kRow: horizontal lines
+  Axis axis = Axis::kColumn;  ///< kColumn: vertical lines, kRow: horizontal lines
   std::vector<std::string> colors = {"blue", "cyan"};
   int alphabet = 2;
   int order = 3;
@@ -29,12 +29,14 @@ struct LinePattern {
   double line_width_px = 4;
   double offset_px = 6;
   std::vector<int> sequence = {0, 0, 0, 1, 0, 1, 1, 1};  ///< one period of symbols
-  bool has_own_sequence = false;           ///< the file states the sequence itself
-  std::optional<int> max_lines;            ///< "lines" of the file
+  bool has_own_sequence = false;                         ///< the file states the sequence itself
+  std::optional<int> max_lines;                          ///< "lines" of the file
 
   [[nodiscard]] int period() const { return static_cast<int>(sequence.size()); }
   [[nodiscard]] int local_id(int line) const { return line % period(); }
-  [[nodiscard]] int symbol(int line) const { return sequence[static_cast<std::size_t>(local_id(line))]; }
+  [[nodiscard]] int symbol(int line) const {
+    return sequence[static_cast<std::size_t>(local_id(line))];
+  }
   [[nodiscard]] Rgb color(int line) const;
   [[nodiscard]] double position_px(double line) const { return offset_px + line * pitch_px; }
   /// Continuous line coordinate of a projector column or row: line i has its centre at i.
@@ -47,6 +49,7 @@ struct LinePattern {
 
 /// What a projector of this size shows: linear light, CV_32FC3 in RGB order, each pixel the box
 /// average of the ideal lines; several patterns add up, limited to 1.
-[[nodiscard]] cv::Mat render_patterns(const std::vector<LinePattern>& patterns, int width, int height);
+[[nodiscard]] cv::Mat render_patterns(const std::vector<LinePattern>& patterns, int width,
+                                      int height);
 
 }  // namespace pencilscan

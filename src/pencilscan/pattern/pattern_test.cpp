@@ -15,7 +15,8 @@ TEST(DeBruijn, LeastSequenceOfTwoSymbolsAndOrderThree) {
 }
 
 TEST(DeBruijn, EveryWindowOccursOnce) {
-  for (const auto& [alphabet, order] : std::vector<std::pair<int, int>>{{2, 3}, {2, 7}, {3, 4}, {5, 2}, {1, 3}}) {
+  for (const auto& [alphabet, order] :
+       std::vector<std::pair<int, int>>{{2, 3}, {2, 7}, {3, 4}, {5, 2}, {1, 3}}) {
     const std::vector<int> sequence = de_bruijn_sequence(alphabet, order);
     std::set<std::vector<int>> windows;
     for (std::size_t i = 0; i < sequence.size(); ++i) {
