@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <numbers>
 
 #include "pencilscan/io/image.h"
 #include "pencilscan/report/overlay.h"
@@ -87,6 +89,44 @@ std::vector<cv::Mat> six_views(const MeshPainter& painter, const Sphere& scene,
   return views;
 }
 
+std::vector<Vec3> device_centers(const Rig& rig) {
+  std::vector<Vec3> centers;
+  for (const Camera& camera : rig.cameras) centers.push_back(camera.center());
+  for (const Projector& projector : rig.projectors) centers.push_back(projector.center());
+  return centers;
+}
+
+/// A view from above the ring in which no device stands before the object, filled by the devices.
+Device scene_view(const Rig& rig, const Sphere& object, int width, int height) {
+  constexpr int kDirections = 36;
+  constexpr double kFill = 0.86;  // of the picture, by the devices' centres
+  const std::vector<Vec3> centers = device_centers(rig);
+  double reach = object.radius;
+  for (const Vec3& c : centers) reach = std::max(reach, (c - object.center).norm());
+  Device best;
+  double best_gap = -1;
+  for (int i = 0; i < kDirections; ++i) {
+    const double azimuth = 2 * std::numbers::pi * i / kDirections;
+    Device view = make_view({object.center, reach},
+                            Vec3(std::cos(azimuth), std::sin(azimuth), 0.75), width, height);
+    const Vec2 middle = *view.project(object.center);
+    double gap = std::numeric_limits<double>::infinity();
+    double zoom = 0;
+    for (const Vec3& c : centers) {
+      const auto pixel = view.project(c);
+      if (!pixel) continue;
+      const Vec2 offset = *pixel - middle;
+      gap = std::min(gap, offset.norm());
+      zoom = std::max({zoom, 2 * std::abs(offset[0]) / width, 2 * std::abs(offset[1]) / height});
+    }
+    if (gap <= best_gap) continue;
+    best_gap = gap;
+    best = view;
+    if (zoom > 0) best.K.topLeftCorner<2, 2>() *= kFill / zoom;
+  }
+  return best;
+}
+
 void add_mesh_sheets(const FrameResults& results, const PictureOptions& options,
                      std::vector<Picture>& pictures) {
   const TriangleMesh& mesh = *results.mesh;
@@ -95,20 +135,10 @@ void add_mesh_sheets(const FrameResults& results, const PictureOptions& options,
   pictures.push_back(
       {"shape", contact_sheet(six_views(painter, object, {}, options), side_names(), 3)});
 
-  BoundingBox devices{object.center, object.center};
-  const auto include = [&](const Device& device) {
-    devices.low = devices.low.cwiseMin(device.center());
-    devices.high = devices.high.cwiseMax(device.center());
-  };
-  for (const Camera& camera : results.rig.cameras) include(camera);
-  for (const Projector& projector : results.rig.projectors) include(projector);
-  Sphere all = sphere_around(devices);
-  all.radius = std::max(0.86 * all.radius, object.radius);
-  ShadeOptions shading;
-  shading.devices = &results.rig;
-  const Device view =
-      make_view(all, Vec3(1, -0.55, 0.62), 2 * options.width, 2 * options.height * 3 / 4);
-  pictures.push_back({"scene", painter.draw(view, shading)});
+  ShadeOptions among_devices;
+  among_devices.devices = &results.rig;
+  const Device view = scene_view(results.rig, object, 2 * options.width, options.height * 4 / 3);
+  pictures.push_back({"scene", painter.draw(view, among_devices)});
 
   if (results.truth == nullptr || results.truth->faces.empty()) return;
   const RayScene truth(*results.truth);

@@ -72,7 +72,7 @@ double shade(const Vec3& normal, const Vec3& to_eye, const Device& view, double 
   const double sky = 0.5 + 0.5 * normal.z();
   const double rim = std::pow(1 - std::max(0.0, normal.dot(to_eye)), 3.0);
   const double ambient = openness * openness * (0.16 + 0.16 * sky);
-  return ambient + (0.35 + 0.65 * openness) * (0.58 * key + 0.14 * fill) + 0.05 * rim;
+  return ambient + (0.35 + 0.65 * openness) * (0.72 * key + 0.16 * fill) + 0.05 * rim;
 }
 
 cv::Mat studio_ground(int width, int height) {
@@ -142,7 +142,7 @@ cv::Mat MeshPainter::draw(const Device& view, const ShadeOptions& options) const
   const BoundingBox box = bounding_box(mesh);
   const Vec3 center = 0.5 * (box.low + box.high);
   const double depth = (view.device_from_world * center).z();
-  const double frustum_mm = std::max(0.35 * (box.high - box.low).norm(), 1e-6);
+  const double frustum_mm = std::max(0.5 * (box.high - box.low).norm(), 1e-6);
   if (options.devices != nullptr) {
     draw_devices(*options.devices, view, frustum_mm, depth, false, picture);
   }

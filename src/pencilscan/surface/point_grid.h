@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <span>
@@ -18,16 +19,16 @@ class PointGrid {
  public:
   /// cell_mm > 0.
   PointGrid(std::span<const Vec3> points, double cell_mm) : cell_(cell_mm) {
-    points_.assign(points.begin(), points.end());
     std::vector<std::pair<std::uint64_t, std::uint32_t>> order(points.size());
     for (std::size_t i = 0; i < points.size(); ++i) {
-      order[i] = {key(cell_of(points_[i])), static_cast<std::uint32_t>(i)};
+      order[i] = {key(cell_of(points[i])), static_cast<std::uint32_t>(i)};
     }
     std::sort(order.begin(), order.end());
     index_.reserve(order.size());
     for (std::size_t i = 0; i < order.size(); ++i) {
       if (i == 0 || order[i].first != order[i - 1].first) first_[order[i].first] = i;
       index_.push_back(order[i].second);
+      points_.push_back(points[order[i].second]);
       keys_.push_back(order[i].first);
     }
   }
@@ -44,7 +45,7 @@ class PointGrid {
           const auto found = first_.find(wanted);
           if (found == first_.end()) continue;
           for (std::size_t i = found->second; i < keys_.size() && keys_[i] == wanted; ++i) {
-            const double d2 = (points_[index_[i]] - center).squaredNorm();
+            const double d2 = (points_[i] - center).squaredNorm();
             if (d2 <= radius * radius) visit(static_cast<std::size_t>(index_[i]), d2);
           }
         }
@@ -68,7 +69,7 @@ class PointGrid {
   }
 
   double cell_;
-  std::vector<Vec3> points_;
+  std::vector<Vec3> points_;          ///< sorted by key
   std::vector<std::uint32_t> index_;  ///< points sorted by key
   std::vector<std::uint64_t> keys_;
   std::unordered_map<std::uint64_t, std::size_t> first_;

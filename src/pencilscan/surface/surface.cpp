@@ -64,6 +64,31 @@ int octree_depth(const SurfaceOptions& options, std::span<const CurveSample> sam
                     options.max_depth);
 }
 
+/// Declares invented those fringe vertices that connect to an invented one through the fringe. Gaps
+/// between lines have a fringe too, but nothing invented inside: they stay measured.
+void cut_fringe(std::span<const char> fringe, TriangleMesh& mesh) {
+  std::vector<std::vector<int>> neighbors(mesh.vertices.size());
+  for (const auto& face : mesh.faces) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      neighbors[static_cast<std::size_t>(face[k])].push_back(face[(k + 1) % 3]);
+    }
+  }
+  std::vector<std::size_t> open;
+  for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
+    if (!(mesh.confidence[v] > 0)) open.push_back(v);
+  }
+  while (!open.empty()) {
+    const std::size_t v = open.back();
+    open.pop_back();
+    for (const int next : neighbors[v]) {
+      const auto n = static_cast<std::size_t>(next);
+      if (!fringe[n] || !(mesh.confidence[n] > 0)) continue;
+      mesh.confidence[n] = 0;
+      open.push_back(n);
+    }
+  }
+}
+
 /// Sets sigma and confidence of every vertex from the samples near it. A vertex is measured when a
 /// sample of its own side lies within the reach, which grows where the sheets graze the surface,
 /// and samples surround it; beyond the last line only a part of the reach counts.
@@ -75,6 +100,7 @@ void attribute_vertices(std::span<const CurveSample> samples, const SurfaceOptio
   const double radius = options.reach_spacings * kMaxStretch * spacing;
   const PointGrid grid(positions_of(samples), radius);
   const std::vector<Vec3> normals = vertex_normals(mesh);
+  std::vector<char> fringe(mesh.vertices.size(), 0);
   mesh.sigma.assign(mesh.vertices.size(), 0.0F);
   mesh.confidence.assign(mesh.vertices.size(), 0.0F);
   const std::size_t chunks = (mesh.vertices.size() + kChunk - 1) / kChunk;
@@ -115,8 +141,8 @@ void attribute_vertices(std::span<const CurveSample> samples, const SurfaceOptio
       });
       double variance = kInterpolation * kInterpolation * nearest * nearest;
       // Samples that fill a half plane pull with 2 / pi of their summed distance.
-      const bool outside = pull.norm() > 0.55 * pull_length && best > kOutsideReach;
-      if (weight_sum > 0 && !outside) {
+      fringe[v] = pull.norm() > 0.55 * pull_length && best > kOutsideReach;
+      if (weight_sum > 0) {
         // Samples of one camera share their errors; cameras are independent.
         variance += variance_sum / weight_sum / std::max(cameras, 1);
         const double certainty = confidence_sum / weight_sum * (1 - 0.5 * best * best);
@@ -127,6 +153,7 @@ void attribute_vertices(std::span<const CurveSample> samples, const SurfaceOptio
       mesh.sigma[v] = static_cast<float>(std::sqrt(variance));
     }
   });
+  cut_fringe(fringe, mesh);
 }
 
 std::vector<char> measured_faces(const TriangleMesh& mesh) {
@@ -184,10 +211,15 @@ TriangleMesh measured_part(const TriangleMesh& mesh, double spacing) {
 /// Poisson in a growing cube until the surface closes inside it.
 TriangleMesh closed_surface(std::span<const CurveSample> samples, const SurfaceOptions& options,
                             double spacing, SurfaceReport& report) {
+  constexpr int kProbeDepth = 6;  // half a second, against several at the full depth
   TriangleMesh mesh;
   for (const double scale : {1.5, 2.0, 3.0}) {
     report.scale = scale;
     report.depth = octree_depth(options, samples, spacing, scale);
+    if (report.depth > kProbeDepth && scale < 3) {
+      const EdgeCounts probe = count_edges(poisson_surface(samples, kProbeDepth, scale));
+      if (probe.boundary > 0) continue;  // a coarse surface leaves the cube where a fine one does
+    }
     mesh = poisson_surface(samples, report.depth, scale);
     if (mesh.faces.empty()) continue;
     attribute_vertices(samples, options, spacing, mesh);

@@ -167,7 +167,8 @@ TEST(Surface, BallIsClosedAndAccurate) {
 
 TEST(Surface, SameBytesForAnyThreadCount) {
   const Rig rig = ball_rig();
-  const std::vector<MeasuredPoint> points = ball_points(rig);
+  std::vector<MeasuredPoint> points = ball_points(rig);
+  std::erase_if(points, [](const MeasuredPoint& p) { return p.projector > 2; });
   std::vector<SurfaceResult> results;
   for (const int threads : {1, 2, 4}) {
     const ThreadLimit limit(threads);
