@@ -248,4 +248,42 @@ std::vector<double> vote(const Rig& rig, std::span<const CurveSample> samples,
   return belief;
 }
 
+void drop_small_clusters(std::span<const CurveSample> samples, double gap_mm, double min_share,
+                         std::vector<char>& keep) {
+  std::vector<std::size_t> kept;
+  std::vector<Vec3> positions;
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    if (!keep[i]) continue;
+    kept.push_back(i);
+    positions.push_back(samples[i].position);
+  }
+  const PointGrid grid(positions, gap_mm);
+  std::vector<int> cluster(kept.size(), -1);
+  std::vector<std::size_t> sizes;
+  std::vector<std::size_t> open;
+  for (std::size_t seed = 0; seed < kept.size(); ++seed) {
+    if (cluster[seed] >= 0) continue;
+    const int name = static_cast<int>(sizes.size());
+    sizes.push_back(0);
+    cluster[seed] = name;
+    open.push_back(seed);
+    while (!open.empty()) {
+      const std::size_t i = open.back();
+      open.pop_back();
+      ++sizes.back();
+      grid.for_each_within(positions[i], gap_mm, [&](std::size_t j, double) {
+        if (cluster[j] >= 0) return;
+        cluster[j] = name;
+        open.push_back(j);
+      });
+    }
+  }
+  if (sizes.empty()) return;
+  const auto largest = static_cast<double>(*std::max_element(sizes.begin(), sizes.end()));
+  for (std::size_t k = 0; k < kept.size(); ++k) {
+    const auto size = static_cast<double>(sizes[static_cast<std::size_t>(cluster[k])]);
+    if (size < min_share * largest) keep[kept[k]] = 0;
+  }
+}
+
 }  // namespace pencilscan

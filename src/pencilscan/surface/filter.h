@@ -23,6 +23,12 @@ namespace pencilscan {
 [[nodiscard]] std::vector<double> vote(const Rig& rig, std::span<const CurveSample> samples,
                                        const PointGrid& grid, double spacing);
 
+/// Clears keep[i] of samples in small clusters: chains of kept samples with gaps up to `gap_mm`
+/// that have less than min_share of the largest cluster's samples. What floats far off would also
+/// stretch the octree and with it every cell.
+void drop_small_clusters(std::span<const CurveSample> samples, double gap_mm, double min_share,
+                         std::vector<char>& keep);
+
 /// Samples believed less than this are wrong more often than right.
 inline constexpr double kBeliefThreshold = 0.65;
 

@@ -54,6 +54,8 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
+constexpr double kFarthest = 1e7;  // mm; 10 km off is a ray that missed its sheet
+
 using CurveKey = std::array<int, 4>;
 CurveKey curve_key(const MeasuredPoint& p) { return {p.camera, p.projector, p.pattern, p.line}; }
 
@@ -67,7 +69,7 @@ SampleSet sample_curves(const Rig& rig, std::span<const MeasuredPoint> points,
   std::vector<double> spacings;
   for (std::size_t i = 0; i < points.size(); ++i) {
     check_devices(rig, points[i]);
-    if (!position(points[i]).allFinite()) continue;
+    if (!position(points[i]).allFinite() || position(points[i]).norm() > kFarthest) continue;
     order.push_back(static_cast<std::uint32_t>(i));
     spacings.push_back(
         light_sheet_at(rig.projectors[points[i].projector], points[i].pattern, position(points[i]))

@@ -28,7 +28,7 @@ struct CurveSample {
 
 struct SampleSet {
   std::vector<CurveSample> samples;
-  std::vector<std::int32_t> sample_of_point;  ///< -1 for a point with non-finite coordinates
+  std::vector<std::int32_t> sample_of_point;  ///< -1: coordinates not finite or beyond 10 km
   double spacing = 0;                         ///< median over the samples, mm
 };
 

@@ -18,6 +18,8 @@ namespace {
 
 constexpr std::size_t kLeastSamples = 30;  // fewer give no surface worth the name
 constexpr double kFitRadius = 1.6;         // spacings, neighbourhood of a local surface
+constexpr double kClusterGap = 2;          // spacings; one missing line does not split an object
+constexpr double kLeastCluster = 0.01;     // of the largest cluster's samples
 constexpr std::size_t kChunk = 256;
 
 std::vector<Vec3> positions_of(std::span<const CurveSample> samples) {
@@ -46,7 +48,9 @@ std::vector<char> judge_samples(const Rig& rig, const SurfaceOptions& options, S
     report.warnings.push_back(
         "hardly any point is supported by another curve: all points are used");
     keep.assign(keep.size(), 1);
+    return keep;
   }
+  drop_small_clusters(set.samples, kClusterGap * set.spacing, kLeastCluster, keep);
   return keep;
 }
 
@@ -250,7 +254,7 @@ SurfaceResult reconstruct_surface(const Rig& rig, std::span<const MeasuredPoint>
   for (const std::int32_t s : set.sample_of_point) report.points += s >= 0 ? 1 : 0;
   if (report.points < points.size()) {
     report.warnings.push_back(std::to_string(points.size() - report.points) +
-                              " points with non-finite coordinates are left out");
+                              " points with non-finite or absurd coordinates are left out");
   }
 
   std::vector<char> keep;

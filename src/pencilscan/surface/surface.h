@@ -42,7 +42,7 @@ enum class SurfaceStatus {
 
 struct SurfaceReport {
   SurfaceStatus status = SurfaceStatus::kDone;
-  std::size_t points = 0;       ///< input points with finite coordinates
+  std::size_t points = 0;       ///< input points with finite coordinates (and nearer than 10 km)
   std::size_t points_used = 0;  ///< of them, those whose sample survived the votes
   std::size_t samples = 0;
   std::size_t samples_used = 0;

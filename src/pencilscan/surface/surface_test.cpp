@@ -235,6 +235,21 @@ TEST(Surface, TwoCamerasAndOneProjectorGiveAClosedSurface) {
   EXPECT_GT(surface_area(result.measured), 0.15 * surface_area(result.mesh));
 }
 
+TEST(Surface, FarFloatersNeitherStayNorStretchTheOctree) {
+  const Rig rig = ball_rig();
+  std::vector<MeasuredPoint> points = ball_points(rig);
+  const std::size_t count = points.size();
+  for (std::size_t i = 0; i < count; i += 400) {  // agreeing wrong patches, 2000 mm off
+    MeasuredPoint p = points[i];
+    p.x += 2000;
+    points.push_back(p);
+  }
+  const SurfaceResult result = reconstruct_surface(rig, points, test_options());
+  expect_watertight(result);
+  EXPECT_LT(worst_deviation(result.mesh), 0.5);
+  for (std::size_t i = count; i < points.size(); ++i) EXPECT_EQ(result.used[i], 0);
+}
+
 TEST(Surface, TooFewPointsIsAStatus) {
   const Rig rig = ball_rig();
   const std::vector<MeasuredPoint> points = ball_points(rig);
