@@ -70,11 +70,10 @@ std::string frame_name(int frame) {
 }
 
 SensorOptions sensor_of(const SimulateOptions& options, const Camera& camera) {
-  SensorOptions sensor = *sensor_preset(options.noise);
+  SensorOptions sensor = sensor_preset(options.noise)->sensor;
   // A rig that states how colours mix describes its cameras whole; a preset adds nothing to it.
   if (camera.states_color_matrix()) sensor.crosstalk = 0;
   sensor.crosstalk = options.crosstalk.value_or(sensor.crosstalk);
-  sensor.ambient = options.ambient.value_or(sensor.ambient);
   sensor.blur_px = options.blur_px.value_or(sensor.blur_px);
   sensor.full_well = options.full_well.value_or(sensor.full_well);
   sensor.read_noise = options.read_noise.value_or(sensor.read_noise);
@@ -230,6 +229,7 @@ void run_simulate(SimulateOptions options) {
   const Stopwatch watch;
   options.surface.smooth = !options.flat;
   options.render.inverse_square = !options.no_falloff;
+  options.render.ambient = options.ambient.value_or(sensor_preset(options.noise)->ambient);
   const Rig rig = read_rig(options.rig_path);
   check_rig(options, rig);
   const TriangleMesh mesh = placed_mesh(options, rig);
@@ -310,12 +310,15 @@ void add_device_options(CLI::App& command, SimulateOptions& options) {
       ->capture_default_str();
   command.add_option("--crosstalk", options.crosstalk, "Share that colour filters leak")
       ->check(CLI::Range(0.0, 0.5));
-  command.add_option("--ambient", options.ambient, "Light everywhere")->check(CLI::Range(0.0, 1.0));
+  command
+      .add_option("--ambient", options.ambient,
+                  "Even light on all surfaces, image value of a white one")
+      ->check(CLI::Range(0.0, 1.0));
   command.add_option("--blur", options.blur_px, "Camera blur, standard deviation, px")
       ->check(CLI::Range(0.0, 50.0));
-  command.add_option("--full-well", options.full_well, "Electrons at value 1; 0: no noise")
+  command.add_option("--full-well", options.full_well, "Electrons at value 1; 0: no shot noise")
       ->check(CLI::NonNegativeNumber);
-  command.add_option("--read-noise", options.read_noise, "Standard deviation, electrons")
+  command.add_option("--read-noise", options.read_noise, "Standard deviation, 1/255 of the range")
       ->check(CLI::NonNegativeNumber);
   command.add_option("--gain", options.gain)->check(CLI::PositiveNumber)->capture_default_str();
   command.add_option("--bits", options.bits, "8 or 16")

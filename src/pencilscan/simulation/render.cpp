@@ -74,6 +74,7 @@ cv::Mat render_camera(const Rig& rig, std::size_t camera_index, const SimulatedO
       Vec3 sum = Vec3::Zero();
       for_each_hit(tracer, x, y, options.samples, [&](const SurfaceSample& sample) {
         const double albedo = object.albedo_at(sample.point);
+        sum += Vec3::Constant(options.ambient * albedo);
         for (const Source& source : sources) {
           const auto light = incidence(*source.lamp.device, source.lamp.center, sample);
           if (!light) continue;
@@ -116,12 +117,16 @@ std::vector<cv::Mat> render_sequence(const Rig& rig, std::size_t camera_index,
     for (int x = 0; x < camera.width; ++x) {
       if (!tracer.may_hit(x, y)) continue;
       for_each_hit(tracer, x, y, options.samples, [&](const SurfaceSample& sample) {
+        const double albedo = object.albedo_at(sample.point);
+        if (options.ambient > 0) {
+          const auto even = static_cast<float>(per_ray * options.ambient * albedo);
+          for (cv::Mat& image : images) image.at<float>(y, x) += even;
+        }
         const auto light = incidence(*lamp.device, lamp.center, sample);
         if (!light || !object.lit(sample.point, sample.face_normal, lamp.center)) return;
         any = true;
         const double share =
-            per_ray * response *
-            reflected(object, sample, object.albedo_at(sample.point), lamp, *light, options);
+            per_ray * response * reflected(object, sample, albedo, lamp, *light, options);
         for (std::size_t i = 0; i < sequence.size(); ++i) {
           const Vec3 shown = sequence[i].at(light->pixel, light->footprint_px / options.samples);
           images[i].at<float>(y, x) += static_cast<float>(share * shown.mean());

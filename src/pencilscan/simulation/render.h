@@ -14,14 +14,16 @@ namespace pencilscan {
 ///
 ///   I = exposure * (D / d)^2 * (albedo cos + specular (n.h)^(1 / roughness)) * M * pattern
 ///
-/// with d the distance to the projector, D the distance from the projector to the centre of the
-/// working volume (so that a surface there is lit alike by all), h the half-way vector (Blinn
-/// 1977), M the rig's colour matrix of the camera for that projector. One pixel is the mean over
-/// samples x samples rays; the pattern under each ray is averaged over the ray's own footprint.
+/// plus albedo * ambient, with d the distance to the projector, D the distance from the projector
+/// to the centre of the working volume (so that a surface there is lit alike by all), h the
+/// half-way vector (Blinn 1977), M the rig's colour matrix of the camera for that projector. One
+/// pixel is the mean over samples x samples rays; the pattern under each ray is averaged over the
+/// ray's own footprint.
 struct RenderOptions {
   int samples = 3;             ///< rays per pixel and axis, >= 1
   double exposure = 0.55;      ///< image value of a white, facing surface at the volume's centre
   bool inverse_square = true;  ///< light falls off with distance
+  double ambient = 0;  ///< even grey light on all surfaces: image value of a white one, >= 0
 };
 
 /// Linear light of one camera, CV_32FC3 in RGB order, without sensor effects. `lights` has one

@@ -241,7 +241,7 @@ TEST(RenderCamera, SameBytesForAnyThreadCount) {
   SurfaceOptions surface;
   surface.texture.kind = TextureKind::kNoise;
   const SimulatedObject object(make_sphere(90, 24), surface);
-  SensorOptions sensor = *sensor_preset("medium");
+  const SensorOptions sensor = sensor_preset("medium")->sensor;
   std::vector<cv::Mat> images;
   for (const int threads : {1, 2, 4}) {
     const ThreadLimit limit(threads);

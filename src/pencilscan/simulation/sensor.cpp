@@ -35,19 +35,15 @@ cv::Mat blurred(const cv::Mat& image, double sigma_px) {
   return result;
 }
 
-/// Crosstalk and ambient light, in place.
+/// Colour filters leak into each other, in place.
 void mix_channels(cv::Mat& image, const SensorOptions& options) {
-  const Mat3 mix = crosstalk_matrix(options.crosstalk);
+  if (image.channels() != 3 || options.crosstalk == 0) return;
+  const Eigen::Matrix3f mix = crosstalk_matrix(options.crosstalk).cast<float>();
   parallel_for(static_cast<std::size_t>(image.rows), [&](std::size_t row) {
     float* values = image.ptr<float>(static_cast<int>(row));
-    const int channels = image.channels();
-    for (int x = 0; x < image.cols; ++x, values += channels) {
-      if (channels == 3 && options.crosstalk > 0) {
-        const Eigen::Vector3f mixed =
-            mix.cast<float>() * Eigen::Vector3f(values[0], values[1], values[2]);
-        std::copy_n(mixed.data(), 3, values);
-      }
-      for (int k = 0; k < channels; ++k) values[k] += static_cast<float>(options.ambient);
+    for (int x = 0; x < image.cols; ++x, values += 3) {
+      const Eigen::Vector3f mixed = mix * Eigen::Vector3f(values[0], values[1], values[2]);
+      std::copy_n(mixed.data(), 3, values);
     }
   });
 }
@@ -56,31 +52,30 @@ void mix_channels(cv::Mat& image, const SensorOptions& options) {
 double expose(double linear, const SensorOptions& options, Random& random) {
   double value = std::max(0.0, linear);
   if (options.full_well > 0) {
-    const double electrons = photo_electrons(random, value * options.full_well) +
-                             (options.read_noise > 0 ? options.read_noise * random.normal() : 0);
-    value = electrons / options.full_well;
+    value = photo_electrons(random, value * options.full_well) / options.full_well;
   }
+  if (options.read_noise > 0) value += options.read_noise / 255 * random.normal();
   value = std::clamp(value * options.gain, 0.0, 1.0);
   return options.gamma == 1 ? value : std::pow(value, 1 / options.gamma);
 }
 
 }  // namespace
 
-std::optional<SensorOptions> sensor_preset(std::string_view name) {
+std::optional<SensorPreset> sensor_preset(std::string_view name) {
   const auto preset = [](double crosstalk, double ambient, double blur_px, double full_well,
                          double read_noise) {
-    SensorOptions options;
-    options.crosstalk = crosstalk;
-    options.ambient = ambient;
-    options.blur_px = blur_px;
-    options.full_well = full_well;
-    options.read_noise = read_noise;
-    return options;
+    SensorPreset result;
+    result.ambient = ambient;
+    result.sensor.crosstalk = crosstalk;
+    result.sensor.blur_px = blur_px;
+    result.sensor.full_well = full_well;
+    result.sensor.read_noise = read_noise;
+    return result;
   };
-  if (name == "none") return SensorOptions{};
-  if (name == "low") return preset(0.03, 0.005, 0.5, 20000, 1.5);
+  if (name == "none") return SensorPreset{};
+  if (name == "low") return preset(0.03, 0.005, 0.5, 20000, 0.5);
   if (name == "medium") return preset(0.08, 0.01, 0.7, 6000, 1.5);
-  if (name == "high") return preset(0.12, 0.03, 1.0, 1500, 4);
+  if (name == "high") return preset(0.12, 0.03, 1.0, 2500, 3);
   return std::nullopt;
 }
 

@@ -9,21 +9,26 @@
 
 namespace pencilscan {
 
-/// From linear light to stored numbers, in this order: crosstalk, ambient light, blur, shot and
-/// read noise, gain, clipping to [0, 1], gamma, rounding to bit_depth.
+/// From linear light to stored numbers, in this order: crosstalk, blur, shot noise, read noise,
+/// gain, clipping to [0, 1], gamma, rounding to bit_depth.
 struct SensorOptions {
-  double crosstalk = 0;   ///< share of a channel's light that the others take, in [0, 0.5)
-  double ambient = 0;     ///< light added everywhere, >= 0
+  double crosstalk = 0;  ///< share of a channel's light that the others take, in [0, 0.5)
+
   double blur_px = 0;     ///< standard deviation of a Gaussian, px, >= 0
   double full_well = 0;   ///< electrons at value 1; 0: no shot noise
-  double read_noise = 0;  ///< standard deviation in electrons; only with full_well > 0
+  double read_noise = 0;  ///< standard deviation in 1/255 of the range, >= 0
   double gain = 1;        ///< factor after the noise, > 0
   double gamma = 1;       ///< stored = linear^(1 / gamma), > 0
   int bit_depth = 8;      ///< 8 or 16
 };
 
-/// Typical sensors: none, low, medium, high; nothing for another name.
-[[nodiscard]] std::optional<SensorOptions> sensor_preset(std::string_view name);
+/// A sensor with the room it works in.
+struct SensorPreset {
+  SensorOptions sensor;
+  double ambient = 0;  ///< RenderOptions::ambient
+};
+/// Typical ones: none, low, medium, high; nothing for another name.
+[[nodiscard]] std::optional<SensorPreset> sensor_preset(std::string_view name);
 
 /// Camera RGB = matrix * light RGB. Rows add up to 1: grey stays grey. Neighbouring filters leak
 /// more than red and blue: of the share c, green takes 3/4 c from red and blue, they 1/4 c of each

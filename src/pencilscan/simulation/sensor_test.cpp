@@ -14,14 +14,14 @@ TEST(ApplySensor, NoiseHasTheVarianceOfTheModel) {
   options.full_well = 6000;
   options.read_noise = 1.5;
   options.bit_depth = 16;
-  for (const double value : {0.002, 0.05, 0.5}) {
+  for (const double value : {0.05, 0.2, 0.7}) {
     const cv::Mat flat(300, 300, CV_32FC1, cv::Scalar(value));
     cv::Mat stored;
     apply_sensor(flat, options).convertTo(stored, CV_64F, 1 / 65535.0);
     cv::Scalar mean;
     cv::Scalar deviation;
     cv::meanStdDev(stored, mean, deviation);
-    const double sigma = std::sqrt(value * 6000 + 1.5 * 1.5) / 6000;
+    const double sigma = std::hypot(std::sqrt(value * 6000) / 6000, 1.5 / 255);
     // 90,000 samples: the mean is good to sigma / 300, the deviation to 0.24 %; four of each.
     EXPECT_NEAR(mean[0], value, 4 * sigma / 300);
     EXPECT_NEAR(deviation[0], sigma, 0.01 * sigma);
