@@ -32,7 +32,9 @@ using namespace pencilscan;
 constexpr int kBlock = 16;             // px
 constexpr double kUsableSigma = 0.02;  // panel px
 constexpr double kShift = 0.1;         // panel px, for the derivative
-constexpr float kOn = 2.0F / 255;      // darker pixels do not count as object
+constexpr double kAmplitudeSpread = 0.15;
+constexpr float kBright = 6.0F / 255;  // surely light ...
+constexpr float kDark = 1.5F / 255;    // ... and surely none
 
 struct Parts {
   std::vector<cv::Mat> image;       // per projector
@@ -118,18 +120,41 @@ void fit_block(const cv::Mat& given, const Parts& parts, const cv::Rect& block,
   }
 }
 
-// Pixels that are object in `a` with no object pixel of `b` within one pixel.
+cv::Mat brightest(const cv::Mat& image) {
+  std::vector<cv::Mat> channels;
+  cv::split(image, channels);
+  return cv::max(cv::max(channels[0], channels[1]), channels[2]);
+}
+
+// Bright pixels of `a` with no light of `b` within one pixel.
 int stray(const cv::Mat& a, const cv::Mat& b) {
   cv::Mat wide;
-  cv::dilate(b, wide, cv::Mat::ones(3, 3, CV_8U));
-  cv::Mat alone = a & ~wide;
+  cv::dilate(brightest(b), wide, cv::Mat::ones(3, 3, CV_8U));
+  const cv::Mat bright = brightest(a) > kBright;
+  const cv::Mat dark = wide < kDark;
+  const cv::Mat alone = bright & dark;
   return cv::countNonZero(alone);
 }
 
-cv::Mat brightest_on(const cv::Mat& image) {
-  std::vector<cv::Mat> channels;
-  cv::split(image, channels);
-  return cv::max(cv::max(channels[0], channels[1]), channels[2]) > kOn;
+// Leaves out samples whose amplitude is far from their projector's median.
+std::vector<Sample> usable(const std::vector<Sample>& samples, std::size_t projectors) {
+  std::vector<Sample> kept;
+  for (std::size_t p = 0; p < projectors; ++p) {
+    std::vector<double> amplitudes;
+    for (const Sample& s : samples) {
+      if (s.projector == p) amplitudes.push_back(s.amplitude);
+    }
+    if (amplitudes.empty()) continue;
+    std::nth_element(amplitudes.begin(),
+                     amplitudes.begin() + static_cast<std::ptrdiff_t>(amplitudes.size() / 2),
+                     amplitudes.end());
+    const double median = amplitudes[amplitudes.size() / 2];
+    for (const Sample& s : samples) {
+      if (s.projector == p && std::abs(s.amplitude / median - 1) < kAmplitudeSpread)
+        kept.push_back(s);
+    }
+  }
+  return kept;
 }
 
 double rms(const std::vector<Sample>& samples) {
@@ -158,6 +183,7 @@ int main(int argc, char** argv) {
   const Rig rig = read_rig(scene / "rig.json");
   const SimulatedObject object(read_mesh(scene / "truth" / "mesh.ply"), surface);
   std::vector<Sample> all;
+  std::size_t found = 0;
   for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
     const std::string& name = rig.cameras[c].name;
     const cv::Mat given = read_image(scene / "frames" / "000000" / (name + ".png"));
@@ -168,6 +194,8 @@ int main(int argc, char** argv) {
         fit_block(given, parts, {x, y, kBlock, kBlock}, samples);
       }
     }
+    found += samples.size();
+    samples = usable(samples, rig.projectors.size());
     std::vector<double> amplitude(rig.projectors.size(), 0);
     std::vector<int> count(rig.projectors.size(), 0);
     double mean = 0;
@@ -176,12 +204,11 @@ int main(int argc, char** argv) {
       ++count[s.projector];
       mean += s.displacement / static_cast<double>(samples.size());
     }
-    const cv::Mat ours = brightest_on(parts.sum);
-    const cv::Mat theirs = brightest_on(given);
     std::printf(
         "%s: lines displaced by %.4f px RMS (mean %+.4f, %zu blocks); silhouette: %d + %d "
         "stray px; amplitudes",
-        name.c_str(), rms(samples), mean, samples.size(), stray(ours, theirs), stray(theirs, ours));
+        name.c_str(), rms(samples), mean, samples.size(), stray(parts.sum, given),
+        stray(given, parts.sum));
     cv::Mat scaled = cv::Mat::zeros(given.size(), given.type());
     for (std::size_t p = 0; p < amplitude.size(); ++p) {
       const double a = count[p] > 0 ? amplitude[p] / count[p] : 1;
@@ -199,7 +226,9 @@ int main(int argc, char** argv) {
   for (const Sample& s : all) sizes.push_back(std::abs(s.displacement));
   std::sort(sizes.begin(), sizes.end());
   if (sizes.empty()) return 1;
-  std::printf("all: %.4f panel px RMS, median %.4f, 99th percentile %.4f, %zu blocks\n", rms(all),
-              sizes[sizes.size() / 2], sizes[sizes.size() * 99 / 100], sizes.size());
+  std::printf(
+      "all: %.4f panel px RMS, median %.4f, 99th percentile %.4f, %zu blocks (%zu left out)\n",
+      rms(all), sizes[sizes.size() / 2], sizes[sizes.size() * 99 / 100], sizes.size(),
+      found - sizes.size());
   return 0;
 }

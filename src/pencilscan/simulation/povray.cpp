@@ -96,12 +96,11 @@ void write_slits(std::ostream& out, const Projector& projector, const LinePatter
 }
 
 void write_lights(std::ostream& out, const Rig& rig, const RenderOptions& options) {
-  const Vec3 middle = working_volume(rig).center;
+  const double reference = reference_distance(rig);
   constexpr double kFade = 100;  // see the header
   out << std::setprecision(15);
   for (const Projector& projector : rig.projectors) {
     const Vec3 center = projector.center();
-    const double reference = (middle - center).norm();
     const double strength =
         options.exposure * (options.inverse_square ? 0.5 * (1 + kFade * kFade) : 1);
     for (const LinePattern& pattern : projector.patterns) {

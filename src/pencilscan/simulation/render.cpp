@@ -19,8 +19,7 @@ struct Lamp {
 
 Lamp make_lamp(const Rig& rig, std::size_t projector) {
   const Device& device = rig.projectors[projector];
-  const Vec3 center = device.center();
-  return {&device, center, (working_volume(rig).center - center).norm()};
+  return {&device, device.center(), reference_distance(rig)};
 }
 
 /// Reflected share of the light that arrives: everything of the model but M * pattern.
@@ -48,6 +47,13 @@ void for_each_hit(const CameraTracer& tracer, int x, int y, int samples, const S
 }
 
 }  // namespace
+
+double reference_distance(const Rig& rig) {
+  const Vec3 middle = working_volume(rig).center;
+  double sum = 0;
+  for (const Projector& projector : rig.projectors) sum += (projector.center() - middle).norm();
+  return sum / static_cast<double>(rig.projectors.size());
+}
 
 cv::Mat render_camera(const Rig& rig, std::size_t camera_index, const SimulatedObject& object,
                       std::span<const PanelLight> lights, const RenderOptions& options) {

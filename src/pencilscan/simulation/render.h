@@ -14,8 +14,8 @@ namespace pencilscan {
 ///
 ///   I = exposure * (D / d)^2 * (albedo cos + specular (n.h)^(1 / roughness)) * M * pattern
 ///
-/// plus albedo * ambient, with d the distance to the projector, D the distance from the projector
-/// to the centre of the working volume (so that a surface there is lit alike by all), h the
+/// plus albedo * ambient, with d the distance to the projector, D the mean distance of all
+/// projectors from the centre of the working volume (equal lamps, nominal strength there), h the
 /// half-way vector (Blinn 1977), M the rig's colour matrix of the camera for that projector. One
 /// pixel is the mean over samples x samples rays; the pattern under each ray is averaged over the
 /// ray's own footprint.
@@ -25,6 +25,9 @@ struct RenderOptions {
   bool inverse_square = true;  ///< light falls off with distance
   double ambient = 0;  ///< even grey light on all surfaces: image value of a white one, >= 0
 };
+
+/// D of the model, mm.
+[[nodiscard]] double reference_distance(const Rig& rig);
 
 /// Linear light of one camera, CV_32FC3 in RGB order, without sensor effects. `lights` has one
 /// entry per projector of the rig.
