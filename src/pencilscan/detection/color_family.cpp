@@ -1,0 +1,69 @@
+#include "pencilscan/detection/color_family.h"
+
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+
+namespace pencilscan {
+namespace {
+
+Vec3 vector_of(const std::string& color) {
+  const Rgb rgb = color_from_name(color).value_or(Rgb{0, 0, 0});
+  return {rgb[0], rgb[1], rgb[2]};
+}
+
+/// Least-squares, minimum-norm weights that are 1 on own colours and 0 on the others.
+void set_presence(std::vector<ColorFamily>& families) {
+  for (ColorFamily& own : families) {
+    std::vector<Vec3> rows;
+    std::vector<double> targets;
+    for (const ColorFamily& family : families) {
+      for (const std::string& color : family.colors) {
+        rows.push_back(vector_of(color));
+        targets.push_back(&family == &own ? 1 : 0);
+      }
+    }
+    Eigen::MatrixXd A(static_cast<Eigen::Index>(rows.size()), 3);
+    Eigen::VectorXd b(A.rows());
+    for (Eigen::Index i = 0; i < A.rows(); ++i) {
+      A.row(i) = rows[static_cast<std::size_t>(i)].transpose();
+      b(i) = targets[static_cast<std::size_t>(i)];
+    }
+    own.presence = A.completeOrthogonalDecomposition().solve(b);
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      if (targets[i] == 0) own.leakage = std::max(own.leakage, std::abs(own.presence.dot(rows[i])));
+    }
+  }
+}
+
+}  // namespace
+
+std::vector<int> ColorFamily::color_of_symbol(const LinePattern& pattern) const {
+  std::vector<int> index;
+  for (const std::string& color : pattern.colors) {
+    index.push_back(
+        static_cast<int>(std::find(colors.begin(), colors.end(), color) - colors.begin()));
+  }
+  return index;
+}
+
+std::vector<ColorFamily> color_families(const Rig& rig) {
+  std::vector<ColorFamily> families;
+  for (std::size_t p = 0; p < rig.projectors.size(); ++p) {
+    for (std::size_t k = 0; k < rig.projectors[p].patterns.size(); ++k) {
+      std::vector<std::string> colors = rig.projectors[p].patterns[k].colors;
+      std::sort(colors.begin(), colors.end());
+      auto family = std::find_if(families.begin(), families.end(),
+                                 [&](const ColorFamily& f) { return f.colors == colors; });
+      if (family == families.end()) {
+        family = families.insert(family, ColorFamily());
+        family->colors = colors;
+      }
+      family->patterns.push_back({static_cast<int>(p), static_cast<int>(k)});
+    }
+  }
+  set_presence(families);
+  return families;
+}
+
+}  // namespace pencilscan

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "pencilscan/rig/rig.h"
+
+namespace pencilscan {
+
+/// A pattern of a projector, by index.
+struct PatternRef {
+  int projector = 0;
+  int pattern = 0;
+  friend bool operator==(const PatternRef&, const PatternRef&) = default;
+};
+
+/// All patterns drawn with one set of colours. One family = one ridge image: `presence` weighs
+/// unmixed projector red, green, blue so that each of its colours gives 1 and those of the other
+/// families give 0 (blue/cyan against red/yellow: the blue channel).
+struct ColorFamily {
+  std::vector<std::string> colors;
+  std::vector<PatternRef> patterns;
+  Vec3 presence = Vec3::Zero();
+  double leakage = 0;  ///< largest |presence . colour of another family|; 0: separable
+
+  /// Index in `colors` of each symbol of a pattern's alphabet.
+  [[nodiscard]] std::vector<int> color_of_symbol(const LinePattern& pattern) const;
+};
+
+[[nodiscard]] std::vector<ColorFamily> color_families(const Rig& rig);
+
+}  // namespace pencilscan

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "pencilscan/detection/code_evidence.h"
+#include "pencilscan/detection/color_family.h"
+#include "pencilscan/detection/curve.h"
+#include "pencilscan/detection/refine.h"
+#include "pencilscan/detection/ridge.h"
+#include "pencilscan/detection/trace.h"
+#include "pencilscan/detection/unmix.h"
+
+namespace pencilscan {
+
+struct DetectionOptions {
+  RidgeOptions ridge;
+  TraceOptions trace;
+  RefineOptions refine;
+  CodeEvidenceOptions code;
+};
+
+/// What one camera sees.
+struct CameraDetection {
+  std::vector<Curve> curves;      ///< of all families
+  Unmixing unmixing;
+  std::size_t saturated_pixels = 0;
+};
+
+/// Curves of all colour families of one camera image (linear or gamma-coded RGB as read, CV_32FC3).
+[[nodiscard]] CameraDetection detect_curves(const Camera& camera, const Rig& rig,
+                                            const std::vector<ColorFamily>& families,
+                                            const cv::Mat& image,
+                                            const DetectionOptions& options = {});
+
+}  // namespace pencilscan

@@ -1,0 +1,237 @@
+#include "pencilscan/detection/trace.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace pencilscan {
+namespace {
+
+using Eigen::Vector2f;
+
+/// Buckets of items by pixel.
+class PixelIndex {
+ public:
+  PixelIndex(cv::Size size, std::size_t items)
+      : size_(size), head_(static_cast<std::size_t>(size.area()), -1), next_(items, -1) {}
+
+  void add(int item, const Vector2f& p) {
+    const std::size_t cell = cell_of(std::lround(p.x()), std::lround(p.y()));
+    next_[static_cast<std::size_t>(item)] = head_[cell];
+    head_[cell] = item;
+  }
+
+  template <class Visit>
+  void around(const Vector2f& p, int radius, Visit visit) const {
+    const long cx = std::lround(p.x());
+    const long cy = std::lround(p.y());
+    for (long y = std::max(0L, cy - radius); y <= std::min<long>(size_.height - 1, cy + radius); ++y) {
+      for (long x = std::max(0L, cx - radius); x <= std::min<long>(size_.width - 1, cx + radius); ++x) {
+        for (int i = head_[cell_of(x, y)]; i >= 0; i = next_[static_cast<std::size_t>(i)]) visit(i);
+      }
+    }
+  }
+
+ private:
+  [[nodiscard]] std::size_t cell_of(long x, long y) const {
+    const long cx = std::clamp<long>(x, 0, size_.width - 1);
+    const long cy = std::clamp<long>(y, 0, size_.height - 1);
+    return static_cast<std::size_t>(cy * size_.width + cx);
+  }
+
+  cv::Size size_;
+  std::vector<int> head_;
+  std::vector<int> next_;
+};
+
+/// A directed end of something: item 2 i is the end against the tangent, 2 i + 1 along it.
+struct End {
+  Vector2f position;
+  Vector2f outward;  ///< unit
+};
+
+struct LinkRule {
+  float min_along;
+  float max_along;
+  float lateral_base;
+  float lateral_slope;
+  float min_cosine;
+};
+
+/// For every end the best facing end, or -1. Ends of one item never match each other.
+std::vector<int> best_facing_ends(const std::vector<End>& ends, const PixelIndex& index,
+                                  const LinkRule& rule) {
+  std::vector<int> best(ends.size(), -1);
+  const int radius = static_cast<int>(std::ceil(rule.max_along)) + 1;
+  for (std::size_t e = 0; e < ends.size(); ++e) {
+    const End& end = ends[e];
+    float best_cost = std::numeric_limits<float>::max();
+    index.around(end.position, radius, [&](int item) {
+      if (item == static_cast<int>(e / 2)) return;
+      for (int side = 0; side < 2; ++side) {
+        const int f = 2 * item + side;
+        const End& other = ends[static_cast<std::size_t>(f)];
+        const Vector2f way = other.position - end.position;
+        const float along = way.dot(end.outward);
+        if (along < rule.min_along || along > rule.max_along) continue;
+        const float cosine = -end.outward.dot(other.outward);
+        if (cosine < rule.min_cosine) continue;
+        const float lateral = std::abs(way.x() * end.outward.y() - way.y() * end.outward.x());
+        if (lateral > rule.lateral_base + rule.lateral_slope * along) continue;
+        const float cost = along + 2 * lateral + 4 * (1 - cosine);
+        if (cost < best_cost || (cost == best_cost && f < best[e])) {
+          best_cost = cost;
+          best[e] = f;
+        }
+      }
+    });
+  }
+  return best;
+}
+
+/// Keeps links on which both ends agree, and walks the chains: lists of directed items (2 i + 1:
+/// walked along its own direction, 2 i: against it).
+std::vector<std::vector<int>> chains_of(const std::vector<int>& best) {
+  const std::size_t items = best.size() / 2;
+  std::vector<int> link(best.size(), -1);
+  for (std::size_t e = 0; e < best.size(); ++e) {
+    const int f = best[e];
+    if (f >= 0 && best[static_cast<std::size_t>(f)] == static_cast<int>(e)) link[e] = f;
+  }
+  std::vector<char> used(items, 0);
+  std::vector<std::vector<int>> chains;
+  const auto walk = [&](int exit) {
+    std::vector<int> chain;
+    for (int e = exit; e >= 0;) {
+      const auto item = static_cast<std::size_t>(e / 2);
+      if (used[item] != 0) break;
+      used[item] = 1;
+      chain.push_back(e);
+      const int entry = link[static_cast<std::size_t>(e)];
+      e = entry < 0 ? -1 : entry ^ 1;
+    }
+    chains.push_back(std::move(chain));
+  };
+  for (std::size_t e = 0; e < best.size(); ++e) {
+    if (link[e] < 0 && used[e / 2] == 0) walk(static_cast<int>(e) ^ 1);
+  }
+  for (std::size_t i = 0; i < items; ++i) {
+    if (used[i] == 0) walk(static_cast<int>(2 * i + 1));  // closed loops
+  }
+  return chains;
+}
+
+using Polyline = std::vector<Vector2f>;
+
+std::vector<Polyline> link_ridgels(std::span<const Ridgel> ridgels, cv::Size size,
+                                   const TraceOptions& options) {
+  std::vector<End> ends;
+  ends.reserve(2 * ridgels.size());
+  PixelIndex index(size, ridgels.size());
+  for (std::size_t i = 0; i < ridgels.size(); ++i) {
+    const Ridgel& r = ridgels[i];
+    const Vector2f position(r.x, r.y);
+    const Vector2f tangent(-r.ny, r.nx);
+    ends.push_back({position, -tangent});
+    ends.push_back({position, tangent});
+    index.add(static_cast<int>(i), position);
+  }
+  const LinkRule rule{0.3F, 2.3F, 0.3F, 0.3F, static_cast<float>(std::cos(options.max_turn_rad))};
+  std::vector<Polyline> lines;
+  for (const auto& chain : chains_of(best_facing_ends(ends, index, rule))) {
+    if (chain.size() < 3) continue;
+    Polyline line;
+    for (const int e : chain) line.push_back(ends[static_cast<std::size_t>(e)].position);
+    lines.push_back(std::move(line));
+  }
+  return lines;
+}
+
+Vector2f outward_at_end(const Polyline& line, bool front) {
+  constexpr std::size_t kReach = 5;
+  const std::size_t n = line.size();
+  const std::size_t k = std::min(kReach, n - 1);
+  return (front ? line[0] - line[k] : line[n - 1] - line[n - 1 - k]).normalized();
+}
+
+void append_bridged(Polyline& line, const Polyline& next) {
+  if (!line.empty()) {
+    const Vector2f from = line.back();
+    const Vector2f way = next.front() - from;
+    const int missing = static_cast<int>(std::lround(way.norm())) - 1;
+    for (int k = 1; k <= missing; ++k) {
+      line.push_back(from + way * (static_cast<float>(k) / static_cast<float>(missing + 1)));
+    }
+  }
+  line.insert(line.end(), next.begin(), next.end());
+}
+
+std::vector<Polyline> bridge_gaps(std::vector<Polyline> lines, cv::Size size, double max_gap_px) {
+  // Each item is a line with two far-apart ends: index both, by end.
+  std::vector<End> ends;
+  for (const Polyline& line : lines) {
+    ends.push_back({line.front(), outward_at_end(line, true)});
+    ends.push_back({line.back(), outward_at_end(line, false)});
+  }
+  const auto max_gap = static_cast<float>(max_gap_px);
+  PixelIndex index(size, ends.size());
+  for (std::size_t e = 0; e < ends.size(); ++e) index.add(static_cast<int>(e), ends[e].position);
+  std::vector<int> best(ends.size(), -1);
+  for (std::size_t e = 0; e < ends.size(); ++e) {
+    float best_cost = std::numeric_limits<float>::max();
+    index.around(ends[e].position, static_cast<int>(std::ceil(max_gap_px)) + 1, [&](int f) {
+      if (f / 2 == static_cast<int>(e / 2)) return;
+      const End& other = ends[static_cast<std::size_t>(f)];
+      const Vector2f way = other.position - ends[e].position;
+      const float along = way.dot(ends[e].outward);
+      const float cosine = -ends[e].outward.dot(other.outward);
+      const float lateral =
+          std::abs(way.x() * ends[e].outward.y() - way.y() * ends[e].outward.x());
+      if (along < 0 || along > max_gap || cosine < 0.9F || lateral > 0.6F + 0.2F * along) return;
+      const float cost = along + 3 * lateral + 10 * (1 - cosine);
+      if (cost < best_cost || (cost == best_cost && f < best[e])) {
+        best_cost = cost;
+        best[e] = f;
+      }
+    });
+  }
+  std::vector<Polyline> joined;
+  for (const auto& chain : chains_of(best)) {
+    Polyline line;
+    for (const int e : chain) {
+      Polyline& part = lines[static_cast<std::size_t>(e / 2)];
+      if (e % 2 == 0) std::reverse(part.begin(), part.end());
+      append_bridged(line, part);
+    }
+    joined.push_back(std::move(line));
+  }
+  return joined;
+}
+
+}  // namespace
+
+std::vector<Curve> trace_curves(std::span<const Ridgel> ridgels, cv::Size image_size,
+                                const TraceOptions& options) {
+  std::vector<Polyline> lines = link_ridgels(ridgels, image_size, options);
+  lines = bridge_gaps(std::move(lines), image_size, options.max_gap_px);
+  std::vector<Curve> curves;
+  for (const Polyline& line : lines) {
+    if (static_cast<int>(line.size()) < options.min_points) continue;
+    Curve curve;
+    for (const Vector2f& p : line) {
+      CurvePoint point;
+      point.position = p;
+      curve.points.push_back(point);
+    }
+    curves.push_back(std::move(curve));
+  }
+  // Top to bottom, left to right: an order that does not depend on how links were walked.
+  std::sort(curves.begin(), curves.end(), [](const Curve& a, const Curve& b) {
+    const Vector2f& p = a.points.front().position;
+    const Vector2f& q = b.points.front().position;
+    return p.y() != q.y() ? p.y() < q.y() : p.x() < q.x();
+  });
+  return curves;
+}
+
+}  // namespace pencilscan

@@ -1,0 +1,128 @@
+#include "pencilscan/solution/labeling.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "pencilscan/core/parallel.h"
+#include "pencilscan/solution/linear.h"
+#include "pencilscan/solution/multiview.h"
+#include "pencilscan/solution/pencil_parameter.h"
+
+namespace pencilscan {
+namespace {
+
+struct ComponentTask {
+  std::size_t graph = 0;
+  int component = 0;
+};
+
+struct ComponentResult {
+  ComponentReport report;
+  std::vector<std::pair<int, CurveLabel>> labels;  ///< (curve, label)
+};
+
+/// Rough probability that a linear solution's rounding picks the right line: the uncertainty along e is
+/// the residual over the smallest singular value.
+float linear_confidence(const LinearSolution& linear) {
+  const double sigma_lines = std::max(0.1, linear.residual_rms_px) / std::max(1e-9, linear.sigma_min);
+  return static_cast<float>(std::clamp(1 / (1 + sigma_lines), 0.0, 1.0));
+}
+
+CurveLabel continuous_label(const Rig& rig, const GridGraph& graph, int curve, double mu, float confidence) {
+  const CurveIdentity& identity = graph.identities[static_cast<std::size_t>(curve)];
+  const Projector& projector = rig.projectors[static_cast<std::size_t>(identity.pattern->projector)];
+  const LinePattern& pattern = projector.patterns[static_cast<std::size_t>(identity.pattern->pattern)];
+  const PencilParameter parameter(rig, rig.cameras[static_cast<std::size_t>(graph.camera)], *identity.pattern);
+  CurveLabel label;
+  label.pattern = *identity.pattern;
+  label.plane = parameter.line_from_mu(mu);
+  label.line = nearest_line(label.plane, identity.local_id, pattern.period(), projector.line_count(pattern));
+  label.confidence = confidence;
+  return label;
+}
+
+ComponentResult solve_one(const Rig& rig, const GridGraph& graph, int component,
+                          std::span<const CurveIndex> indices, const SolutionOptions& options) {
+  ComponentResult result;
+  const LinearSolution linear = solve_component(rig, graph, component);
+  if (linear.solved && options.method == Method::kMultiview) {
+    const MultiviewSolution multiview = sweep_component(rig, graph, linear, indices, options);
+    result.report = multiview.report;
+    const double scale = options.cost == MultiviewCost::kNormalized ? 0.15 * options.search_radius_px
+                                                                    : std::max(1e-9, *std::min_element(multiview.report.sweep_cost.begin(), multiview.report.sweep_cost.end()));
+    const auto confidence = static_cast<float>(1 - 0.5 * std::exp(-multiview.report.margin / scale));
+    for (std::size_t k = 0; k < linear.curves.size(); ++k) {
+      if (multiview.lines[k] < 0) continue;
+      const CurveIdentity& identity = graph.identities[static_cast<std::size_t>(linear.curves[k])];
+      result.labels.push_back({linear.curves[k], CurveLabel{*identity.pattern, multiview.lines[k],
+                                                            static_cast<double>(multiview.lines[k]), confidence}});
+    }
+  } else if (linear.solved) {
+    for (std::size_t k = 0; k < linear.curves.size(); ++k) {
+      const CurveLabel label = continuous_label(rig, graph, linear.curves[k], linear.mu[static_cast<Eigen::Index>(k)], linear_confidence(linear));
+      if (std::isfinite(label.plane) && label.line >= 0) result.labels.push_back({linear.curves[k], label});
+    }
+    result.report.solved = true;
+  } else {
+    result.report.reason = linear.reason;
+  }
+  result.report.camera = graph.camera;
+  result.report.crossings = linear.crossings;
+  result.report.curves = static_cast<int>(std::count(graph.component_of_curve.begin(), graph.component_of_curve.end(), component));
+  result.report.sigma_min = linear.sigma_min;
+  result.report.sigma_second = linear.sigma_second;
+  result.report.residual_rms_px = linear.residual_rms_px;
+  return result;
+}
+
+}  // namespace
+
+std::optional<Method> method_from_name(std::string_view name) {
+  if (name == "linear") return Method::kLinear;
+  if (name == "multiview") return Method::kMultiview;
+  return std::nullopt;
+}
+
+int nearest_line(double coordinate, int local_id, int period, int line_count) {
+  if (!std::isfinite(coordinate) || line_count < 1) return -1;
+  const double bounded = std::clamp(coordinate, -1e6, 1e6);
+  if (local_id < 0 || period < 2) {
+    return std::clamp(static_cast<int>(std::lround(bounded)), 0, line_count - 1);
+  }
+  const int last_cycle = (line_count - 1 - local_id) / period;
+  if (local_id >= line_count) return -1;
+  const long cycle = std::lround((bounded - local_id) / period);
+  return local_id + period * static_cast<int>(std::clamp<long>(cycle, 0, last_cycle));
+}
+
+Labeling solve(const Rig& rig, std::span<const GridGraph> graphs, const SolutionOptions& options) {
+  Labeling labeling;
+  labeling.labels.resize(rig.cameras.size());
+  std::vector<ComponentTask> tasks;
+  std::vector<CurveIndex> indices;
+  indices.reserve(rig.cameras.size());
+  std::vector<const GridGraph*> of_camera(rig.cameras.size(), nullptr);
+  for (std::size_t g = 0; g < graphs.size(); ++g) {
+    const auto camera = static_cast<std::size_t>(graphs[g].camera);
+    of_camera[camera] = &graphs[g];
+    labeling.labels[camera].resize(graphs[g].curves.size());
+    for (int k = 0; k < graphs[g].component_count; ++k) tasks.push_back({g, k});
+  }
+  const GridGraph nothing;
+  for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
+    indices.emplace_back(of_camera[c] != nullptr ? *of_camera[c] : nothing,
+                         cv::Size(rig.cameras[c].width, rig.cameras[c].height));
+  }
+  std::vector<ComponentResult> results(tasks.size());
+  parallel_for(tasks.size(), [&](std::size_t t) {
+    results[t] = solve_one(rig, graphs[tasks[t].graph], tasks[t].component, indices, options);
+  });
+  for (std::size_t t = 0; t < tasks.size(); ++t) {
+    auto& labels = labeling.labels[static_cast<std::size_t>(graphs[tasks[t].graph].camera)];
+    for (auto& [curve, label] : results[t].labels) labels[static_cast<std::size_t>(curve)] = label;
+    labeling.components.push_back(std::move(results[t].report));
+  }
+  return labeling;
+}
+
+}  // namespace pencilscan
