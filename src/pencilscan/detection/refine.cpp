@@ -298,8 +298,8 @@ std::vector<Curve> refine_curves(const cv::Mat& presence, std::vector<Curve> cur
   constexpr int kSmoothingReach = 4;
   for (int round = 0; round < options.rounds; ++round) {
     for (Curve& curve : curves) smooth_positions(curve.points, kSmoothingReach);
-    cv::Mat residual = presence;
-    if (round > 0) residual = presence - render_curves(curves, presence.size());
+    const cv::Mat residual =
+        round > 0 ? cv::Mat(presence - render_curves(curves, presence.size())) : presence;
     for (Curve& curve : curves) {
       fit_curve(residual, round == 0, options.half_arc, curve);
       smooth_widths(curve.points);
