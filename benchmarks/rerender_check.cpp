@@ -171,7 +171,7 @@ int main(int argc, char** argv) {
     return 2;
   }
   const std::filesystem::path scene(argv[1]);
-  SurfaceOptions surface;
+  Reflectance surface;
   std::string difference_path;
   for (int i = 2; i < argc; ++i) {
     if (std::strcmp(argv[i], "--flat") == 0) {

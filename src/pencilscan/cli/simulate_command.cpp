@@ -41,7 +41,7 @@ struct SimulateOptions {
   bool truth_maps = false;
   bool export_povray = false;
 
-  SurfaceOptions surface;
+  Reflectance surface;
   bool flat = false;
   RenderOptions render;
   bool no_falloff = false;

@@ -10,8 +10,8 @@
 namespace pencilscan {
 namespace {
 
-constexpr int kHalf = 4;         ///< profile half-length, px
-constexpr int kUnknowns = 4;     ///< own line, other families, background level and slope
+constexpr int kHalf = 4;      ///< profile half-length, px
+constexpr int kUnknowns = 4;  ///< own line, other families, background level and slope
 
 using Normal = Eigen::Matrix<float, kUnknowns, kUnknowns>;
 using Right = Eigen::Matrix<float, kUnknowns, 3>;
@@ -126,7 +126,8 @@ void measure_code(const cv::Mat& unmixed_image, const std::vector<ColorFamily>& 
       curve.code.assign(curve.points.size() * family.colors.size(), 0.F);
       for (std::size_t i = 0; i < curve.points.size(); ++i) {
         const Eigen::Vector3f rgb = measured[i].rgb.cwiseQuotient(gains);
-        const float noise = static_cast<float>(options.relative_noise) * std::max(rgb.norm(), 1e-4F);
+        const float noise =
+            static_cast<float>(options.relative_noise) * std::max(rgb.norm(), 1e-4F);
         float* row = curve.code.data() + i * family.colors.size();
         float best = -1e9F;
         for (std::size_t j = 0; j < family.colors.size(); ++j) {

@@ -9,14 +9,15 @@
 namespace pencilscan {
 
 struct CodeEvidenceOptions {
-  int half_arc = 4;              ///< points on either side that share one colour measurement
-  double relative_noise = 0.12;  ///< model error of a colour amplitude, share of the line's amplitude
-  double max_log_ratio = 4;      ///< evidence of one point is limited to this
+  int half_arc = 4;  ///< points on either side that share one colour measurement
+  double relative_noise =
+      0.12;                  ///< model error of a colour amplitude, share of the line's amplitude
+  double max_log_ratio = 4;  ///< evidence of one point is limited to this
 };
 
-/// Sets Curve::code of all curves of one camera. At each point the three unmixed channels are regressed
-/// on the curve's own profile, the profiles of the other families' curves there (which share
-/// channels: green codes both blue/cyan and red/yellow) and a sloped background. The colour
+/// Sets Curve::code of all curves of one camera. At each point the three unmixed channels are
+/// regressed on the curve's own profile, the profiles of the other families' curves there (which
+/// share channels: green codes both blue/cyan and red/yellow) and a sloped background. The colour
 /// amplitudes, relative to those usual in the image, are compared with each colour of the family.
 void measure_code(const cv::Mat& unmixed_image, const std::vector<ColorFamily>& families,
                   std::vector<Curve>& curves, const CodeEvidenceOptions& options = {});

@@ -22,7 +22,7 @@ struct DetectionOptions {
 
 /// What one camera sees.
 struct CameraDetection {
-  std::vector<Curve> curves;      ///< of all families
+  std::vector<Curve> curves;  ///< of all families
   Unmixing unmixing;
   std::size_t saturated_pixels = 0;
 };

@@ -27,7 +27,8 @@ void smooth_positions(std::vector<CurvePoint>& points, int reach) {
     const int high = std::min(n - 1, low + 2 * r);
     const Vector2f center = points[static_cast<std::size_t>(i)].position;
     const Vector2f tangent = (points[static_cast<std::size_t>(high)].position -
-                              points[static_cast<std::size_t>(low)].position).normalized();
+                              points[static_cast<std::size_t>(low)].position)
+                                 .normalized();
     const Vector2f normal(tangent.y(), -tangent.x());
     Eigen::Matrix3f N = 1e-3F * Eigen::Matrix3f::Identity();
     Eigen::Vector3f b = Eigen::Vector3f::Zero();
@@ -43,15 +44,16 @@ void smooth_positions(std::vector<CurvePoint>& points, int reach) {
     const Vector2f slope = tangent + 0.25F * x[1] * normal;
     points[static_cast<std::size_t>(i)].normal = Vector2f(slope.y(), -slope.x()).normalized();
   }
-  for (int i = 0; i < n; ++i) points[static_cast<std::size_t>(i)].position = positions[static_cast<std::size_t>(i)];
+  for (int i = 0; i < n; ++i)
+    points[static_cast<std::size_t>(i)].position = positions[static_cast<std::size_t>(i)];
 }
 
 struct Fit {
   float amplitude = 0;
   float offset = 0;
   float width = 0;
-  float residual2 = 0;       ///< mean squared residual, degrees of freedom taken off
-  float offset_gain = 0;     ///< variance of offset for unit residual variance
+  float residual2 = 0;    ///< mean squared residual, degrees of freedom taken off
+  float offset_gain = 0;  ///< variance of offset for unit residual variance
   bool good = false;
 };
 
@@ -139,12 +141,14 @@ void fit_curve(const cv::Mat& residual, bool first_round, int half_arc, Curve& c
     const int r = std::min({half_arc, i, n - 1 - i});  // symmetric: no shift towards the inside
     Profile mean{};
     for (int j = i - r; j <= i + r; ++j) {
-      for (std::size_t o = 0; o < mean.size(); ++o) mean[o] += profiles[static_cast<std::size_t>(j)][o];
+      for (std::size_t o = 0; o < mean.size(); ++o)
+        mean[o] += profiles[static_cast<std::size_t>(j)][o];
     }
     for (float& m : mean) m /= static_cast<float>(2 * r + 1);
     const CurvePoint& p = points[static_cast<std::size_t>(i)];
     const float width = first_round ? 1.5F : p.width_px;
-    const int half = first_round ? 4 : std::clamp(static_cast<int>(std::lround(2.4F * width)) + 1, 4, kMaxHalf);
+    const int half =
+        first_round ? 4 : std::clamp(static_cast<int>(std::lround(2.4F * width)) + 1, 4, kMaxHalf);
     const float top = mean[kMaxHalf] - std::min(mean[static_cast<std::size_t>(kMaxHalf - half)],
                                                 mean[static_cast<std::size_t>(kMaxHalf + half)]);
     fits[static_cast<std::size_t>(i)] = fit_profile(mean, half, top, width);
@@ -184,7 +188,8 @@ void smooth_widths(std::vector<CurvePoint>& points) {
     for (int j = std::max(0, i - kReach); j <= std::min(n - 1, i + kReach); ++j) {
       window[count++] = points[static_cast<std::size_t>(j)].width_px;
     }
-    std::nth_element(window.begin(), window.begin() + static_cast<std::ptrdiff_t>(count / 2), window.begin() + static_cast<std::ptrdiff_t>(count));
+    std::nth_element(window.begin(), window.begin() + static_cast<std::ptrdiff_t>(count / 2),
+                     window.begin() + static_cast<std::ptrdiff_t>(count));
     widths[static_cast<std::size_t>(i)] = window[count / 2];
   }
   for (std::size_t i = 0; i < points.size(); ++i) points[i].width_px = widths[i];

@@ -44,8 +44,7 @@ Direction make_direction(int index, const RidgeOptions& options) {
       const double w = weight * (k == 0 ? 1 - fraction : fraction);
       if (w < 1e-6) continue;
       const int m = low + k;
-      direction.taps.push_back(
-          {major_x ? j : m, major_x ? m : j, static_cast<float>(w)});
+      direction.taps.push_back({major_x ? j : m, major_x ? m : j, static_cast<float>(w)});
     }
   }
   return direction;
@@ -68,7 +67,8 @@ Hessian gaussian_hessian(const cv::Mat& image, double sigma) {
     const double value = std::exp(-0.5 * i * i / (sigma * sigma)) / sum;
     const double s2 = sigma * sigma;
     g.at<float>(0, i + radius) = static_cast<float>(value);
-    d1.at<float>(0, i + radius) = static_cast<float>(i / s2 * value);  // correlation, not convolution
+    d1.at<float>(0, i + radius) =
+        static_cast<float>(i / s2 * value);  // correlation, not convolution
     d2.at<float>(0, i + radius) = static_cast<float>((i * i / s2 - 1) / s2 * value);
     d2_mean += (i * i / s2 - 1) / s2 * value;
   }
@@ -96,7 +96,8 @@ Levels response_levels(const Hessian& h) {
   }
   if (values.empty()) return {};
   std::vector<float> magnitude(values.size());
-  std::transform(values.begin(), values.end(), magnitude.begin(), [](float v) { return std::abs(v); });
+  std::transform(values.begin(), values.end(), magnitude.begin(),
+                 [](float v) { return std::abs(v); });
   // The lower quartile of |N(0, s)| is 0.3186 s: background even if lines cover half the image.
   const auto quartile = magnitude.begin() + static_cast<std::ptrdiff_t>(magnitude.size() / 4);
   std::nth_element(magnitude.begin(), quartile, magnitude.end());
@@ -169,7 +170,8 @@ float bilinear(const float* image, int stride, float x, float y) {
   const float fx = x - static_cast<float>(ix);
   const float fy = y - static_cast<float>(iy);
   const float* p = image + iy * stride + ix;
-  return (1 - fy) * ((1 - fx) * p[0] + fx * p[1]) + fy * ((1 - fx) * p[stride] + fx * p[stride + 1]);
+  return (1 - fy) * ((1 - fx) * p[0] + fx * p[1]) +
+         fy * ((1 - fx) * p[stride] + fx * p[stride + 1]);
 }
 
 /// Offset of the maximum of the parabola through (-1, before), (0, at), (1, after).
@@ -178,8 +180,9 @@ float parabola_offset(float before, float at, float after) {
   return curvature < 0 ? 0.5F * (before - after) / curvature : 0.F;
 }
 
-void collect_tile(const TileResponses& tile, const std::vector<Direction>& directions, float threshold,
-                  int x0, int y0, int width, int height, std::vector<Ridgel>& ridgels) {
+void collect_tile(const TileResponses& tile, const std::vector<Direction>& directions,
+                  float threshold, int x0, int y0, int width, int height,
+                  std::vector<Ridgel>& ridgels) {
   constexpr int kSize = TileResponses::kSize;
   const std::size_t n = directions.size();
   const auto step = std::numbers::pi_v<float> / static_cast<float>(n);
@@ -207,7 +210,8 @@ void collect_tile(const TileResponses& tile, const std::vector<Direction>& direc
         const float ny = d.ny + turn * d.nx;
         const float norm = std::hypot(nx, ny);
         ridgels.push_back({static_cast<float>(x0 + x - 1) + offset * d.nx,
-                           static_cast<float>(y0 + y - 1) + offset * d.ny, nx / norm, ny / norm, r});
+                           static_cast<float>(y0 + y - 1) + offset * d.ny, nx / norm, ny / norm,
+                           r});
       }
     }
   }

@@ -7,9 +7,9 @@ namespace pencilscan {
 
 /// A local piece of a bright line: a maximum across one direction of the oriented filter.
 struct Ridgel {
-  float x = 0, y = 0;      ///< sub-pixel position
-  float nx = 1, ny = 0;    ///< unit normal
-  float response = 0;      ///< negative second derivative across, smoothed along
+  float x = 0, y = 0;    ///< sub-pixel position
+  float nx = 1, ny = 0;  ///< unit normal
+  float response = 0;    ///< negative second derivative across, smoothed along
 };
 
 struct RidgeOptions {
@@ -21,12 +21,13 @@ struct RidgeOptions {
 };
 
 /// Ridgels of one presence image, in (x, y, direction) space: where two lines of one colour cross,
-/// both directions have their own maximum, so that neither is lost. This replaces the image rotation
-/// of the paper's section IV-C.
+/// both directions have their own maximum, so that neither is lost. This replaces the image
+/// rotation of the paper's section IV-C.
 ///
-/// The elongated second-derivative filter is the isotropic Gaussian Hessian (sigma_across), steered to
-/// each direction, and smoothed along it by a 1-D Gaussian of variance along^2 - across^2 on a sheared
-/// grid: 2 multiplications a tap instead of a full 2-D kernel.
-[[nodiscard]] std::vector<Ridgel> find_ridgels(const cv::Mat& presence, const RidgeOptions& options = {});
+/// The elongated second-derivative filter is the isotropic Gaussian Hessian (sigma_across), steered
+/// to each direction, and smoothed along it by a 1-D Gaussian of variance along^2 - across^2 on a
+/// sheared grid: 2 multiplications a tap instead of a full 2-D kernel.
+[[nodiscard]] std::vector<Ridgel> find_ridgels(const cv::Mat& presence,
+                                               const RidgeOptions& options = {});
 
 }  // namespace pencilscan

@@ -25,8 +25,10 @@ class PixelIndex {
   void around(const Vector2f& p, int radius, Visit visit) const {
     const long cx = std::lround(p.x());
     const long cy = std::lround(p.y());
-    for (long y = std::max(0L, cy - radius); y <= std::min<long>(size_.height - 1, cy + radius); ++y) {
-      for (long x = std::max(0L, cx - radius); x <= std::min<long>(size_.width - 1, cx + radius); ++x) {
+    for (long y = std::max(0L, cy - radius); y <= std::min<long>(size_.height - 1, cy + radius);
+         ++y) {
+      for (long x = std::max(0L, cx - radius); x <= std::min<long>(size_.width - 1, cx + radius);
+           ++x) {
         for (int i = head_[cell_of(x, y)]; i >= 0; i = next_[static_cast<std::size_t>(i)]) visit(i);
       }
     }
@@ -185,8 +187,7 @@ std::vector<Polyline> bridge_gaps(std::vector<Polyline> lines, cv::Size size, do
       const Vector2f way = other.position - ends[e].position;
       const float along = way.dot(ends[e].outward);
       const float cosine = -ends[e].outward.dot(other.outward);
-      const float lateral =
-          std::abs(way.x() * ends[e].outward.y() - way.y() * ends[e].outward.x());
+      const float lateral = std::abs(way.x() * ends[e].outward.y() - way.y() * ends[e].outward.x());
       if (along < 0 || along > max_gap || cosine < 0.9F || lateral > 0.6F + 0.2F * along) return;
       const float cost = along + 3 * lateral + 10 * (1 - cosine);
       if (cost < best_cost || (cost == best_cost && f < best[e])) {

@@ -118,7 +118,8 @@ cv::Mat linearized(const cv::Mat& image, double gamma) {
 cv::Mat unmixed(const cv::Mat& image, const Unmixing& unmixing) {
   cv::Matx33f matrix;
   for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) matrix(i, j) = static_cast<float>(unmixing.projector_from_camera(i, j));
+    for (int j = 0; j < 3; ++j)
+      matrix(i, j) = static_cast<float>(unmixing.projector_from_camera(i, j));
   }
   cv::Mat result;
   cv::transform(image, result, matrix);

@@ -13,10 +13,10 @@ struct Unmixing {
   bool estimated = false;  ///< from the frame, since the rig states no color_matrix
 };
 
-/// The stated matrix inverted (the mean over projectors where they differ), or else an estimate from
-/// the frame: ridge strengths of one channel at clear ridges of the others, where it ought to show
-/// nothing, regressed on those (crosstalk of the projector panel, filters and sensor together).
-/// `image` is linear light, CV_32FC3, RGB.
+/// The stated matrix inverted (the mean over projectors where they differ), or else an estimate
+/// from the frame: ridge strengths of one channel at clear ridges of the others, where it ought to
+/// show nothing, regressed on those (crosstalk of the projector panel, filters and sensor
+/// together). `image` is linear light, CV_32FC3, RGB.
 [[nodiscard]] Unmixing estimate_unmixing(const Camera& camera, const Rig& rig,
                                          const std::vector<ColorFamily>& families,
                                          const cv::Mat& image);

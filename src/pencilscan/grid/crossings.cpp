@@ -65,7 +65,8 @@ Vector2f local_tangent(const Curve& curve, int segment) {
   const int low = std::max(0, segment - 2);
   const int high = std::min(n - 1, segment + 3);
   return (curve.points[static_cast<std::size_t>(high)].position -
-          curve.points[static_cast<std::size_t>(low)].position).normalized();
+          curve.points[static_cast<std::size_t>(low)].position)
+      .normalized();
 }
 
 }  // namespace

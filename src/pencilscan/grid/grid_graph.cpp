@@ -29,7 +29,8 @@ std::vector<Curve> cut_curves(const std::vector<Curve>& curves, std::vector<Cut>
         piece.family = curve.family;
         const auto at = [](std::size_t i) { return static_cast<std::ptrdiff_t>(i); };
         piece.points.assign(curve.points.begin() + at(begin), curve.points.begin() + at(end));
-        piece.code.assign(curve.code.begin() + at(begin * colors), curve.code.begin() + at(end * colors));
+        piece.code.assign(curve.code.begin() + at(begin * colors),
+                          curve.code.begin() + at(end * colors));
         result.push_back(std::move(piece));
       }
       begin = end;
@@ -45,7 +46,8 @@ std::vector<Curve> cut_curves(const std::vector<Curve>& curves, std::vector<Cut>
 void identify(const Rig& rig, const std::vector<ColorFamily>& families, const GridOptions& options,
               GridGraph& graph, std::vector<NeighborRelation>& relations) {
   const Camera& camera = rig.cameras[static_cast<std::size_t>(graph.camera)];
-  graph.crossings = find_crossings(graph.curves, {camera.width, camera.height}, options.min_angle_rad);
+  graph.crossings =
+      find_crossings(graph.curves, {camera.width, camera.height}, options.min_angle_rad);
   vote_for_projectors(rig, families, options, graph);
   relations = neighbor_relations(rig, graph);
   infer_local_ids(rig, families, relations, graph);
@@ -56,7 +58,8 @@ void find_components(GridGraph& graph) {
   std::iota(parent.begin(), parent.end(), 0);
   const auto root = [&](int c) {
     while (parent[static_cast<std::size_t>(c)] != c) {
-      parent[static_cast<std::size_t>(c)] = parent[static_cast<std::size_t>(parent[static_cast<std::size_t>(c)])];
+      parent[static_cast<std::size_t>(c)] =
+          parent[static_cast<std::size_t>(parent[static_cast<std::size_t>(c)])];
       c = parent[static_cast<std::size_t>(c)];
     }
     return c;
@@ -66,7 +69,8 @@ void find_components(GridGraph& graph) {
     const auto& a = graph.identities[static_cast<std::size_t>(x.curve_a)].pattern;
     const auto& b = graph.identities[static_cast<std::size_t>(x.curve_b)].pattern;
     if (!a || !b || *a == *b) continue;
-    connected[static_cast<std::size_t>(x.curve_a)] = connected[static_cast<std::size_t>(x.curve_b)] = 1;
+    connected[static_cast<std::size_t>(x.curve_a)] =
+        connected[static_cast<std::size_t>(x.curve_b)] = 1;
     const int ra = root(x.curve_a);
     const int rb = root(x.curve_b);
     parent[static_cast<std::size_t>(std::max(ra, rb))] = std::min(ra, rb);
@@ -95,7 +99,8 @@ GridGraph build_grid_graph(const Rig& rig, const std::vector<ColorFamily>& famil
   std::vector<NeighborRelation> relations;
   identify(rig, families, options, graph, relations);
   // So has one whose neighbours disagree about its ID on two stretches.
-  const std::vector<Cut> cuts = contradicted_connections(rig, relations, graph, options.min_votes_to_cut);
+  const std::vector<Cut> cuts =
+      contradicted_connections(rig, relations, graph, options.min_votes_to_cut);
   if (!cuts.empty()) {
     graph.cut_connections += cuts.size();
     graph.curves = cut_curves(graph.curves, cuts, families);

@@ -22,21 +22,22 @@ struct GridGraph {
   int camera = 0;
   std::vector<Curve> curves;
   std::vector<Crossing> crossings;
-  std::vector<CurveIdentity> identities;          ///< one per curve
-  std::vector<int> component_of_curve;            ///< -1: no crossing with another projector's curve
+  std::vector<CurveIdentity> identities;  ///< one per curve
+  std::vector<int> component_of_curve;    ///< -1: no crossing with another projector's curve
   int component_count = 0;
-  std::size_t cut_connections = 0;                ///< wrong connections cut by code or neighbours
+  std::size_t cut_connections = 0;  ///< wrong connections cut by code or neighbours
 };
 
 struct GridOptions {
-  double min_angle_rad = 0.26;        ///< flatter crossings are not used
-  double projection_sigma_px = 0.5;   ///< calibration and detection, projector px, for projector votes
-  double flip_cost = 8;               ///< log-evidence needed to cut a curve at a colour change
-  double min_votes_to_cut = 2.5;      ///< contradicting neighbours needed to cut a curve
+  double min_angle_rad = 0.26;  ///< flatter crossings are not used
+  double projection_sigma_px =
+      0.5;                        ///< calibration and detection, projector px, for projector votes
+  double flip_cost = 8;           ///< log-evidence needed to cut a curve at a colour change
+  double min_votes_to_cut = 2.5;  ///< contradicting neighbours needed to cut a curve
 };
 
-/// Crossings, projector of each curve, local de Bruijn IDs from neighbouring curves; wrong connections
-/// are cut; connected components.
+/// Crossings, projector of each curve, local de Bruijn IDs from neighbouring curves; wrong
+/// connections are cut; connected components.
 [[nodiscard]] GridGraph build_grid_graph(const Rig& rig, const std::vector<ColorFamily>& families,
                                          int camera, std::vector<Curve> curves,
                                          const GridOptions& options = {});

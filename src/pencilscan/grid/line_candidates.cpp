@@ -12,8 +12,7 @@ std::optional<DepthRange> depth_range(const Camera& camera, const Sphere& volume
   // |z d - c|^2 = r^2
   const double a = direction.squaredNorm();
   const double b = direction.dot(center);
-  const double discriminant =
-      b * b - a * (center.squaredNorm() - volume.radius * volume.radius);
+  const double discriminant = b * b - a * (center.squaredNorm() - volume.radius * volume.radius);
   if (discriminant <= 0) return std::nullopt;
   const double root = std::sqrt(discriminant);
   const DepthRange range{std::max(1e-3, (b - root) / a), (b + root) / a};
@@ -35,13 +34,15 @@ std::vector<LineCandidate> line_candidates(const Rig& rig, const Camera& camera,
   const double a = pattern.coordinate((*near)[axis]);
   const double b = pattern.coordinate((*far)[axis]);
   const int first = std::max(0, static_cast<int>(std::ceil(std::min(a, b))));
-  const int last = std::min(projector.line_count(pattern) - 1, static_cast<int>(std::floor(std::max(a, b))));
+  const int last =
+      std::min(projector.line_count(pattern) - 1, static_cast<int>(std::floor(std::max(a, b))));
   for (int line = first; line <= last; ++line) {
     const auto depth = ray.depth(pattern.position_px(line), pattern.axis);
     if (!depth || *depth < range.near || *depth > range.far) continue;
     const auto at = ray.pixel(*depth);
     if (!at || !projector.contains(*at)) continue;
-    candidates.push_back({line, *depth, 1 / std::max(1e-6, std::abs(ray.slope(*depth, pattern.axis)))});
+    candidates.push_back(
+        {line, *depth, 1 / std::max(1e-6, std::abs(ray.slope(*depth, pattern.axis)))});
   }
   if (a > b) std::reverse(candidates.begin(), candidates.end());
   return candidates;
@@ -49,7 +50,8 @@ std::vector<LineCandidate> line_candidates(const Rig& rig, const Camera& camera,
 
 bool can_see_pattern(const Rig& rig, const Camera& camera, int projector) {
   constexpr double kMinCosine = -0.5;
-  return camera.forward().dot(rig.projectors[static_cast<std::size_t>(projector)].forward()) > kMinCosine;
+  return camera.forward().dot(rig.projectors[static_cast<std::size_t>(projector)].forward()) >
+         kMinCosine;
 }
 
 }  // namespace pencilscan

@@ -16,7 +16,8 @@ struct LineCandidate {
   double sigma_depth = 0;  ///< mm, for one projector pixel of error across the line
 };
 
-/// Camera depths at which the ray of a pixel is inside the working volume; nothing when it misses it.
+/// Camera depths at which the ray of a pixel is inside the working volume; nothing when it misses
+/// it.
 struct DepthRange {
   double near = 0;  ///< mm, > 0
   double far = 0;   ///< mm, > near
@@ -26,8 +27,8 @@ struct DepthRange {
 
 /// All lines of a pattern that meet the pixel's ray inside the volume, ordered by depth.
 [[nodiscard]] std::vector<LineCandidate> line_candidates(const Rig& rig, const Camera& camera,
-                                                         const DepthRange& range, PatternRef pattern,
-                                                         const Vec2& pixel);
+                                                         const DepthRange& range,
+                                                         PatternRef pattern, const Vec2& pixel);
 
 /// False when no surface can face both devices well: their axes are more than 120 degrees apart.
 [[nodiscard]] bool can_see_pattern(const Rig& rig, const Camera& camera, int projector);

@@ -9,7 +9,8 @@ namespace pencilscan {
 namespace {
 
 const LinePattern& pattern_of(const Rig& rig, PatternRef ref) {
-  return rig.projectors[static_cast<std::size_t>(ref.projector)].patterns[static_cast<std::size_t>(ref.pattern)];
+  return rig.projectors[static_cast<std::size_t>(ref.projector)]
+      .patterns[static_cast<std::size_t>(ref.pattern)];
 }
 
 int modulo(int a, int n) { return ((a % n) + n) % n; }
@@ -40,7 +41,9 @@ std::vector<std::map<std::pair<int, int>, std::vector<Stop>>> stops_of(const Gri
   }
   for (auto& by_pattern : stops) {
     for (auto& [pattern, list] : by_pattern) {
-      std::sort(list.begin(), list.end(), [](const Stop& x, const Stop& y) { return std::tie(x.at, x.curve) < std::tie(y.at, y.curve); });
+      std::sort(list.begin(), list.end(), [](const Stop& x, const Stop& y) {
+        return std::tie(x.at, x.curve) < std::tie(y.at, y.curve);
+      });
     }
   }
   return stops;
@@ -50,7 +53,8 @@ std::vector<std::map<std::pair<int, int>, std::vector<Stop>>> stops_of(const Gri
 float usual_gap(const std::vector<Stop>& stops, std::size_t i) {
   std::vector<float> gaps;
   const std::size_t low = i >= 2 ? i - 2 : 0;
-  for (std::size_t k = low; k <= i + 2 && k + 1 < stops.size(); ++k) gaps.push_back(stops[k + 1].at - stops[k].at);
+  for (std::size_t k = low; k <= i + 2 && k + 1 < stops.size(); ++k)
+    gaps.push_back(stops[k + 1].at - stops[k].at);
   const auto middle = gaps.begin() + static_cast<std::ptrdiff_t>((gaps.size() - 1) / 2);
   std::nth_element(gaps.begin(), middle, gaps.end());
   return *middle;
@@ -102,13 +106,15 @@ Belief color_belief(const Curve& curve, const ColorFamily& family, const LinePat
   const std::size_t colors = family.colors.size();
   std::vector<double> evidence(colors, 0.0);
   for (std::size_t i = 0; i < curve.points.size(); ++i) {
-    for (std::size_t c = 0; c < colors; ++c) evidence[c] += curve.code[i * colors + c] / kPointsPerMeasurement;
+    for (std::size_t c = 0; c < colors; ++c)
+      evidence[c] += curve.code[i * colors + c] / kPointsPerMeasurement;
   }
   const double best = *std::max_element(evidence.begin(), evidence.end());
   const std::vector<int> color_of = family.color_of_symbol(pattern);
   Belief belief;
   for (const int symbol : pattern.sequence) {
-    const double e = evidence[static_cast<std::size_t>(color_of[static_cast<std::size_t>(symbol)])] - best;
+    const double e =
+        evidence[static_cast<std::size_t>(color_of[static_cast<std::size_t>(symbol)])] - best;
     belief.push_back(std::exp(std::max(e, -kMaxLogEvidence)));
   }
   normalize(belief);
@@ -142,8 +148,8 @@ int line_order_sign(const Rig& rig, const Camera& camera, PatternRef ref, const 
   if (!next) return 0;
   const double runs = (*next)[along] - (*here)[along];
   if (runs == 0) return 0;
-  // det d(projector)/d(normal, tangent) > 0: for columns (d across/dn)(d along/dt) > 0, for rows its
-  // negative.
+  // det d(projector)/d(normal, tangent) > 0: for columns (d across/dn)(d along/dt) > 0, for rows
+  // its negative.
   const int sense = runs > 0 ? 1 : -1;
   return axis == Axis::kColumn ? sense : -sense;
 }
@@ -163,12 +169,15 @@ std::vector<NeighborRelation> neighbor_relations(const Rig& rig, const GridGraph
         const float ratio = (b.at - a.at) / usual_gap(list, i);
         const int lines = static_cast<int>(std::lround(ratio));
         if (lines < 1 || lines > 2 || std::abs(ratio - static_cast<float>(lines)) > 0.4F) continue;
-        const Vec2 tangent = tangent_at(graph.curves[static_cast<std::size_t>(a.curve)], a.at_curve);
+        const Vec2 tangent =
+            tangent_at(graph.curves[static_cast<std::size_t>(a.curve)], a.at_curve);
         const Vec2 normal(tangent.y(), -tangent.x());
-        const int order = line_order_sign(rig, camera, ref, a.position.cast<double>(), tangent, depth);
+        const int order =
+            line_order_sign(rig, camera, ref, a.position.cast<double>(), tangent, depth);
         const double side = normal.dot((b.position - a.position).cast<double>());
         if (order == 0 || side == 0) continue;
-        relations.push_back({a.curve, b.curve, lines * order * (side > 0 ? 1 : -1), a.at_curve, b.at_curve});
+        relations.push_back(
+            {a.curve, b.curve, lines * order * (side > 0 ? 1 : -1), a.at_curve, b.at_curve});
       }
     }
   }
@@ -182,13 +191,16 @@ void infer_local_ids(const Rig& rig, const std::vector<ColorFamily>& families,
   for (std::size_t c = 0; c < n; ++c) {
     const auto& ref = graph.identities[c].pattern;
     if (!ref) continue;
-    unary[c] = color_belief(graph.curves[c], families[static_cast<std::size_t>(graph.curves[c].family)], pattern_of(rig, *ref));
+    unary[c] =
+        color_belief(graph.curves[c], families[static_cast<std::size_t>(graph.curves[c].family)],
+                     pattern_of(rig, *ref));
   }
   const std::vector<Edge> edges = aggregated(relations);
   // messages[2 e]: from -> to, messages[2 e + 1]: to -> from.
   std::vector<Belief> messages;
   for (const Edge& e : edges) {
-    for (int k = 0; k < 2; ++k) messages.emplace_back(unary[static_cast<std::size_t>(e.from)].size(), 1.0);
+    for (int k = 0; k < 2; ++k)
+      messages.emplace_back(unary[static_cast<std::size_t>(e.from)].size(), 1.0);
   }
   std::vector<Belief> beliefs;
   constexpr int kIterations = 15;
@@ -211,7 +223,8 @@ void infer_local_ids(const Rig& rig, const std::vector<ColorFamily>& families,
         const Belief& back = messages[2 * e + static_cast<std::size_t>(1 - k)];
         for (std::size_t i = 0; i < cavity.size(); ++i) cavity[i] /= back[i];
         normalize(cavity);
-        Belief next = shifted_message(cavity, k == 0 ? edges[e].shift : -edges[e].shift, edges[e].wrong);
+        Belief next =
+            shifted_message(cavity, k == 0 ? edges[e].shift : -edges[e].shift, edges[e].wrong);
         Belief& message = messages[2 * e + static_cast<std::size_t>(k)];
         for (std::size_t i = 0; i < next.size(); ++i) message[i] = 0.4 * message[i] + 0.6 * next[i];
         normalize(message);
@@ -226,7 +239,8 @@ void infer_local_ids(const Rig& rig, const std::vector<ColorFamily>& families,
   }
 }
 
-std::vector<Cut> contradicted_connections(const Rig& rig, const std::vector<NeighborRelation>& relations,
+std::vector<Cut> contradicted_connections(const Rig& rig,
+                                          const std::vector<NeighborRelation>& relations,
                                           const GridGraph& graph, double min_votes_to_cut) {
   struct Vote {
     float at;
@@ -240,15 +254,20 @@ std::vector<Cut> contradicted_connections(const Rig& rig, const std::vector<Neig
     if (!from.pattern || !to.pattern) continue;
     const int period = pattern_of(rig, *from.pattern).period();
     if (period < 2) continue;
-    votes[static_cast<std::size_t>(r.to)].push_back({r.at_to, modulo(from.local_id + r.shift, period), from.id_probability});
-    votes[static_cast<std::size_t>(r.from)].push_back({r.at_from, modulo(to.local_id - r.shift, period), to.id_probability});
+    votes[static_cast<std::size_t>(r.to)].push_back(
+        {r.at_to, modulo(from.local_id + r.shift, period), from.id_probability});
+    votes[static_cast<std::size_t>(r.from)].push_back(
+        {r.at_from, modulo(to.local_id - r.shift, period), to.id_probability});
   }
   std::vector<Cut> cuts;
   for (std::size_t c = 0; c < votes.size(); ++c) {
     auto& list = votes[c];
     if (list.size() < 4) continue;
-    std::sort(list.begin(), list.end(), [](const Vote& x, const Vote& y) { return std::tie(x.at, x.id) < std::tie(y.at, y.id); });
-    const auto period = static_cast<std::size_t>(pattern_of(rig, *graph.identities[c].pattern).period());
+    std::sort(list.begin(), list.end(), [](const Vote& x, const Vote& y) {
+      return std::tie(x.at, x.id) < std::tie(y.at, y.id);
+    });
+    const auto period =
+        static_cast<std::size_t>(pattern_of(rig, *graph.identities[c].pattern).period());
     std::vector<double> total(period, 0.0);
     for (const Vote& v : list) total[static_cast<std::size_t>(v.id)] += v.weight;
     const double one = *std::max_element(total.begin(), total.end());
@@ -258,7 +277,8 @@ std::vector<Cut> contradicted_connections(const Rig& rig, const std::vector<Neig
     for (std::size_t i = 0; i + 1 < list.size(); ++i) {
       before[static_cast<std::size_t>(list[i].id)] += list[i].weight;
       double after_best = 0;
-      for (std::size_t k = 0; k < period; ++k) after_best = std::max(after_best, total[k] - before[k]);
+      for (std::size_t k = 0; k < period; ++k)
+        after_best = std::max(after_best, total[k] - before[k]);
       const double gain = *std::max_element(before.begin(), before.end()) + after_best - one;
       if (gain > best_gain) {
         best_gain = gain;
@@ -270,8 +290,8 @@ std::vector<Cut> contradicted_connections(const Rig& rig, const std::vector<Neig
   return cuts;
 }
 
-std::vector<Cut> color_flips(const std::vector<ColorFamily>& families, const std::vector<Curve>& curves,
-                             double flip_cost) {
+std::vector<Cut> color_flips(const std::vector<ColorFamily>& families,
+                             const std::vector<Curve>& curves, double flip_cost) {
   constexpr double kPointsPerMeasurement = 9;
   std::vector<Cut> cuts;
   for (std::size_t c = 0; c < curves.size(); ++c) {
@@ -282,15 +302,18 @@ std::vector<Cut> color_flips(const std::vector<ColorFamily>& families, const std
     std::vector<double> score(colors, 0.0);
     std::vector<std::size_t> from(n * colors);
     for (std::size_t i = 0; i < n; ++i) {
-      const std::size_t best = static_cast<std::size_t>(std::max_element(score.begin(), score.end()) - score.begin());
+      const std::size_t best =
+          static_cast<std::size_t>(std::max_element(score.begin(), score.end()) - score.begin());
       const double switched = score[best] - flip_cost;
       for (std::size_t k = 0; k < colors; ++k) {
         const bool stays = score[k] >= switched;
         from[i * colors + k] = stays ? k : best;
-        score[k] = std::max(score[k], switched) + curves[c].code[i * colors + k] / kPointsPerMeasurement;
+        score[k] =
+            std::max(score[k], switched) + curves[c].code[i * colors + k] / kPointsPerMeasurement;
       }
     }
-    auto state = static_cast<std::size_t>(std::max_element(score.begin(), score.end()) - score.begin());
+    auto state =
+        static_cast<std::size_t>(std::max_element(score.begin(), score.end()) - score.begin());
     for (std::size_t i = n; i-- > 1;) {
       const std::size_t previous = from[i * colors + state];
       if (previous != state) cuts.push_back({static_cast<int>(c), static_cast<float>(i) - 0.5F});

@@ -10,20 +10,22 @@ namespace pencilscan {
 struct NeighborRelation {
   int from = 0;
   int to = 0;
-  int shift = 1;         ///< signed, in lines
-  float at_from = 0;     ///< where along `from` it was seen
+  int shift = 1;      ///< signed, in lines
+  float at_from = 0;  ///< where along `from` it was seen
   float at_to = 0;
 };
 
-/// +1 when the line coordinate of `ref` grows along the image normal (t.y, -t.x) of a curve with unit
-/// tangent t at `pixel`, -1 when it falls. A surface seen by both devices maps camera to projector
-/// image without mirroring, so that the sense in which the curve runs along its light sheet decides.
+/// +1 when the line coordinate of `ref` grows along the image normal (t.y, -t.x) of a curve with
+/// unit tangent t at `pixel`, -1 when it falls. A surface seen by both devices maps camera to
+/// projector image without mirroring, so that the sense in which the curve runs along its light
+/// sheet decides.
 [[nodiscard]] int line_order_sign(const Rig& rig, const Camera& camera, PatternRef ref,
                                   const Vec2& pixel, const Vec2& tangent, double depth);
 
 /// Neighbouring curves of one pattern: consecutive crossings along a curve of another pattern, a
 /// double gap counting two lines.
-[[nodiscard]] std::vector<NeighborRelation> neighbor_relations(const Rig& rig, const GridGraph& graph);
+[[nodiscard]] std::vector<NeighborRelation> neighbor_relations(const Rig& rig,
+                                                               const GridGraph& graph);
 
 /// Local IDs (line index modulo the period) by sum-product belief propagation: each curve's colour
 /// evidence, and neighbours one line further. Fills CurveIdentity::local_id and id_probability.
@@ -37,10 +39,9 @@ struct Cut {
 };
 
 /// Curves whose neighbours on one stretch say one local ID and on the next another.
-[[nodiscard]] std::vector<Cut> contradicted_connections(const Rig& rig,
-                                                        const std::vector<NeighborRelation>& relations,
-                                                        const GridGraph& graph,
-                                                        double min_votes_to_cut);
+[[nodiscard]] std::vector<Cut> contradicted_connections(
+    const Rig& rig, const std::vector<NeighborRelation>& relations, const GridGraph& graph,
+    double min_votes_to_cut);
 
 /// Places where the colour of a curve flips: two-state dynamic programming with a cost per flip.
 [[nodiscard]] std::vector<Cut> color_flips(const std::vector<ColorFamily>& families,

@@ -23,7 +23,8 @@ std::vector<float> evidence_around(const Curve& curve, float at, std::size_t col
   const int low = std::max(0, center - kReach);
   const int high = std::min(n - 1, center + kReach);
   for (int i = low; i <= high; ++i) {
-    for (std::size_t c = 0; c < colors; ++c) sum[c] += curve.code[static_cast<std::size_t>(i) * colors + c];
+    for (std::size_t c = 0; c < colors; ++c)
+      sum[c] += curve.code[static_cast<std::size_t>(i) * colors + c];
   }
   for (float& s : sum) s /= static_cast<float>(high - low + 1);
   return sum;
@@ -39,11 +40,13 @@ std::vector<PatternCandidates> candidates_at(const Rig& rig, const Camera& camer
   std::vector<PatternCandidates> result;
   for (const PatternRef& ref : family.patterns) {
     if (!can_see_pattern(rig, camera, ref.projector)) continue;
-    const LinePattern& pattern = rig.projectors[static_cast<std::size_t>(ref.projector)].patterns[static_cast<std::size_t>(ref.pattern)];
+    const LinePattern& pattern = rig.projectors[static_cast<std::size_t>(ref.projector)]
+                                     .patterns[static_cast<std::size_t>(ref.pattern)];
     const std::vector<int> color_of = family.color_of_symbol(pattern);
     PatternCandidates found{ref, line_candidates(rig, camera, range, ref, pixel), {}};
     std::erase_if(found.lines, [&](const LineCandidate& l) {
-      return evidence[static_cast<std::size_t>(color_of[static_cast<std::size_t>(pattern.symbol(l.line))])] < kImprobable;
+      return evidence[static_cast<std::size_t>(
+                 color_of[static_cast<std::size_t>(pattern.symbol(l.line))])] < kImprobable;
     });
     found.support.assign(found.lines.size(), 0.0);
     if (!found.lines.empty()) result.push_back(std::move(found));
@@ -68,8 +71,8 @@ void compare(PatternCandidates& a, PatternCandidates& b, double range_mm, double
       const double dz = q.depth - p.depth;
       const double sigma = sigma_px * std::hypot(p.sigma_depth, q.sigma_depth);
       if (dz > 3 * sigma) break;
-      const double log_density = -0.5 * dz * dz / (sigma * sigma) -
-                                 std::log(std::sqrt(2 * std::numbers::pi) * sigma);
+      const double log_density =
+          -0.5 * dz * dz / (sigma * sigma) - std::log(std::sqrt(2 * std::numbers::pi) * sigma);
       a.support[i] = std::max(a.support[i], log_density - std::log(density_b));
       b.support[j] = std::max(b.support[j], log_density - std::log(density_a));
     }
@@ -82,7 +85,8 @@ using VoteTable = std::vector<std::vector<double>>;
 void add_votes(const std::vector<PatternCandidates>& candidates,
                const std::vector<PatternRef>& patterns, VoteTable& table) {
   for (const PatternCandidates& c : candidates) {
-    const auto k = static_cast<std::size_t>(std::find(patterns.begin(), patterns.end(), c.ref) - patterns.begin());
+    const auto k = static_cast<std::size_t>(std::find(patterns.begin(), patterns.end(), c.ref) -
+                                            patterns.begin());
     for (std::size_t i = 0; i < c.lines.size(); ++i) {
       table[k][static_cast<std::size_t>(c.lines[i].line)] += c.support[i];
     }
@@ -93,7 +97,8 @@ VoteTable empty_table(const Rig& rig, const ColorFamily& family) {
   VoteTable table;
   for (const PatternRef& ref : family.patterns) {
     const Projector& projector = rig.projectors[static_cast<std::size_t>(ref.projector)];
-    const int lines = projector.line_count(projector.patterns[static_cast<std::size_t>(ref.pattern)]);
+    const int lines =
+        projector.line_count(projector.patterns[static_cast<std::size_t>(ref.pattern)]);
     table.emplace_back(static_cast<std::size_t>(lines), 0.0);
   }
   return table;
@@ -149,7 +154,8 @@ void vote_for_projectors(const Rig& rig, const std::vector<ColorFamily>& familie
   }
   graph.identities.clear();
   for (std::size_t c = 0; c < graph.curves.size(); ++c) {
-    graph.identities.push_back(decide(tables[c], families[static_cast<std::size_t>(graph.curves[c].family)].patterns));
+    graph.identities.push_back(
+        decide(tables[c], families[static_cast<std::size_t>(graph.curves[c].family)].patterns));
   }
 }
 

@@ -8,27 +8,33 @@
 namespace pencilscan {
 namespace {
 
-std::vector<std::string> detection_warnings(const Rig& rig, const Frame& frame, const std::vector<ColorFamily>& families,
+std::vector<std::string> detection_warnings(const Rig& rig, const Frame& frame,
+                                            const std::vector<ColorFamily>& families,
                                             const std::vector<CameraDetection>& detections) {
   std::vector<std::string> warnings;
   for (const ColorFamily& family : families) {
     if (family.leakage <= 0.1) continue;
     std::string names;
     for (const std::string& color : family.colors) names += (names.empty() ? "" : "/") + color;
-    warnings.push_back("the colours " + names + " cannot be told apart from those of other projectors");
+    warnings.push_back("the colours " + names +
+                       " cannot be told apart from those of other projectors");
   }
   for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
     const Camera& camera = rig.cameras[c];
     if (camera.sees_texture_only) continue;
     const std::string who = "camera " + camera.name;
     if (frame.images[c].empty()) {
-      warnings.push_back(who + " has no image in frame " + frame.name + ": reconstructed without it");
+      warnings.push_back(who + " has no image in frame " + frame.name +
+                         ": reconstructed without it");
       continue;
     }
-    if (detections[c].curves.empty()) warnings.push_back(who + ": no projected line was found in its image");
-    const double saturated = static_cast<double>(detections[c].saturated_pixels) / static_cast<double>(frame.images[c].total());
+    if (detections[c].curves.empty())
+      warnings.push_back(who + ": no projected line was found in its image");
+    const double saturated = static_cast<double>(detections[c].saturated_pixels) /
+                             static_cast<double>(frame.images[c].total());
     if (saturated > 0.01) {
-      warnings.push_back(who + ": " + std::to_string(static_cast<int>(100 * saturated)) + " % of its pixels are saturated; lower exposure or gain");
+      warnings.push_back(who + ": " + std::to_string(static_cast<int>(100 * saturated)) +
+                         " % of its pixels are saturated; lower exposure or gain");
     }
   }
   return warnings;
@@ -45,7 +51,8 @@ PointResult measure_points(const Rig& rig, const Frame& frame, const PointOption
   result.detections.resize(cameras);
   parallel_for(cameras, [&](std::size_t c) {
     if (frame.images[c].empty() || rig.cameras[c].sees_texture_only) return;
-    result.detections[c] = detect_curves(rig.cameras[c], rig, result.families, frame.images[c], options.detection);
+    result.detections[c] =
+        detect_curves(rig.cameras[c], rig, result.families, frame.images[c], options.detection);
   });
   result.warnings = detection_warnings(rig, frame, result.families, result.detections);
   result.times.push_back({"detection", detection_watch.seconds()});
@@ -53,7 +60,8 @@ PointResult measure_points(const Rig& rig, const Frame& frame, const PointOption
   Stopwatch grid_watch;
   result.graphs.resize(cameras);
   parallel_for(cameras, [&](std::size_t c) {
-    result.graphs[c] = build_grid_graph(rig, result.families, static_cast<int>(c), std::move(result.detections[c].curves), options.grid);
+    result.graphs[c] = build_grid_graph(rig, result.families, static_cast<int>(c),
+                                        std::move(result.detections[c].curves), options.grid);
   });
   result.times.push_back({"grid", grid_watch.seconds()});
 

@@ -44,6 +44,7 @@ struct PointResult {
 
 /// The paper's Fig. 3 for one frame: detection and grid per camera, one solution over all cameras,
 /// triangulation.
-[[nodiscard]] PointResult measure_points(const Rig& rig, const Frame& frame, const PointOptions& options = {});
+[[nodiscard]] PointResult measure_points(const Rig& rig, const Frame& frame,
+                                         const PointOptions& options = {});
 
 }  // namespace pencilscan

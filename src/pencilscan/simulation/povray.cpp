@@ -35,7 +35,7 @@ void write_list(std::ostream& out, const char* name, const Items& items, const P
 }
 
 void write_object(std::ostream& out, const SimulatedObject& object) {
-  const SurfaceOptions& surface = object.surface();
+  const Reflectance& surface = object.surface();
   out << std::setprecision(9) << "mesh2 {\n";
   const auto print_vector = [&](const Vec3& v) { out << Vector{v}; };
   write_list(out, "vertex_vectors", object.mesh().vertices, print_vector);
@@ -144,7 +144,7 @@ void write_camera(std::ostream& out, const Camera& camera) {
 
 }  // namespace
 
-void check_povray_can_show(const Rig& rig, const SurfaceOptions& surface,
+void check_povray_can_show(const Rig& rig, const Reflectance& surface,
                            const fs::path& rig_path) {
   for (const Camera& camera : rig.cameras) {
     if (camera.has_distortion()) {

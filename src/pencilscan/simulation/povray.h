@@ -10,7 +10,7 @@ namespace pencilscan {
 
 /// InputError (naming the rig file) when POV-Ray 3.7 cannot show this: it knows no camera lens
 /// distortion, and colour matrices and procedural noise of ours are not translated.
-void check_povray_can_show(const Rig& rig, const SurfaceOptions& surface,
+void check_povray_can_show(const Rig& rig, const Reflectance& surface,
                            const std::filesystem::path& rig_path);
 
 /// Writes mesh.inc, rig.inc, and per camera <camera>.pov and <camera>.ini into `folder`; `povray

@@ -53,7 +53,7 @@ SimulatedObject ball_and_board() {
   const int base = static_cast<int>(mesh.vertices.size());
   mesh.vertices.insert(mesh.vertices.end(), ball.vertices.begin(), ball.vertices.end());
   for (const auto& f : ball.faces) mesh.faces.push_back({f[0] + base, f[1] + base, f[2] + base});
-  SurfaceOptions surface;
+  Reflectance surface;
   surface.smooth = false;
   surface.specular = 0.2;
   surface.texture = {TextureKind::kStripes, 0.5, 60};

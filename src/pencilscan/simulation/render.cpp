@@ -26,7 +26,7 @@ Lamp make_lamp(const Rig& rig, std::size_t projector) {
 double reflected(const SimulatedObject& object, const SurfaceSample& sample, double albedo,
                  const Lamp& lamp, const Incidence& light, const RenderOptions& options) {
   double value = albedo * light.cosine;
-  const SurfaceOptions& surface = object.surface();
+  const Reflectance& surface = object.surface();
   if (surface.specular > 0) {
     const double half = (light.to_light + sample.to_camera).normalized().dot(sample.normal);
     if (half > 0) value += surface.specular * std::pow(half, 1 / surface.roughness);

@@ -46,8 +46,8 @@ PanelLight uniform_light(int size = 320) {
   return {{PanelProfile(Axis::kColumn, {-0.5, size - 0.5}, {Vec3::Ones()})}, 0};
 }
 
-SurfaceOptions flat_shading() {
-  SurfaceOptions surface;
+Reflectance flat_shading() {
+  Reflectance surface;
   surface.smooth = false;
   return surface;
 }
@@ -147,7 +147,7 @@ TEST(CameraTruth, ShadowOfABallOnABoardIsWhereTheSegmentMeetsTheBall) {
 
 TEST(RenderCamera, UniformLightFollowsTheCosineAndTheInverseSquare) {
   const Rig rig = pair_rig();
-  SurfaceOptions surface;
+  Reflectance surface;
   surface.albedo = 0.7;
   surface.smooth = false;
   const SimulatedObject object(board(), surface);
@@ -238,7 +238,7 @@ TEST(RenderCamera, ProjectorsAddUpWithTheirColourMatrices) {
 
 TEST(RenderCamera, SameBytesForAnyThreadCount) {
   const Rig rig = pair_rig();
-  SurfaceOptions surface;
+  Reflectance surface;
   surface.texture.kind = TextureKind::kNoise;
   const SimulatedObject object(make_sphere(90, 24), surface);
   const SensorOptions sensor = sensor_preset("medium")->sensor;

@@ -6,7 +6,7 @@
 
 namespace pencilscan {
 
-SimulatedObject::SimulatedObject(const TriangleMesh& mesh, SurfaceOptions surface,
+SimulatedObject::SimulatedObject(const TriangleMesh& mesh, Reflectance surface,
                                  const RigidTransform& world_from_object)
     : surface_(surface),
       world_from_object_(world_from_object),

@@ -8,7 +8,7 @@
 namespace pencilscan {
 
 /// Reflection of the whole object.
-struct SurfaceOptions {
+struct Reflectance {
   double albedo = 0.8;      ///< Lambert, in [0, 1]
   SurfaceTexture texture;   ///< factor on the albedo
   double specular = 0;      ///< weight of the Blinn-Phong lobe (light's own colour), >= 0
@@ -20,12 +20,12 @@ struct SurfaceOptions {
 class SimulatedObject {
  public:
   /// `mesh` in its own frame (its texture's frame), at least one face.
-  explicit SimulatedObject(const TriangleMesh& mesh, SurfaceOptions surface = {},
+  explicit SimulatedObject(const TriangleMesh& mesh, Reflectance surface = {},
                            const RigidTransform& world_from_object = {});
 
   [[nodiscard]] const RayScene& rays() const { return rays_; }
   [[nodiscard]] const TriangleMesh& mesh() const { return rays_.mesh(); }  ///< in world
-  [[nodiscard]] const SurfaceOptions& surface() const { return surface_; }
+  [[nodiscard]] const Reflectance& surface() const { return surface_; }
   [[nodiscard]] const std::vector<Vec3>& normals() const { return normals_; }
   [[nodiscard]] const RigidTransform& world_from_object() const { return world_from_object_; }
   /// Unit normal of a hit's face and the one to shade with, both on the viewer's side.
@@ -39,7 +39,7 @@ class SimulatedObject {
   [[nodiscard]] double albedo_at(const Vec3& point) const;
 
  private:
-  SurfaceOptions surface_;
+  Reflectance surface_;
   RigidTransform world_from_object_;
   RigidTransform object_from_world_;
   RayScene rays_;

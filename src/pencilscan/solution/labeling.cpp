@@ -21,22 +21,28 @@ struct ComponentResult {
   std::vector<std::pair<int, CurveLabel>> labels;  ///< (curve, label)
 };
 
-/// Rough probability that a linear solution's rounding picks the right line: the uncertainty along e is
-/// the residual over the smallest singular value.
+/// Rough probability that a linear solution's rounding picks the right line: the uncertainty along
+/// e is the residual over the smallest singular value.
 float linear_confidence(const LinearSolution& linear) {
-  const double sigma_lines = std::max(0.1, linear.residual_rms_px) / std::max(1e-9, linear.sigma_min);
+  const double sigma_lines =
+      std::max(0.1, linear.residual_rms_px) / std::max(1e-9, linear.sigma_min);
   return static_cast<float>(std::clamp(1 / (1 + sigma_lines), 0.0, 1.0));
 }
 
-CurveLabel continuous_label(const Rig& rig, const GridGraph& graph, int curve, double mu, float confidence) {
+CurveLabel continuous_label(const Rig& rig, const GridGraph& graph, int curve, double mu,
+                            float confidence) {
   const CurveIdentity& identity = graph.identities[static_cast<std::size_t>(curve)];
-  const Projector& projector = rig.projectors[static_cast<std::size_t>(identity.pattern->projector)];
-  const LinePattern& pattern = projector.patterns[static_cast<std::size_t>(identity.pattern->pattern)];
-  const PencilParameter parameter(rig, rig.cameras[static_cast<std::size_t>(graph.camera)], *identity.pattern);
+  const Projector& projector =
+      rig.projectors[static_cast<std::size_t>(identity.pattern->projector)];
+  const LinePattern& pattern =
+      projector.patterns[static_cast<std::size_t>(identity.pattern->pattern)];
+  const PencilParameter parameter(rig, rig.cameras[static_cast<std::size_t>(graph.camera)],
+                                  *identity.pattern);
   CurveLabel label;
   label.pattern = *identity.pattern;
   label.plane = parameter.line_from_mu(mu);
-  label.line = nearest_line(label.plane, identity.local_id, pattern.period(), projector.line_count(pattern));
+  label.line =
+      nearest_line(label.plane, identity.local_id, pattern.period(), projector.line_count(pattern));
   label.confidence = confidence;
   return label;
 }
@@ -48,19 +54,26 @@ ComponentResult solve_one(const Rig& rig, const GridGraph& graph, int component,
   if (linear.solved && options.method == Method::kMultiview) {
     const MultiviewSolution multiview = sweep_component(rig, graph, linear, indices, options);
     result.report = multiview.report;
-    const double scale = options.cost == MultiviewCost::kNormalized ? 0.15 * options.search_radius_px
-                                                                    : std::max(1e-9, *std::min_element(multiview.report.sweep_cost.begin(), multiview.report.sweep_cost.end()));
-    const auto confidence = static_cast<float>(1 - 0.5 * std::exp(-multiview.report.margin / scale));
+    const double scale = options.cost == MultiviewCost::kNormalized
+                             ? 0.15 * options.search_radius_px
+                             : std::max(1e-9, *std::min_element(multiview.report.sweep_cost.begin(),
+                                                                multiview.report.sweep_cost.end()));
+    const auto confidence =
+        static_cast<float>(1 - 0.5 * std::exp(-multiview.report.margin / scale));
     for (std::size_t k = 0; k < linear.curves.size(); ++k) {
       if (multiview.lines[k] < 0) continue;
       const CurveIdentity& identity = graph.identities[static_cast<std::size_t>(linear.curves[k])];
-      result.labels.push_back({linear.curves[k], CurveLabel{*identity.pattern, multiview.lines[k],
-                                                            static_cast<double>(multiview.lines[k]), confidence}});
+      result.labels.push_back(
+          {linear.curves[k], CurveLabel{*identity.pattern, multiview.lines[k],
+                                        static_cast<double>(multiview.lines[k]), confidence}});
     }
   } else if (linear.solved) {
     for (std::size_t k = 0; k < linear.curves.size(); ++k) {
-      const CurveLabel label = continuous_label(rig, graph, linear.curves[k], linear.mu[static_cast<Eigen::Index>(k)], linear_confidence(linear));
-      if (std::isfinite(label.plane) && label.line >= 0) result.labels.push_back({linear.curves[k], label});
+      const CurveLabel label =
+          continuous_label(rig, graph, linear.curves[k], linear.mu[static_cast<Eigen::Index>(k)],
+                           linear_confidence(linear));
+      if (std::isfinite(label.plane) && label.line >= 0)
+        result.labels.push_back({linear.curves[k], label});
     }
     result.report.solved = true;
   } else {
@@ -68,7 +81,8 @@ ComponentResult solve_one(const Rig& rig, const GridGraph& graph, int component,
   }
   result.report.camera = graph.camera;
   result.report.crossings = linear.crossings;
-  result.report.curves = static_cast<int>(std::count(graph.component_of_curve.begin(), graph.component_of_curve.end(), component));
+  result.report.curves = static_cast<int>(
+      std::count(graph.component_of_curve.begin(), graph.component_of_curve.end(), component));
   result.report.sigma_min = linear.sigma_min;
   result.report.sigma_second = linear.sigma_second;
   result.report.residual_rms_px = linear.residual_rms_px;

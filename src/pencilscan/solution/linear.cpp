@@ -24,7 +24,8 @@ struct Equation {
 
 class System {
  public:
-  System(const Rig& rig, const GridGraph& graph, int component) : camera_(rig.cameras[static_cast<std::size_t>(graph.camera)]) {
+  System(const Rig& rig, const GridGraph& graph, int component)
+      : camera_(rig.cameras[static_cast<std::size_t>(graph.camera)]) {
     std::map<int, int> unknown_of_curve;
     for (const Crossing& x : graph.crossings) {
       if (graph.component_of_curve[static_cast<std::size_t>(x.curve_a)] != component) continue;
@@ -35,7 +36,8 @@ class System {
       const PencilParameter& h = parameter(rig, *rb);
       if (!v.usable() || !h.usable()) continue;
       const auto index = [&](int curve) {
-        const auto [it, fresh] = unknown_of_curve.try_emplace(curve, static_cast<int>(curves.size()));
+        const auto [it, fresh] =
+            unknown_of_curve.try_emplace(curve, static_cast<int>(curves.size()));
         if (fresh) curves.push_back(curve);
         return it->second;
       };
@@ -108,7 +110,8 @@ struct Normal {
   Eigen::VectorXd right;   ///< M'c
 };
 
-Normal normal_equations(const std::vector<Equation>& equations, const std::vector<int>& compact, int size) {
+Normal normal_equations(const std::vector<Equation>& equations, const std::vector<int>& compact,
+                        int size) {
   Normal n{Eigen::MatrixXd::Zero(size, size), Eigen::VectorXd::Zero(size)};
   for (const Equation& e : equations) {
     const int i = compact[static_cast<std::size_t>(e.i)];
@@ -125,10 +128,12 @@ Normal normal_equations(const std::vector<Equation>& equations, const std::vecto
 }
 
 /// Smallest eigenvector of a factored symmetric matrix, orthogonal to `avoid` (may be empty).
-Eigen::VectorXd inverse_iteration(const Eigen::LDLT<Eigen::MatrixXd>& factor, const Eigen::VectorXd& avoid) {
+Eigen::VectorXd inverse_iteration(const Eigen::LDLT<Eigen::MatrixXd>& factor,
+                                  const Eigen::VectorXd& avoid) {
   constexpr int kIterations = 12;
   Eigen::VectorXd x(factor.rows());
-  for (Eigen::Index i = 0; i < x.size(); ++i) x[i] = 1 + 0.3 * std::sin(static_cast<double>(7 * i + 1));
+  for (Eigen::Index i = 0; i < x.size(); ++i)
+    x[i] = 1 + 0.3 * std::sin(static_cast<double>(7 * i + 1));
   for (int k = 0; k < kIterations; ++k) {
     if (avoid.size() > 0) x -= avoid * avoid.dot(x);
     x = factor.solve(x);
@@ -149,8 +154,8 @@ double rms_residual_px(const std::vector<Equation>& equations, const Eigen::Vect
 }
 
 /// Follows single crossings outwards from solved curves.
-void attach_leaves(const std::vector<Equation>& leaves, std::vector<char>& known, Eigen::VectorXd& x,
-                   Eigen::VectorXd& direction) {
+void attach_leaves(const std::vector<Equation>& leaves, std::vector<char>& known,
+                   Eigen::VectorXd& x, Eigen::VectorXd& direction) {
   constexpr double kMinCoefficient = 1e-12;
   for (const Equation& e : leaves) {
     const auto i = static_cast<std::size_t>(e.i);
@@ -175,7 +180,8 @@ LinearSolution solve_component(const Rig& rig, const GridGraph& graph, int compo
   solution.crossings = static_cast<int>(system.equations.size());
   const std::vector<Equation> leaves = system.peel_leaves();
   std::vector<char> known(system.curves.size(), 0);
-  for (const Equation& e : system.equations) known[static_cast<std::size_t>(e.i)] = known[static_cast<std::size_t>(e.j)] = 1;
+  for (const Equation& e : system.equations)
+    known[static_cast<std::size_t>(e.i)] = known[static_cast<std::size_t>(e.j)] = 1;
   std::vector<int> compact(system.curves.size(), -1);
   int size = 0;
   for (std::size_t i = 0; i < known.size(); ++i) {
@@ -192,8 +198,10 @@ LinearSolution solve_component(const Rig& rig, const GridGraph& graph, int compo
   for (int pass = 0; pass < kPasses; ++pass) {
     system.weigh(pass == 0 ? nullptr : &x);
     const Normal normal = normal_equations(system.equations, compact, size);
-    const Eigen::VectorXd scale = normal.matrix.diagonal().cwiseSqrt().cwiseMax(1e-300).cwiseInverse();
-    const Eigen::LDLT<Eigen::MatrixXd> scaled(scale.asDiagonal() * normal.matrix * scale.asDiagonal());
+    const Eigen::VectorXd scale =
+        normal.matrix.diagonal().cwiseSqrt().cwiseMax(1e-300).cwiseInverse();
+    const Eigen::LDLT<Eigen::MatrixXd> scaled(scale.asDiagonal() * normal.matrix *
+                                              scale.asDiagonal());
     const Eigen::VectorXd mu = scale.asDiagonal() * scaled.solve(scale.asDiagonal() * normal.right);
     if (!mu.allFinite()) {
       solution.reason = "the equations are singular";

@@ -14,7 +14,7 @@ struct LineCost {
   int line = 0;
   double distance_sum = 0;  ///< px, matched points
   int matched = 0;
-  int reprojected = 0;      ///< points inside an adjacent image
+  int reprojected = 0;  ///< points inside an adjacent image
 };
 
 /// One unknown of the sweep.
@@ -29,8 +29,8 @@ struct SweepCurve {
 };
 
 std::vector<LineCost> line_costs(const Rig& rig, const GridGraph& graph, int curve_index,
-                                 std::span<const CurveIndex> indices, const std::vector<int>& others,
-                                 const SolutionOptions& options) {
+                                 std::span<const CurveIndex> indices,
+                                 const std::vector<int>& others, const SolutionOptions& options) {
   const Camera& camera = rig.cameras[static_cast<std::size_t>(graph.camera)];
   const Curve& curve = graph.curves[static_cast<std::size_t>(curve_index)];
   const CurveIdentity& identity = graph.identities[static_cast<std::size_t>(curve_index)];
@@ -45,16 +45,20 @@ std::vector<LineCost> line_costs(const Rig& rig, const GridGraph& graph, int cur
     if (identity.local_id >= 0 && pattern.local_id(candidate.line) != identity.local_id) continue;
     LineCost cost;
     cost.line = candidate.line;
-    for (std::size_t i = 0; i < curve.points.size(); i += static_cast<std::size_t>(options.point_stride)) {
+    for (std::size_t i = 0; i < curve.points.size();
+         i += static_cast<std::size_t>(options.point_stride)) {
       const Vec2 pixel = curve.points[i].position.cast<double>();
-      const auto depth = RayInProjector(camera, projector, pixel).depth(pattern.position_px(candidate.line), pattern.axis);
+      const auto depth = RayInProjector(camera, projector, pixel)
+                             .depth(pattern.position_px(candidate.line), pattern.axis);
       if (!depth) continue;
       const Vec3 point = camera.point_at_depth(pixel, *depth);
       for (const int other : others) {
         const auto reprojected = rig.cameras[static_cast<std::size_t>(other)].project(point);
-        if (!reprojected || !rig.cameras[static_cast<std::size_t>(other)].contains(*reprojected)) continue;
+        if (!reprojected || !rig.cameras[static_cast<std::size_t>(other)].contains(*reprojected))
+          continue;
         ++cost.reprojected;
-        const auto d = indices[static_cast<std::size_t>(other)].distance(*reprojected, ref, identity.local_id, options.search_radius_px);
+        const auto d = indices[static_cast<std::size_t>(other)].distance(
+            *reprojected, ref, identity.local_id, options.search_radius_px);
         if (!d) continue;
         ++cost.matched;
         cost.distance_sum += *d;
@@ -62,7 +66,8 @@ std::vector<LineCost> line_costs(const Rig& rig, const GridGraph& graph, int cur
     }
     costs.push_back(cost);
   }
-  std::sort(costs.begin(), costs.end(), [](const LineCost& a, const LineCost& b) { return a.line < b.line; });
+  std::sort(costs.begin(), costs.end(),
+            [](const LineCost& a, const LineCost& b) { return a.line < b.line; });
   return costs;
 }
 
@@ -70,7 +75,8 @@ const LineCost* cost_at(const SweepCurve& curve, double s) {
   const double coordinate = curve.parameter.line_from_mu(curve.mu + s * curve.direction);
   if (!std::isfinite(coordinate)) return nullptr;
   const int line = nearest_line(coordinate, curve.local_id, curve.period, curve.line_count);
-  const auto it = std::lower_bound(curve.costs.begin(), curve.costs.end(), line, [](const LineCost& c, int l) { return c.line < l; });
+  const auto it = std::lower_bound(curve.costs.begin(), curve.costs.end(), line,
+                                   [](const LineCost& c, int l) { return c.line < l; });
   return it != curve.costs.end() && it->line == line ? &*it : nullptr;
 }
 
@@ -117,7 +123,8 @@ std::pair<double, double> sweep_range(const std::vector<SweepCurve>& curves) {
 
 void find_minimum(ComponentReport& report, double separation) {
   const auto& cost = report.sweep_cost;
-  const auto best = static_cast<std::size_t>(std::min_element(cost.begin(), cost.end()) - cost.begin());
+  const auto best =
+      static_cast<std::size_t>(std::min_element(cost.begin(), cost.end()) - cost.begin());
   // Several neighbouring s may snap to the same lines: the middle of the plateau is the choice.
   std::size_t last = best;
   while (last + 1 < cost.size() && cost[last + 1] == cost[best]) ++last;
@@ -125,15 +132,17 @@ void find_minimum(ComponentReport& report, double separation) {
   report.best_s = report.sweep_s[middle];
   double second = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < cost.size(); ++i) {
-    if (std::abs(report.sweep_s[i] - report.best_s) > separation && cost[i] != cost[best]) second = std::min(second, cost[i]);
+    if (std::abs(report.sweep_s[i] - report.best_s) > separation && cost[i] != cost[best])
+      second = std::min(second, cost[i]);
   }
   report.margin = std::isfinite(second) ? second - cost[best] : 0;
 }
 
 }  // namespace
 
-MultiviewSolution sweep_component(const Rig& rig, const GridGraph& graph, const LinearSolution& linear,
-                                  std::span<const CurveIndex> indices, const SolutionOptions& options) {
+MultiviewSolution sweep_component(const Rig& rig, const GridGraph& graph,
+                                  const LinearSolution& linear, std::span<const CurveIndex> indices,
+                                  const SolutionOptions& options) {
   const Camera& camera = rig.cameras[static_cast<std::size_t>(graph.camera)];
   const std::vector<int> others = adjacent_cameras(rig, graph.camera);
   MultiviewSolution solution;
@@ -162,7 +171,8 @@ MultiviewSolution sweep_component(const Rig& rig, const GridGraph& graph, const 
     solution.report.sweep_s.push_back(s);
     solution.report.sweep_cost.push_back(total_cost(curves, s, options));
   }
-  if (!std::isfinite(*std::min_element(solution.report.sweep_cost.begin(), solution.report.sweep_cost.end()))) {
+  if (!std::isfinite(*std::min_element(solution.report.sweep_cost.begin(),
+                                       solution.report.sweep_cost.end()))) {
     solution.report.reason = "no reprojected curve meets one with its ID in another camera";
     return solution;
   }

@@ -9,17 +9,19 @@
 
 namespace pencilscan {
 
-/// Multi-view correction of one component (section IV-B): x(s) = x0 + s e is swept over all positions of
-/// the pattern planes in the volume (Step 1); each curve snaps to the nearest line with its local ID
-/// (1.1); its points, triangulated with that line, are reprojected into the adjacent cameras (1.2) and
-/// compared with the curves of the same ID there (1.3); the s of least cost wins (Step 2).
+/// Multi-view correction of one component (section IV-B): x(s) = x0 + s e is swept over all
+/// positions of the pattern planes in the volume (Step 1); each curve snaps to the nearest line
+/// with its local ID (1.1); its points, triangulated with that line, are reprojected into the
+/// adjacent cameras (1.2) and compared with the curves of the same ID there (1.3); the s of least
+/// cost wins (Step 2).
 ///
 /// What the comparison costs depends on a curve and its line only, not on s: it is computed once
 /// per (curve, line), and the sweep adds up table entries.
 /// Deviation: all cameras within 75 degrees count as adjacent, not one.
 struct MultiviewSolution {
-  std::vector<int> lines;        ///< per unknown of the linear solution; -1: its line is outside the volume
-  ComponentReport report;        ///< sweep, margin
+  std::vector<int>
+      lines;  ///< per unknown of the linear solution; -1: its line is outside the volume
+  ComponentReport report;  ///< sweep, margin
 };
 
 [[nodiscard]] MultiviewSolution sweep_component(const Rig& rig, const GridGraph& graph,

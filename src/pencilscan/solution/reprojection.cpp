@@ -26,7 +26,9 @@ std::optional<double> CurveIndex::distance(const Vec2& pixel, PatternRef pattern
                                            double radius_px) const {
   const Eigen::Vector2f p = pixel.cast<float>();
   const auto r = static_cast<float>(radius_px);
-  const auto cell = [](float v, int count) { return std::clamp(static_cast<int>(std::floor(v / kCell)), 0, count - 1); };
+  const auto cell = [](float v, int count) {
+    return std::clamp(static_cast<int>(std::floor(v / kCell)), 0, count - 1);
+  };
   constexpr float kReach = 2;  // half the spacing of entries, and a little
   float best = r;
   bool found = false;

@@ -9,9 +9,10 @@
 namespace pencilscan {
 namespace {
 
-/// d(line coordinate, projector px)/d(camera px across the curve), by a finite difference at equal depth.
-double coordinate_per_pixel(const Camera& camera, const Projector& projector, const LinePattern& pattern,
-                            const CurvePoint& point, double depth) {
+/// d(line coordinate, projector px)/d(camera px across the curve), by a finite difference at equal
+/// depth.
+double coordinate_per_pixel(const Camera& camera, const Projector& projector,
+                            const LinePattern& pattern, const CurvePoint& point, double depth) {
   const Vec2 pixel = point.position.cast<double>();
   const Vec2 normal = point.normal.cast<double>();
   const auto axis = static_cast<Eigen::Index>(pattern.axis);
@@ -21,7 +22,8 @@ double coordinate_per_pixel(const Camera& camera, const Projector& projector, co
 }
 
 void add_curve(const Rig& rig, const GridGraph& graph, const Curve& curve, const CurveLabel& label,
-               const Sphere& volume, const TriangulationOptions& options, std::vector<MeasuredPoint>& points) {
+               const Sphere& volume, const TriangulationOptions& options,
+               std::vector<MeasuredPoint>& points) {
   const Camera& camera = rig.cameras[static_cast<std::size_t>(graph.camera)];
   const Projector& projector = rig.projectors[static_cast<std::size_t>(label.pattern.projector)];
   const LinePattern& pattern = projector.patterns[static_cast<std::size_t>(label.pattern.pattern)];
@@ -56,26 +58,31 @@ void add_curve(const Rig& rig, const GridGraph& graph, const Curve& curve, const
 
 void keep_one_per_pixel(std::vector<MeasuredPoint>& points) {
   const auto key = [](const MeasuredPoint& p) {
-    return std::make_tuple(p.camera, p.projector, p.pattern, p.line, std::lround(p.v), std::lround(p.u));
+    return std::make_tuple(p.camera, p.projector, p.pattern, p.line, std::lround(p.v),
+                           std::lround(p.u));
   };
   std::sort(points.begin(), points.end(), [&](const MeasuredPoint& a, const MeasuredPoint& b) {
     return std::tuple_cat(key(a), std::make_tuple(a.sigma, a.u, a.v)) <
            std::tuple_cat(key(b), std::make_tuple(b.sigma, b.u, b.v));
   });
-  const auto last = std::unique(points.begin(), points.end(), [&](const MeasuredPoint& a, const MeasuredPoint& b) { return key(a) == key(b); });
+  const auto last =
+      std::unique(points.begin(), points.end(),
+                  [&](const MeasuredPoint& a, const MeasuredPoint& b) { return key(a) == key(b); });
   points.erase(last, points.end());
 }
 
 }  // namespace
 
 std::vector<MeasuredPoint> triangulate(const Rig& rig, std::span<const GridGraph> graphs,
-                                       const Labeling& labeling, const TriangulationOptions& options) {
+                                       const Labeling& labeling,
+                                       const TriangulationOptions& options) {
   const Sphere volume = working_volume(rig);
   std::vector<std::vector<MeasuredPoint>> per_camera(graphs.size());
   parallel_for(graphs.size(), [&](std::size_t g) {
     const auto& labels = labeling.labels[static_cast<std::size_t>(graphs[g].camera)];
     for (std::size_t c = 0; c < labels.size(); ++c) {
-      if (labels[c]) add_curve(rig, graphs[g], graphs[g].curves[c], *labels[c], volume, options, per_camera[g]);
+      if (labels[c])
+        add_curve(rig, graphs[g], graphs[g].curves[c], *labels[c], volume, options, per_camera[g]);
     }
     keep_one_per_pixel(per_camera[g]);
   });
