@@ -1,0 +1,88 @@
+#include <iostream>
+#include <memory>
+
+#include "pencilscan/cli/command.h"
+#include "pencilscan/core/error.h"
+#include "pencilscan/core/parallel.h"
+#include "pencilscan/pipeline/sequence.h"
+
+namespace pencilscan::cli {
+namespace {
+
+struct ReconstructOptions {
+  CommonOptions common;
+  std::string rig;
+  std::string frames;
+  std::string out;
+  std::string method = "multiview";
+  std::string cost = "normalized";
+  bool no_pictures = false;
+  bool overwrite = false;
+};
+
+void reconstruct(const ReconstructOptions& options) {
+  const ThreadLimit limit(options.common.threads);
+  SequenceOptions sequence;
+  sequence.points.solution.method = method_from_name(options.method).value();
+  sequence.points.solution.cost =
+      options.cost == "published" ? MultiviewCost::kPublished : MultiviewCost::kNormalized;
+  sequence.pictures = !options.no_pictures;
+  sequence.overwrite = options.overwrite;
+  sequence.description = "method=" + options.method + " multiview-cost=" + options.cost +
+                         " pictures=" + (options.no_pictures ? "no" : "yes");
+  const auto outcomes =
+      reconstruct_sequence(options.rig, options.frames, options.out, sequence, stderr_progress());
+  nlohmann::ordered_json figures;
+  std::size_t failed = 0;
+  for (const FrameOutcome& outcome : outcomes) {
+    for (const std::string& warning : outcome.warnings) {
+      std::cerr << "pencilscan: warning: frame " << outcome.name << ": " << warning << "\n";
+    }
+    if (!outcome.done) {
+      std::cerr << "pencilscan: frame " << outcome.name << ": " << outcome.failure << "\n";
+      ++failed;
+    }
+  }
+  figures["frames"] = outcomes.size();
+  figures["frames_failed"] = failed;
+  figures["frames_resumed"] =
+      std::count_if(outcomes.begin(), outcomes.end(), [](const auto& o) { return o.resumed; });
+  if (outcomes.size() == 1 && !outcomes[0].resumed) {
+    figures["points"] = outcomes[0].points;
+    figures["seconds"] = outcomes[0].seconds;
+  }
+  figures["out"] = options.out;
+  print_figures(options.common, figures);
+  if (failed > 0) {
+    throw StageError(std::to_string(failed) + " of " + std::to_string(outcomes.size()) +
+                     " frames could not be reconstructed");
+  }
+}
+
+}  // namespace
+
+void add_reconstruct_command(CLI::App& app) {
+  CLI::App* command = app.add_subcommand(
+      "reconstruct", "The shape in every frame: labelled points, closed mesh, report, pictures.");
+  auto options = std::make_shared<ReconstructOptions>();
+  command->add_option("--rig", options->rig, "rig.json of the calibrated devices")->required();
+  command->add_option("--frames", options->frames, "folder that holds the frame folders")
+      ->required();
+  command->add_option("--out", options->out, "output folder, one folder per frame")->required();
+  command->add_option("--method", options->method, "how lines are told apart")
+      ->check(CLI::IsMember({"linear", "multiview"}))
+      ->capture_default_str();
+  command
+      ->add_option("--multiview-cost", options->cost,
+                   "of the sweep: published (a sum over matched points) or normalized (a mean over "
+                   "all reprojected points)")
+      ->check(CLI::IsMember({"published", "normalized"}))
+      ->capture_default_str();
+  command->add_flag("--no-pictures", options->no_pictures, "leave overlays and views out");
+  command->add_flag("--overwrite", options->overwrite, "replace output of other inputs or options");
+  add_common_options(*command, options->common,
+                     "pencilscan reconstruct --rig rig.json --frames frames --out result");
+  command->callback([options] { reconstruct(*options); });
+}
+
+}  // namespace pencilscan::cli

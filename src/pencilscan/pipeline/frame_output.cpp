@@ -1,0 +1,161 @@
+#include "pencilscan/pipeline/frame_output.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "pencilscan/core/parallel.h"
+#include "pencilscan/report/overlay.h"
+#include "pencilscan/report/pictures.h"
+
+namespace pencilscan {
+namespace {
+
+using nlohmann::ordered_json;
+
+/// Rounded to six digits, so that the file stays readable; null when not finite.
+ordered_json number(double value) {
+  if (!std::isfinite(value)) return nullptr;
+  if (value == 0) return 0.0;
+  const double scale = std::pow(10.0, 5 - std::floor(std::log10(std::abs(value))));
+  return std::round(value * scale) / scale;
+}
+
+ordered_json camera_report(const Rig& rig, const Frame& frame, const PointResult& result,
+                           std::size_t c) {
+  const GridGraph& graph = result.graphs[c];
+  const auto& labels = result.labeling.labels[c];
+  std::size_t curve_points = 0;
+  std::size_t labelled_points = 0;
+  std::size_t without_crossing = 0;
+  std::vector<float> sigmas;
+  for (std::size_t k = 0; k < graph.curves.size(); ++k) {
+    curve_points += graph.curves[k].points.size();
+    if (k < labels.size() && labels[k]) labelled_points += graph.curves[k].points.size();
+    without_crossing += graph.component_of_curve[k] < 0;
+    for (const CurvePoint& p : graph.curves[k].points) sigmas.push_back(p.sigma_px);
+  }
+  ordered_json report;
+  report["name"] = rig.cameras[c].name;
+  report["image"] = !frame.images[c].empty();
+  report["curves"] = graph.curves.size();
+  report["curve_points"] = curve_points;
+  report["labelled_curve_points"] = labelled_points;
+  report["curves_without_crossing"] = without_crossing;
+  report["crossings"] = graph.crossings.size();
+  report["components"] = graph.component_count;
+  report["connections_cut"] = graph.cut_connections;
+  if (!sigmas.empty()) {
+    const auto middle = sigmas.begin() + static_cast<std::ptrdiff_t>(sigmas.size() / 2);
+    std::nth_element(sigmas.begin(), middle, sigmas.end());
+    report["curve_sigma_median_px"] = number(*middle);
+  }
+  report["saturated_pixels"] = result.detections[c].saturated_pixels;
+  report["crosstalk_estimated"] = result.detections[c].unmixing.estimated;
+  return report;
+}
+
+ordered_json component_report(const Rig& rig, const ComponentReport& component) {
+  ordered_json report;
+  report["camera"] = rig.cameras[static_cast<std::size_t>(component.camera)].name;
+  report["curves"] = component.curves;
+  report["crossings"] = component.crossings;
+  report["solved"] = component.solved;
+  if (!component.reason.empty()) report["reason"] = component.reason;
+  if (component.sigma_min > 0) {
+    report["sigma_min_px_per_line"] = number(component.sigma_min);
+    report["sigma_second_px_per_line"] = number(component.sigma_second);
+    report["residual_rms_px"] = number(component.residual_rms_px);
+  }
+  if (!component.sweep_s.empty()) {
+    report["best_s_lines"] = number(component.best_s);
+    report["margin"] = number(component.margin);
+    report["sweep_first_s_lines"] = number(component.sweep_s.front());
+    report["sweep_last_s_lines"] = number(component.sweep_s.back());
+    // The curve is for a plot: at most 400 values, evenly picked.
+    const std::size_t stride = 1 + component.sweep_cost.size() / 400;
+    ordered_json cost = ordered_json::array();
+    for (std::size_t i = 0; i < component.sweep_cost.size(); i += stride) {
+      cost.push_back(number(component.sweep_cost[i]));
+    }
+    report["sweep_stride"] = stride;
+    report["sweep_cost"] = cost;
+  }
+  return report;
+}
+
+/// Every detected curve of a camera; undecided ones have key -1.
+std::vector<OverlayCurve> overlay_curves(const GridGraph& graph, OverlayKey key) {
+  std::vector<OverlayCurve> curves;
+  for (std::size_t k = 0; k < graph.curves.size(); ++k) {
+    const CurveIdentity& identity = graph.identities[k];
+    OverlayCurve curve;
+    for (const CurvePoint& p : graph.curves[k].points) curve.points.push_back(p.position);
+    if (identity.pattern) {
+      curve.key = key == OverlayKey::kLocalId ? identity.local_id : identity.pattern->projector;
+    }
+    curves.push_back(std::move(curve));
+  }
+  return curves;
+}
+
+}  // namespace
+
+nlohmann::ordered_json frame_report(const Rig& rig, const Frame& frame, const PointResult& points,
+                                    const SurfaceResult& surface) {
+  ordered_json report;
+  report["frame"] = frame.name;
+  report["points"] = points.points.size();
+  ordered_json per_projector = ordered_json::object();
+  for (const Projector& projector : rig.projectors) per_projector[projector.name] = 0;
+  for (const MeasuredPoint& p : points.points) {
+    auto& count = per_projector[rig.projectors[p.projector].name];
+    count = count.get<int>() + 1;
+  }
+  report["points_by_projector"] = per_projector;
+  report["cameras"] = ordered_json::array();
+  for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
+    report["cameras"].push_back(camera_report(rig, frame, points, c));
+  }
+  report["components"] = ordered_json::array();
+  for (const ComponentReport& component : points.labeling.components) {
+    report["components"].push_back(component_report(rig, component));
+  }
+  const SurfaceReport& s = surface.report;
+  report["surface"] = {{"status", to_string(s.status)},
+                       {"points_used", s.points_used},
+                       {"spacing_mm", number(s.spacing_mm)},
+                       {"octree_depth", s.depth},
+                       {"vertices", s.vertices},
+                       {"faces", s.faces},
+                       {"boundary_edges", s.edges.boundary},
+                       {"non_manifold_edges", s.edges.non_manifold},
+                       {"measured_share", number(s.measured_share)}};
+  report["warnings"] = points.warnings;
+  for (const std::string& warning : s.warnings) report["warnings"].push_back(warning);
+  return report;
+}
+
+void write_frame_pictures(const std::filesystem::path& folder, const Rig& rig, const Frame& frame,
+                          const PointResult& points, const SurfaceResult& surface) {
+  std::vector<std::size_t> cameras;
+  for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
+    if (!frame.images[c].empty()) cameras.push_back(c);
+  }
+  std::vector<Picture> overlays(2 * cameras.size());
+  parallel_for(overlays.size(), [&](std::size_t i) {
+    const std::size_t c = cameras[i / 2];
+    const OverlayKey key = i % 2 == 0 ? OverlayKey::kLocalId : OverlayKey::kProjector;
+    OverlayOptions options;
+    options.key_name = key == OverlayKey::kLocalId ? "local ID" : "projector";
+    overlays[i] = {rig.cameras[c].name + (i % 2 == 0 ? "_local_id" : "_projector"),
+                   draw_overlay(frame.images[c], overlay_curves(points.graphs[c], key), options)};
+  });
+  write_pictures(folder, overlays);
+  FrameResults results{.rig = rig};
+  results.points = points.points;
+  results.used = surface.used;
+  if (!surface.mesh.faces.empty()) results.mesh = &surface.mesh;
+  write_pictures(folder, make_pictures(results));
+}
+
+}  // namespace pencilscan

@@ -1,0 +1,173 @@
+#include "pencilscan/pipeline/sequence.h"
+
+#include <nlohmann/json.hpp>
+
+#include "pencilscan/core/error.h"
+#include "pencilscan/core/parallel.h"
+#include "pencilscan/core/stopwatch.h"
+#include "pencilscan/io/file.h"
+#include "pencilscan/io/mesh_file.h"
+#include "pencilscan/pipeline/frame_files.h"
+#include "pencilscan/pipeline/frame_output.h"
+
+namespace pencilscan {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::ordered_json;
+
+constexpr const char* kInputsFile = "inputs.json";
+
+std::string hex(std::uint64_t value) {
+  static constexpr char kDigits[] = "0123456789abcdef";
+  std::string text(16, '0');
+  for (std::size_t i = 16; i-- > 0; value >>= 4U) text[i] = kDigits[value & 15U];
+  return text;
+}
+
+/// What decides the output: rig bytes, options, image bytes of every frame.
+ordered_json describe_inputs(const fs::path& rig_path, const std::vector<FrameFiles>& frames,
+                             const std::string& options) {
+  std::vector<std::uint64_t> hashes(frames.size());
+  parallel_for(frames.size(), [&](std::size_t i) { hashes[i] = frame_hash(frames[i]); });
+  ordered_json inputs;
+  inputs["rig"] = hex(hash_bytes(read_file(rig_path)));
+  inputs["options"] = options;
+  inputs["frames"] = ordered_json::object();
+  for (std::size_t i = 0; i < frames.size(); ++i) inputs["frames"][frames[i].name] = hex(hashes[i]);
+  return inputs;
+}
+
+/// True when `earlier` says that a frame was made from the same inputs.
+bool same_frame(const nlohmann::json& earlier, const ordered_json& now, const std::string& name) {
+  if (!earlier.contains("frames") || !earlier["frames"].contains(name)) return false;
+  return earlier["frames"][name] == now["frames"][name].get<std::string>();
+}
+
+bool same_settings(const nlohmann::json& earlier, const ordered_json& now) {
+  return earlier.contains("rig") && earlier.contains("options") &&
+         earlier["rig"] == now["rig"].get<std::string>() &&
+         earlier["options"] == now["options"].get<std::string>();
+}
+
+/// Decides which frames are there already; refuses the output of other inputs.
+std::vector<char> resumable(const fs::path& out, const std::vector<FrameFiles>& frames,
+                            const ordered_json& inputs, bool overwrite) {
+  std::vector<char> done(frames.size(), 0);
+  if (!fs::exists(out) || (fs::is_directory(out) && fs::is_empty(out))) return done;
+  const auto refuse = [&](const std::string& what) {
+    if (!overwrite) throw InputError("--out", "", out.string(), what + " (or give --overwrite)");
+  };
+  if (!fs::is_directory(out)) throw InputError("--out", "", out.string(), "must be a folder");
+  if (!fs::exists(out / kInputsFile)) {
+    refuse("must be new, empty or the output of the same inputs");
+    return done;
+  }
+  const nlohmann::json earlier = read_json(out / kInputsFile);
+  if (!same_settings(earlier, inputs)) {
+    refuse("holds the output of another rig or other options");
+    return done;
+  }
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    const bool there = fs::exists(out / frames[i].name / "report.json");
+    if (there && !same_frame(earlier, inputs, frames[i].name)) {
+      refuse("holds the output of other images in frame " + frames[i].name);
+      continue;
+    }
+    done[i] = there ? 1 : 0;
+  }
+  return done;
+}
+
+void check_images(const Rig& rig, const std::vector<FrameFiles>& frames, const Progress& progress) {
+  // In chunks, so that only a few decoded frames are in memory.
+  const auto chunk = static_cast<std::size_t>(thread_count());
+  for (std::size_t first = 0; first < frames.size(); first += chunk) {
+    const std::size_t count = std::min(chunk, frames.size() - first);
+    parallel_for(count, [&](std::size_t i) {
+      const Frame frame = read_frame(rig, frames[first + i]);
+      static_cast<void>(frame);
+    });
+    if (progress) {
+      progress("checking images",
+               static_cast<double>(first + count) / static_cast<double>(frames.size()));
+    }
+  }
+}
+
+void reconstruct_frame(const Rig& rig, const FrameFiles& files, const fs::path& folder,
+                       const SequenceOptions& options, FrameOutcome& outcome) {
+  const Stopwatch total;
+  const Frame frame = read_frame(rig, files);
+  const double reading = total.seconds();
+  PointResult points = measure_points(rig, frame, options.points);
+  if (points.points.empty()) {
+    throw StageError("frame " + files.name + ": no curve could be given its projector line");
+  }
+  const Stopwatch surface_watch;
+  const SurfaceResult surface = reconstruct_surface(rig, points.points, options.surface);
+  points.times.push_back({"surface", surface_watch.seconds()});
+  write_points(folder / "points.ply", points.points);
+  write_mesh(folder / "mesh.ply", surface.mesh);
+  write_mesh(folder / "mesh_measured.ply", surface.measured);
+  if (options.pictures) {
+    const Stopwatch picture_watch;
+    write_frame_pictures(folder / "pictures", rig, frame, points, surface);
+    points.times.push_back({"pictures", picture_watch.seconds()});
+  }
+  ordered_json timing;
+  timing["threads"] = thread_count();
+  timing["seconds"] = {{"reading", reading}};
+  for (const StageTime& t : points.times) timing["seconds"][t.stage] = t.seconds;
+  timing["seconds"]["total"] = total.seconds();
+  write_json(folder / "timing.json", timing);
+  const ordered_json report = frame_report(rig, frame, points, surface);
+  write_json(folder / "report.json", report);  // last: its presence means that the frame is done
+  outcome.points = points.points.size();
+  outcome.warnings = report["warnings"].get<std::vector<std::string>>();
+  outcome.seconds = total.seconds();
+  outcome.done = true;
+}
+
+}  // namespace
+
+std::vector<FrameOutcome> reconstruct_sequence(const fs::path& rig_path,
+                                               const fs::path& frames_path, const fs::path& out,
+                                               const SequenceOptions& options,
+                                               const Progress& progress) {
+  const Rig rig = read_rig(rig_path);
+  const std::vector<FrameFiles> frames = find_frames(rig, frames_path);
+  check_images(rig, frames, progress);
+  const ordered_json inputs = describe_inputs(rig_path, frames, options.description);
+  const std::vector<char> there = resumable(out, frames, inputs, options.overwrite);
+
+  // From here on the output may change. What is to be made anew goes first, so that an abort leaves
+  // no frame that claims to be of these inputs and is not.
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    if (there[i] == 0) fs::remove_all(out / frames[i].name);
+  }
+  write_json(out / kInputsFile, inputs);
+
+  std::vector<FrameOutcome> outcomes;
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    FrameOutcome outcome;
+    outcome.name = frames[i].name;
+    if (there[i] != 0) {
+      outcome.done = outcome.resumed = true;
+    } else {
+      try {
+        reconstruct_frame(rig, frames[i], out / frames[i].name, options, outcome);
+      } catch (const std::exception& error) {
+        outcome.failure = error.what();
+      }
+    }
+    outcomes.push_back(std::move(outcome));
+    if (progress) {
+      progress("frame " + frames[i].name,
+               static_cast<double>(i + 1) / static_cast<double>(frames.size()));
+    }
+  }
+  return outcomes;
+}
+
+}  // namespace pencilscan

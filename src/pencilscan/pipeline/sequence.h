@@ -1,0 +1,42 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "pencilscan/core/progress.h"
+#include "pencilscan/pipeline/frame.h"
+#include "pencilscan/surface/surface.h"
+
+namespace pencilscan {
+
+struct SequenceOptions {
+  PointOptions points;
+  SurfaceOptions surface;
+  bool pictures = true;
+  bool overwrite = false;   ///< replace the results of other inputs or options
+  std::string description;  ///< of the options: output of another description is not resumed
+};
+
+struct FrameOutcome {
+  std::string name;
+  bool done = false;
+  bool resumed = false;  ///< was there already, from the same inputs
+  std::string failure;   ///< why not done
+  std::size_t points = 0;
+  double seconds = 0;
+  std::vector<std::string> warnings;
+};
+
+/// Reconstructs every frame below `frames` into `out`/<frame>: points.ply, mesh.ply,
+/// mesh_measured.ply, pictures/, timing.json and, last, report.json. All input is checked before
+/// the first byte is written (InputError). A frame that fails does not stop the others. A frame
+/// that is there already from the same rig, images and options is kept; output of anything else is
+/// an InputError unless `overwrite`.
+[[nodiscard]] std::vector<FrameOutcome> reconstruct_sequence(const std::filesystem::path& rig_path,
+                                                             const std::filesystem::path& frames,
+                                                             const std::filesystem::path& out,
+                                                             const SequenceOptions& options,
+                                                             const Progress& progress = {});
+
+}  // namespace pencilscan
