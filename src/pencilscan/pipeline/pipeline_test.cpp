@@ -1,0 +1,225 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+#include <opencv2/core.hpp>
+
+#include "pencilscan/core/error.h"
+#include "pencilscan/core/parallel.h"
+#include "pencilscan/evaluation/label_error.h"
+#include "pencilscan/evaluation/line_recall.h"
+#include "pencilscan/evaluation/true_lines.h"
+#include "pencilscan/evaluation/truth_scene.h"
+#include "pencilscan/io/file.h"
+#include "pencilscan/io/image.h"
+#include "pencilscan/io/mesh_file.h"
+#include "pencilscan/pipeline/frame_files.h"
+#include "pencilscan/pipeline/sequence.h"
+#include "pencilscan/simulation/panel_light.h"
+#include "pencilscan/simulation/render.h"
+#include "pencilscan/simulation/sensor.h"
+#include "pencilscan/simulation/simulated_object.h"
+
+namespace pencilscan {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Two cameras and two projectors before a ball: the paper's Fig. 6 with small images.
+Rig small_rig() {
+  Rig rig;
+  for (int c = 0; c < 2; ++c) {
+    Camera camera;
+    camera.name = "cam" + std::to_string(c);
+    camera.width = 320;
+    camera.height = 240;
+    camera.K << 1150, 0, 160, 0, 1150, 120, 0, 0, 1;
+    camera.device_from_world = look_at({1100, c == 0 ? -200.0 : 200.0, 150}, {0, 0, 0});
+    rig.cameras.push_back(camera);
+  }
+  for (int p = 0; p < 2; ++p) {
+    Projector projector;
+    projector.name = "proj" + std::to_string(p);
+    projector.width = 640;
+    projector.height = 512;
+    projector.K << 1200, 0, 320, 0, 1200, 256, 0, 0, 1;
+    projector.device_from_world =
+        p == 0 ? look_at({1000, 480, 100}, {0, 0, 0}) : look_at({900, -60, 700}, {0, 0, 0});
+    LinePattern pattern;
+    pattern.axis = p == 0 ? Axis::kColumn : Axis::kRow;
+    if (p == 1) pattern.colors = {"red", "yellow"};
+    projector.patterns = {pattern};
+    rig.projectors.push_back(projector);
+  }
+  rig.volume = Sphere{{0, 0, 0}, 110};
+  return rig;
+}
+
+TriangleMesh ball() { return make_sphere(95, 48); }
+
+Frame render_frame(const Rig& rig, const TriangleMesh& mesh) {
+  const SimulatedObject object(mesh);
+  const auto lights = line_lights(rig);
+  Frame frame;
+  frame.name = "000000";
+  for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
+    frame.images.push_back(cv::min(render_camera(rig, c, object, lights), 1.0));
+  }
+  return frame;
+}
+
+/// A scene folder on disk, made once: rig.json and one frame of 16-bit images.
+class PipelineTest : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    folder_ = new fs::path(fs::temp_directory_path() /
+                           ("pencilscan_pipeline_test_" + std::to_string(::getpid())));
+    rig_ = new Rig(small_rig());
+    frame_ = new Frame(render_frame(*rig_, ball()));
+    write_rig(*rig_, *folder_ / "rig.json");
+    for (std::size_t c = 0; c < 2; ++c) {
+      write_image(*folder_ / "frames" / "000000" / (rig_->cameras[c].name + ".png"),
+                  frame_->images[c], 16);
+    }
+  }
+  static void TearDownTestSuite() {
+    fs::remove_all(*folder_);
+    delete folder_;
+    delete rig_;
+    delete frame_;
+  }
+
+  static std::vector<FrameOutcome> run(const fs::path& frames, const fs::path& out,
+                                       const SequenceOptions& options) {
+    return reconstruct_sequence(*folder_ / "rig.json", frames, out, options);
+  }
+
+  static SequenceOptions quick() {
+    SequenceOptions options;
+    options.pictures = false;
+    options.surface.max_depth = 5;
+    options.description = "quick";
+    return options;
+  }
+
+  static fs::path* folder_;
+  static Rig* rig_;
+  static Frame* frame_;
+};
+fs::path* PipelineTest::folder_ = nullptr;
+Rig* PipelineTest::rig_ = nullptr;
+Frame* PipelineTest::frame_ = nullptr;
+
+TEST_F(PipelineTest, MultiviewLabelsTheBallAndLinearWorksWithOneCamera) {
+  const PointResult result = measure_points(*rig_, *frame_);
+  const TruthScene truth(ball(), *rig_);
+  const auto verdicts = judge_points(truth, result.points);
+  // A noise-free convex object: nearly every point must carry its true line.
+  EXPECT_LT(label_figures(truth, result.points, verdicts).wrong.value(), 0.02);
+  std::vector<TrueLinePixel> lines;
+  for (int c = 0; c < 2; ++c) {
+    const auto part = true_line_pixels(truth, c);
+    lines.insert(lines.end(), part.begin(), part.end());
+  }
+  EXPECT_GT(line_recall(*rig_, lines, result.points).recall.value(), 0.85);
+
+  Rig minimum = *rig_;
+  minimum.cameras.resize(1);
+  Frame one = *frame_;
+  one.images.resize(1);
+  PointOptions options;
+  options.solution.method = Method::kLinear;
+  const PointResult linear = measure_points(minimum, one, options);
+  ASSERT_GT(linear.points.size(), 500U);
+  const TruthScene one_truth(ball(), minimum);
+  const auto linear_verdicts = judge_points(one_truth, linear.points);
+  EXPECT_LT(label_figures(one_truth, linear.points, linear_verdicts).wrong.value(), 0.5);
+}
+
+TEST_F(PipelineTest, BytesAreTheSameForAnyThreadCount) {
+  std::vector<std::string> bytes;
+  for (const int threads : {1, 2, 4}) {
+    const ThreadLimit limit(threads);
+    const fs::path out = *folder_ / ("out_threads_" + std::to_string(threads));
+    ASSERT_TRUE(run(*folder_ / "frames", out, quick()).front().done);
+    bytes.push_back(read_file(out / "000000" / "points.ply") +
+                    read_file(out / "000000" / "mesh.ply") +
+                    read_file(out / "000000" / "mesh_measured.ply") +
+                    read_file(out / "000000" / "report.json"));
+  }
+  EXPECT_EQ(bytes[0], bytes[1]);
+  EXPECT_EQ(bytes[0], bytes[2]);
+}
+
+TEST_F(PipelineTest, ThreadsRaceNowhereWhileMeasuringPoints) {
+  const ThreadLimit limit(4);
+  EXPECT_FALSE(measure_points(*rig_, *frame_).points.empty());
+}
+
+TEST_F(PipelineTest, ResumesItsOwnOutputAndRefusesThatOfOtherOptions) {
+  const fs::path out = *folder_ / "out_resume";
+  EXPECT_FALSE(run(*folder_ / "frames", out, quick()).front().resumed);
+  const std::string report = read_file(out / "000000" / "report.json");
+  EXPECT_TRUE(run(*folder_ / "frames", out, quick()).front().resumed);
+  SequenceOptions other = quick();
+  other.description = "other";
+  EXPECT_THROW(static_cast<void>(run(*folder_ / "frames", out, other)), InputError);
+  EXPECT_EQ(read_file(out / "000000" / "report.json"), report);
+  // An aborted frame (no report yet) is made again.
+  fs::remove(out / "000000" / "report.json");
+  EXPECT_FALSE(run(*folder_ / "frames", out, quick()).front().resumed);
+  EXPECT_EQ(read_file(out / "000000" / "report.json"), report);
+  other.overwrite = true;
+  EXPECT_TRUE(run(*folder_ / "frames", out, other).front().done);
+}
+
+TEST_F(PipelineTest, MissingCameraIsAWarningAndNotAFailure) {
+  const fs::path frames = *folder_ / "one_missing";
+  fs::create_directories(frames / "000000");
+  fs::copy_file(*folder_ / "frames" / "000000" / "cam0.png", frames / "000000" / "cam0.png",
+                fs::copy_options::overwrite_existing);
+  SequenceOptions options = quick();
+  options.points.solution.method = Method::kLinear;
+  const auto outcomes = run(frames, *folder_ / "out_missing", options);
+  ASSERT_TRUE(outcomes.front().done) << outcomes.front().failure;
+  EXPECT_THAT(outcomes.front().warnings, testing::Contains(testing::HasSubstr("cam1")));
+}
+
+/// Expects an InputError whose line has all the given parts, and no output.
+void expect_refused(const fs::path& rig, const fs::path& frames,
+                    const std::vector<std::string>& parts) {
+  const fs::path out = frames.parent_path() / "out_refused";
+  try {
+    static_cast<void>(reconstruct_sequence(rig, frames, out, {}));
+    FAIL() << frames << " was accepted";
+  } catch (const InputError& error) {
+    for (const std::string& part : parts) EXPECT_THAT(error.what(), testing::HasSubstr(part));
+    EXPECT_THAT(error.what(), testing::Not(testing::HasSubstr("\n")));
+  }
+  EXPECT_FALSE(fs::exists(out));
+}
+
+TEST_F(PipelineTest, RefusesBrokenFramesBeforeWritingAnything) {
+  const fs::path rig = *folder_ / "rig.json";
+  const std::string png = read_file(*folder_ / "frames" / "000000" / "cam0.png");
+  const auto frames_with = [&](const std::string& name, const std::string& file,
+                               const std::string& bytes) {
+    const fs::path frames = *folder_ / name;
+    fs::create_directories(frames / "000000");
+    std::ofstream(frames / "000000" / file, std::ios::binary) << bytes;
+    return frames;
+  };
+  expect_refused(rig, frames_with("truncated", "cam0.png", png.substr(0, png.size() / 2)),
+                 {"cam0.png"});
+  write_image(*folder_ / "wrong_size" / "000000" / "cam1.png", cv::Mat(100, 50, CV_8UC3), 8);
+  expect_refused(rig, *folder_ / "wrong_size", {"cam1.png", "50x100", "320x240"});
+  expect_refused(rig, frames_with("strangers", "other.png", png), {"000000", "cam0"});
+  fs::create_directories(*folder_ / "empty");
+  expect_refused(rig, *folder_ / "empty", {"empty", "frame folder"});
+  expect_refused(rig, *folder_ / "nowhere", {"nowhere"});
+}
+
+}  // namespace
+}  // namespace pencilscan
