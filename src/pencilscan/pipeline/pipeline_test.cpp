@@ -33,10 +33,10 @@ Rig small_rig() {
   for (int c = 0; c < 2; ++c) {
     Camera camera;
     camera.name = "cam" + std::to_string(c);
-    camera.width = 320;
-    camera.height = 240;
-    camera.K << 1150, 0, 160, 0, 1150, 120, 0, 0, 1;
-    camera.device_from_world = look_at({1100, c == 0 ? -200.0 : 200.0, 150}, {0, 0, 0});
+    camera.width = 480;
+    camera.height = 360;
+    camera.K << 900, 0, 240, 0, 900, 180, 0, 0, 1;
+    camera.device_from_world = look_at({560, c == 0 ? -110.0 : 110.0, 80}, {0, 0, 0});
     rig.cameras.push_back(camera);
   }
   for (int p = 0; p < 2; ++p) {
@@ -44,9 +44,9 @@ Rig small_rig() {
     projector.name = "proj" + std::to_string(p);
     projector.width = 640;
     projector.height = 512;
-    projector.K << 1200, 0, 320, 0, 1200, 256, 0, 0, 1;
+    projector.K << 1000, 0, 320, 0, 1000, 256, 0, 0, 1;
     projector.device_from_world =
-        p == 0 ? look_at({1000, 480, 100}, {0, 0, 0}) : look_at({900, -60, 700}, {0, 0, 0});
+        p == 0 ? look_at({450, 225, 45}, {0, 0, 0}) : look_at({386, -140, 277}, {0, 0, 0});
     LinePattern pattern;
     pattern.axis = p == 0 ? Axis::kColumn : Axis::kRow;
     if (p == 1) pattern.colors = {"red", "yellow"};
@@ -214,7 +214,7 @@ TEST_F(PipelineTest, RefusesBrokenFramesBeforeWritingAnything) {
   expect_refused(rig, frames_with("truncated", "cam0.png", png.substr(0, png.size() / 2)),
                  {"cam0.png"});
   write_image(*folder_ / "wrong_size" / "000000" / "cam1.png", cv::Mat(100, 50, CV_8UC3), 8);
-  expect_refused(rig, *folder_ / "wrong_size", {"cam1.png", "50x100", "320x240"});
+  expect_refused(rig, *folder_ / "wrong_size", {"cam1.png", "50x100", "480x360"});
   expect_refused(rig, frames_with("strangers", "other.png", png), {"000000", "cam0"});
   fs::create_directories(*folder_ / "empty");
   expect_refused(rig, *folder_ / "empty", {"empty", "frame folder"});
