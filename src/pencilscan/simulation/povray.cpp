@@ -144,8 +144,7 @@ void write_camera(std::ostream& out, const Camera& camera) {
 
 }  // namespace
 
-void check_povray_can_show(const Rig& rig, const Reflectance& surface,
-                           const fs::path& rig_path) {
+void check_povray_can_show(const Rig& rig, const Reflectance& surface, const fs::path& rig_path) {
   for (const Camera& camera : rig.cameras) {
     if (camera.has_distortion()) {
       throw InputError(rig_path.string(), camera.name + ".distortion", "",
