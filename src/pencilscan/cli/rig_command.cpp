@@ -1,0 +1,214 @@
+#include <algorithm>
+#include <cstdio>
+#include <iostream>
+#include <memory>
+#include <numbers>
+
+#include "pencilscan/cli/command.h"
+#include "pencilscan/core/error.h"
+#include "pencilscan/core/parallel.h"
+#include "pencilscan/io/file.h"
+#include "pencilscan/planning/rig_check.h"
+#include "pencilscan/planning/ring.h"
+
+namespace pencilscan::cli {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr double kDegree = std::numbers::pi / 180;
+
+// ---- pencilscan rig ring ------------------------------------------------------------------------
+
+struct RingCommand {
+  CommonOptions common;
+  RingOptions ring;
+  std::string out;
+  double arc_deg = 360;
+  double camera_elevation_deg = 15;
+  double vertical_elevation_deg = 8;
+  double horizontal_elevation_deg = 34;
+};
+
+void run_ring(RingCommand command) {
+  const ThreadLimit threads(command.common.threads);
+  RingOptions& ring = command.ring;
+  const auto require = [](bool holds, const char* option, double value, const char* rule) {
+    if (!holds) throw InputError("command line", option, Json(value).dump(), rule);
+  };
+  require(ring.volume_radius_mm < ring.distance_mm, "--distance-mm", ring.distance_mm,
+          "must be larger than --volume-radius-mm");
+  require(ring.line_width_px <= ring.pitch_px, "--line-width-px", ring.line_width_px,
+          "must be <= --pitch-px");
+  require(ring.offset_px <= std::min(ring.projector_width, ring.projector_height) - 0.5,
+          "--offset-px", ring.offset_px, "the first line must lie on the panel");
+  ring.arc_rad = std::min(command.arc_deg * kDegree, 2 * std::numbers::pi);
+  ring.camera_elevation_rad = command.camera_elevation_deg * kDegree;
+  ring.vertical_elevation_rad = command.vertical_elevation_deg * kDegree;
+  ring.horizontal_elevation_rad = command.horizontal_elevation_deg * kDegree;
+  write_rig(make_ring(ring), command.out);
+  print_figures(command.common, {{"rig", command.out},
+                                 {"cameras", ring.cameras},
+                                 {"projectors", ring.projectors},
+                                 {"distance_mm", ring.distance_mm},
+                                 {"pitch_px", ring.pitch_px}});
+}
+
+void add_ring(CLI::App& group) {
+  auto options = std::make_shared<RingCommand>();
+  CLI::App* command = group.add_subcommand("ring", "Write a ring of cameras and projectors");
+  RingOptions& ring = options->ring;
+  const auto number = [&](const char* flag, auto& value, double low, double high,
+                          const char* text) {
+    command->add_option(flag, value, text)->check(CLI::Range(low, high))->capture_default_str();
+  };
+  command->add_option("--out", options->out, "The rig file to write (rig.json)")->required();
+  number("--cameras", ring.cameras, 1, 256, "Number of cameras");
+  number("--projectors", ring.projectors, 1, 256,
+         "Number of projectors: vertical and horizontal lines in turn");
+  number("--distance-mm", ring.distance_mm, 1, 1e6, "Distance of the devices to the centre");
+  number("--volume-radius-mm", ring.volume_radius_mm, 0.1, 1e6, "Radius of the working volume");
+  number("--arc-deg", options->arc_deg, 1, 360, "Part of the circle to use");
+  number("--camera-elevation-deg", options->camera_elevation_deg, -80, 80, "Cameras");
+  number("--vertical-elevation-deg", options->vertical_elevation_deg, -80, 80,
+         "Projectors of vertical lines");
+  number("--horizontal-elevation-deg", options->horizontal_elevation_deg, -80, 80,
+         "Projectors of horizontal lines: about 30 degrees off the cameras");
+  number("--camera-width", ring.camera_width, 16, 65536, "px");
+  number("--camera-height", ring.camera_height, 16, 65536, "px");
+  number("--camera-focal-px", ring.camera_focal_px, 1, 1e6, "px");
+  number("--projector-width", ring.projector_width, 16, 65536, "px");
+  number("--projector-height", ring.projector_height, 16, 65536, "px");
+  number("--projector-focal-px", ring.projector_focal_px, 1, 1e6, "px");
+  number("--pitch-px", ring.pitch_px, 1, 1e4, "Distance of neighbouring lines");
+  number("--line-width-px", ring.line_width_px, 0.1, 1e4, "Width of a line");
+  number("--offset-px", ring.offset_px, -0.5, 1e5, "Centre of the first line");
+  add_common_options(*command, options->common, "pencilscan rig ring --out rig.json");
+  command->callback([options] { run_ring(*options); });
+}
+
+// ---- pencilscan rig check -----------------------------------------------------------------------
+
+struct CheckCommand {
+  CommonOptions common;
+  std::string rig_path;
+};
+
+std::string family_name(const Rig& rig, const LineFamily& family) {
+  const Projector& projector = rig.projectors[family.projector];
+  if (projector.patterns.size() == 1) return projector.name;
+  return projector.name + "/" + std::to_string(family.pattern);
+}
+
+Json to_json(const CoverageCheck& coverage) {
+  return {{"seen", coverage.seen},
+          {"lit", coverage.lit},
+          {"seen_and_lit", coverage.seen_and_lit},
+          {"usable", coverage.usable},
+          {"grid", coverage.grid},
+          {"skew_grid", coverage.skew_grid},
+          {"ambiguous", coverage.ambiguous}};
+}
+
+Json to_json(const Rig& rig, const RigCheck& check) {
+  const Vec3& center = check.volume.center;
+  Json json;
+  json["volume"] = {{"center", {center.x(), center.y(), center.z()}},
+                    {"radius", check.volume.radius}};
+  json["samples"] = check.samples;
+  json["coverage"] = to_json(check.coverage);
+  json["pairs"] = Json::array();
+  for (const PairCheck& pair : check.pairs) {
+    json["pairs"].push_back({{"camera", rig.cameras[pair.camera].name},
+                             {"projector", rig.projectors[pair.family.projector].name},
+                             {"pattern", pair.family.pattern},
+                             {"shared_samples", pair.shared},
+                             {"usable_share", pair.usable_share},
+                             {"sensitive_share", pair.sensitive_share},
+                             {"sensitivity_median", pair.sensitivity_median},
+                             {"px_per_mm_median", pair.px_per_mm_median},
+                             {"line_spacing_median_px", pair.spacing_median_px}});
+  }
+  json["axes"] = Json::array();
+  for (const AxesCheck& axes : check.axes) {
+    json["axes"].push_back({{"first", family_name(rig, axes.first)},
+                            {"second", family_name(rig, axes.second)},
+                            {"angle_deg", axes.angle_rad / kDegree},
+                            {"distance_mm", axes.distance_mm},
+                            {"skewness", axes.skewness},
+                            {"same_color", axes.same_color},
+                            {"shared_views", axes.shared},
+                            {"crossing_share", axes.crossing_share},
+                            {"parallel_share", axes.parallel_share}});
+  }
+  json["warnings"] = Json::array();
+  for (const RigWarning& warning : check.warnings) {
+    json["warnings"].push_back({{"severity", warning.severe ? "severe" : "warning"},
+                                {"kind", warning.kind},
+                                {"text", warning.text}});
+  }
+  return json;
+}
+
+void print_tables(const Rig& rig, const RigCheck& check) {
+  std::printf("%-10s %-12s %7s %7s %8s %8s %8s\n", "camera", "projector", "shared", "usable",
+              "depth s", "px/mm", "lines px");
+  for (const PairCheck& pair : check.pairs) {
+    if (pair.shared == 0) continue;
+    std::printf("%-10s %-12s %7zu %6.0f%% %8.2f %8.2f %8.1f\n",
+                rig.cameras[pair.camera].name.c_str(), family_name(rig, pair.family).c_str(),
+                pair.shared, 100 * pair.usable_share, pair.sensitivity_median,
+                pair.px_per_mm_median, pair.spacing_median_px);
+  }
+  std::printf("\n%-12s %-12s %8s %8s %8s %9s %9s\n", "axis", "axis", "angle", "mm apart",
+              "skewness", "crossing", "parallel");
+  for (const AxesCheck& axes : check.axes) {
+    if (axes.shared == 0) continue;
+    std::printf("%-12s %-12s %7.1f\u00b0 %8.0f %8.3f %8.0f%% %8.0f%%%s\n",
+                family_name(rig, axes.first).c_str(), family_name(rig, axes.second).c_str(),
+                axes.angle_rad / kDegree, axes.distance_mm, axes.skewness,
+                100 * axes.crossing_share, 100 * axes.parallel_share,
+                axes.same_color ? "  same colour" : "");
+  }
+  std::printf("\n");
+  std::fflush(stdout);
+}
+
+void run_check(const CheckCommand& command) {
+  const ThreadLimit threads(command.common.threads);
+  const Rig rig = read_rig(command.rig_path);
+  const RigCheck check = check_rig(rig);
+  const Json json = to_json(rig, check);
+  print_tables(rig, check);
+  CommonOptions coverage_only = command.common;
+  coverage_only.json_path.clear();
+  print_figures(coverage_only, {{"coverage", json["coverage"]}});
+  std::cout << "\n";
+  for (const RigWarning& warning : check.warnings) {
+    std::cout << (warning.severe ? "SEVERE: " : "warning: ") << warning.text << "\n";
+  }
+  if (check.warnings.empty()) std::cout << "no warnings\n";
+  if (!command.common.json_path.empty()) write_json(command.common.json_path, json);
+}
+
+void add_check(CLI::App& group) {
+  auto options = std::make_shared<CheckCommand>();
+  CLI::App* command =
+      group.add_subcommand("check", "Compute what a rig can measure and warn about what it cannot");
+  command->add_option("--rig", options->rig_path, "The rig (rig.json)")->required();
+  add_common_options(*command, options->common, "pencilscan rig check --rig rig.json");
+  command->callback([options] { run_check(*options); });
+}
+
+}  // namespace
+
+void add_rig_command(CLI::App& app) {
+  CLI::App* group = app.add_subcommand("rig", "Make and check rigs");
+  group->require_subcommand(1);
+  group->footer(
+      "Example:\n  pencilscan rig ring --out rig.json && pencilscan rig check --rig rig.json");
+  add_ring(*group);
+  add_check(*group);
+}
+
+}  // namespace pencilscan::cli

@@ -1,0 +1,169 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "pencilscan/core/parallel.h"
+#include "pencilscan/planning/rig_check.h"
+#include "pencilscan/planning/ring.h"
+
+namespace pencilscan {
+namespace {
+
+constexpr double kDegree = std::numbers::pi / 180;
+
+bool has_severe(const RigCheck& check, const std::string& kind) {
+  return std::any_of(check.warnings.begin(), check.warnings.end(), [&](const RigWarning& warning) {
+    return warning.severe && warning.kind == kind;
+  });
+}
+
+bool has_any(const RigCheck& check, const std::string& kind) {
+  return std::any_of(check.warnings.begin(), check.warnings.end(),
+                     [&](const RigWarning& warning) { return warning.kind == kind; });
+}
+
+RingOptions one_height() {
+  RingOptions options;
+  options.camera_elevation_rad = 0;
+  options.vertical_elevation_rad = 0;
+  options.horizontal_elevation_rad = 0;
+  return options;
+}
+
+/// A ring at one height whose projectors show lines rolled by +45 and -45 degrees in turn.
+Rig mirror_symmetric_rig() {
+  Rig rig = make_ring(one_height());
+  for (std::size_t i = 0; i < rig.projectors.size(); ++i) {
+    Projector& projector = rig.projectors[i];
+    projector.device_from_world =
+        look_at(projector.center(), Vec3::Zero(), (i % 2 == 0 ? 45 : -45) * kDegree);
+    projector.patterns.front().axis = Axis::kColumn;
+  }
+  return rig;
+}
+
+TEST(Ring, DevicesStandWhereAskedAndLookAtTheCentre) {
+  const Rig rig = make_ring();
+  ASSERT_EQ(rig.cameras.size(), 6U);
+  ASSERT_EQ(rig.projectors.size(), 6U);
+  const auto expect_pose = [](const Device& device, double azimuth_deg, double elevation_rad) {
+    const Vec3 center = device.center();
+    EXPECT_NEAR(center.norm(), 1100, 1e-9) << device.name;
+    EXPECT_NEAR(std::asin(center.z() / center.norm()), elevation_rad, 1e-12) << device.name;
+    const double turn = std::atan2(center.y(), center.x()) - azimuth_deg * kDegree;
+    EXPECT_NEAR(std::remainder(turn, 2 * std::numbers::pi), 0, 1e-12) << device.name;
+    const auto pixel = device.project(Vec3::Zero());
+    ASSERT_TRUE(pixel);
+    EXPECT_NEAR(pixel->x(), 0.5 * (device.width - 1), 1e-9) << device.name;
+    EXPECT_NEAR(pixel->y(), 0.5 * (device.height - 1), 1e-9) << device.name;
+  };
+  for (std::size_t i = 0; i < 6; ++i) {
+    const bool vertical = i % 2 == 0;
+    const double azimuth = 60.0 * static_cast<double>(i);
+    expect_pose(rig.cameras[i], azimuth, 0.262);
+    expect_pose(rig.projectors[i], azimuth + 30, vertical ? 0.140 : 0.593);
+    EXPECT_EQ(rig.projectors[i].patterns[0].axis, vertical ? Axis::kColumn : Axis::kRow);
+  }
+}
+
+TEST(RigCheck, DefaultRingHasNoWarning) {
+  const RigCheck check = check_rig(make_ring());
+  EXPECT_TRUE(check.warnings.empty())
+      << (check.warnings.empty() ? "" : check.warnings.front().text);
+  EXPECT_GT(check.coverage.usable, 0.8);
+  EXPECT_GT(check.coverage.grid, 0.6);
+  EXPECT_LT(check.coverage.ambiguous, 0.1);
+}
+
+TEST(RigCheck, HorizontalLinesAtTheHeightOfTheCamerasAreFlagged) {
+  const RigCheck check = check_rig(make_ring(one_height()));
+  EXPECT_TRUE(has_severe(check, "no_depth"));
+  EXPECT_TRUE(has_severe(check, "no_grid"));
+  // What is left are vertical lines of two projectors that cross near the poles of the spheres.
+  for (const AxesCheck& axes : check.axes) {
+    if (axes.first.projector % 2 != axes.second.projector % 2) {
+      EXPECT_EQ(axes.crossing_share, 0);
+    }
+  }
+  for (const PairCheck& pair : check.pairs) {
+    if (pair.family.projector % 2 == 1) {
+      EXPECT_EQ(pair.usable_share, 0) << "horizontal";
+    }
+  }
+}
+
+TEST(RigCheck, MirrorSymmetricDiagonalLinesHaveCoplanarAxes) {
+  const RigCheck check = check_rig(mirror_symmetric_rig());
+  EXPECT_FALSE(has_any(check, "no_depth"));
+  EXPECT_TRUE(has_severe(check, "coplanar_axes"));
+  // Neighbours are mirror images in the vertical plane between them, so their axes meet in it.
+  EXPECT_LT(check.axes.front().skewness, 1e-9);
+  EXPECT_LT(check.coverage.skew_grid, 0.5 * check.coverage.grid);
+}
+
+TEST(RigCheck, SensitivityIsTheSineOfTheTriangulationAngleForLinesAcrossTheBaseline) {
+  RingOptions options = one_height();
+  options.cameras = 1;
+  options.projectors = 1;
+  options.arc_rad = 120 * kDegree;  // camera at -30, projector at +30 degrees
+  options.volume_radius_mm = 1;     // all samples nearly in the centre
+  const RigCheck check = check_rig(make_ring(options));
+  ASSERT_EQ(check.pairs.size(), 1U);
+  const double sine = std::sin(60 * kDegree);
+  // Samples lie within 1 mm of the centre at 1100 mm.
+  EXPECT_NEAR(check.pairs[0].sensitivity_median, sine, 2e-3);
+  EXPECT_NEAR(check.pairs[0].px_per_mm_median, sine * options.projector_focal_px / 1100, 1e-2);
+}
+
+TEST(RigCheck, AxesOfKnownSkewLinesAreMeasured) {
+  RingOptions options = one_height();
+  options.cameras = 1;
+  options.projectors = 2;
+  Rig rig = make_ring(options);
+  // Vertical axis through (1100, 0, 0); horizontal axis along y through (0, 0, 1100)-like heights.
+  rig.projectors[0].device_from_world = look_at({1100, 0, 0}, Vec3::Zero());
+  rig.projectors[1].device_from_world = look_at({700, 0, 500}, Vec3::Zero());
+  const RigCheck check = check_rig(rig);
+  ASSERT_EQ(check.axes.size(), 1U);
+  // Axes: (1100, 0, t) and (700, t, 500): perpendicular, 400 mm apart.
+  EXPECT_NEAR(check.axes[0].angle_rad, 90 * kDegree, 1e-9);
+  EXPECT_NEAR(check.axes[0].distance_mm, 400, 1e-6);
+  EXPECT_NEAR(check.axes[0].skewness, 400 / (0.5 * (1100 + std::hypot(700, 500))), 1e-9);
+}
+
+TEST(RigCheck, ParallelLinesOfOneColourAreAmbiguous) {
+  RingOptions options;
+  options.horizontal_elevation_rad = options.vertical_elevation_rad;
+  Rig rig = make_ring(options);
+  for (Projector& projector : rig.projectors) projector.patterns = rig.projectors[0].patterns;
+  const RigCheck check = check_rig(rig);
+  EXPECT_TRUE(has_severe(check, "same_color"));
+  EXPECT_GT(check.coverage.ambiguous, 5 * check_rig(make_ring()).coverage.ambiguous);
+}
+
+TEST(RigCheck, DevicesThatLookAwayAreNamed) {
+  Rig rig = make_ring();
+  rig.cameras[2].device_from_world = look_at(rig.cameras[2].center(), Vec3(0, 0, 5000));
+  const RigCheck check = check_rig(rig);
+  ASSERT_TRUE(has_severe(check, "out_of_view"));
+  EXPECT_THAT(check.warnings.front().text, ::testing::HasSubstr("cam2"));
+  EXPECT_EQ(check.camera_view_share[2], 0);
+}
+
+TEST(RigCheck, FiguresDoNotDependOnTheThreadCount) {
+  const auto run = [](int threads) {
+    const ThreadLimit limit(threads);
+    return check_rig(make_ring());
+  };
+  const RigCheck one = run(1), four = run(4);
+  EXPECT_EQ(one.coverage.grid, four.coverage.grid);
+  for (std::size_t i = 0; i < one.pairs.size(); ++i) {
+    EXPECT_EQ(one.pairs[i].sensitivity_median, four.pairs[i].sensitivity_median);
+  }
+}
+
+}  // namespace
+}  // namespace pencilscan

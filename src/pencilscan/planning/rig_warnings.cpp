@@ -1,0 +1,233 @@
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "pencilscan/planning/rig_check.h"
+
+namespace pencilscan {
+namespace {
+
+/// A line family that is usable on less than this share of what cameras see of it gives no depth.
+constexpr double kNoDepthShare = 0.15;
+/// A camera or projector should have this share of the volume in its image.
+constexpr double kEnoughView = 0.5;
+/// Surface that should be measurable, and be crossed by two usable line sets.
+constexpr double kEnoughUsable = 0.85;
+constexpr double kTooFewUsable = 0.5;
+constexpr double kEnoughGrid = 0.4;
+constexpr double kTooFewGrid = 0.1;
+/// Views with same-colour ambiguity that are tolerable, and that are not.
+constexpr double kSomeAmbiguity = 0.1;
+constexpr double kMuchAmbiguity = 0.3;
+/// Line spacings in the image, px: below the second, detection does not separate lines.
+constexpr double kWideSpacing = 5;
+constexpr double kNarrowSpacing = 3;
+/// Two line sets are partners in a grid when they cross on this share of what shows both.
+constexpr double kPartnerShare = 0.2;
+/// Fewer shared samples than this say nothing about a pair.
+constexpr std::size_t kFewSamples = 10;
+
+std::string percent(double share) {
+  char text[16];
+  std::snprintf(text, sizeof text, "%.0f %%", 100 * share);
+  return text;
+}
+
+std::string number(double value, const char* format) {
+  char text[32];
+  std::snprintf(text, sizeof text, format, value);
+  return text;
+}
+
+/// Collects the warnings of one rig.
+class Collector {
+ public:
+  Collector(const Rig& rig, const RigCheck& check, const RigCheckOptions& options)
+      : rig_(rig), check_(check), options_(options) {}
+
+  std::vector<RigWarning> collect() {
+    check_patterns();
+    check_views();
+    check_depth();
+    check_grid();
+    check_axes();
+    check_ambiguity();
+    check_coverage();
+    check_spacing();
+    std::stable_partition(warnings_.begin(), warnings_.end(),
+                          [](const RigWarning& warning) { return warning.severe; });
+    return std::move(warnings_);
+  }
+
+ private:
+  void warn(bool severe, const char* kind, std::string text) {
+    warnings_.push_back({severe, kind, std::move(text)});
+  }
+  [[nodiscard]] std::string name(const LineFamily& family) const {
+    const Projector& projector = rig_.projectors[family.projector];
+    return projector.patterns.size() == 1
+               ? projector.name
+               : projector.name + " pattern " + std::to_string(family.pattern);
+  }
+  [[nodiscard]] const LinePattern& pattern(const LineFamily& family) const {
+    return rig_.projectors[family.projector].patterns[family.pattern];
+  }
+
+  void check_patterns() {
+    for (const Projector& projector : rig_.projectors) {
+      if (projector.patterns.empty()) {
+        warn(false, "no_pattern", projector.name + " has no pattern: it measures nothing");
+      }
+    }
+  }
+
+  void check_views() {
+    const auto check_device = [&](const Device& device, double view) {
+      if (view < kEnoughView) {
+        warn(view <= 0, "out_of_view",
+             device.name + " has only " + percent(view) +
+                 " of the working volume in its image: turn it to the volume, move it away or "
+                 "shorten its focal length");
+      }
+    };
+    for (std::size_t c = 0; c < rig_.cameras.size(); ++c) {
+      check_device(rig_.cameras[c], check_.camera_view_share[c]);
+    }
+    for (std::size_t p = 0; p < rig_.projectors.size(); ++p) {
+      check_device(rig_.projectors[p], check_.projector_view_share[p]);
+    }
+  }
+
+  /// Lines along the epipolar lines of every camera that sees them.
+  void check_depth() {
+    for (std::size_t k = 0; k < check_.pairs.size(); ++k) {
+      const LineFamily family = check_.pairs[k].family;
+      if (check_.pairs[k].camera != check_.pairs.front().camera) break;  // each family once
+      std::size_t shared = 0;
+      double sensitive = 0, best = 0;
+      for (const PairCheck& pair : check_.pairs) {
+        if (pair.family.projector != family.projector || pair.family.pattern != family.pattern) {
+          continue;
+        }
+        shared += pair.shared;
+        sensitive += pair.sensitive_share * static_cast<double>(pair.shared);
+        best = std::max(best, pair.sensitivity_median);
+      }
+      if (shared < kFewSamples) {
+        warn(true, "unseen_light",
+             name(family) + " lights nothing that a camera sees: move it or a camera");
+      } else if (sensitive < kNoDepthShare * static_cast<double>(shared)) {
+        warn_no_depth(family, best);
+      }
+    }
+  }
+
+  void warn_no_depth(const LineFamily& family, double best) {
+    const bool rows = pattern(family).axis == Axis::kRow;
+    warn(
+        true, "no_depth",
+        "the " + std::string(rows ? "horizontal" : "vertical") + " lines of " + name(family) +
+            " give no depth (sensitivity at best " + number(best, "%.2f") + ", needed " +
+            number(options_.min_sensitivity, "%.2f") +
+            "): they run along the epipolar lines of the cameras that see them; " +
+            (rows ? "raise or lower this projector by about 30 degrees against the cameras, or let "
+                    "it show vertical lines"
+                  : "move it sideways against the cameras, or let it show horizontal lines"));
+  }
+
+  void check_grid() {
+    const double grid = check_.coverage.grid;
+    if (grid >= kEnoughGrid) return;
+    warn(grid < kTooFewGrid, "no_grid",
+         "only " + percent(grid) +
+             " of the surface shows some camera two usable line sets of different projectors that "
+             "cross: crossings decide which line is which; mix directions of lines, and let "
+             "neighbouring projectors overlap");
+  }
+
+  /// Coplanar axes among the pairs that make up the grid, and what is left without them.
+  void check_axes() {
+    const double left = check_.coverage.skew_grid;
+    const bool severe = left < kEnoughGrid && left < 0.5 * check_.coverage.grid;
+    for (const AxesCheck& axes : check_.axes) {
+      if (axes.shared < kFewSamples || axes.crossing_share < kPartnerShare) continue;
+      if (axes.skewness >= options_.min_skewness) continue;
+      // Families of one colour are no grid of the paper's kind; coplanarity matters where they are
+      // all that there is, or where colours differ.
+      if (axes.same_color && !severe) continue;
+      if (axes.first.projector == axes.second.projector) {
+        warn(severe, "coplanar_axes",
+             name(axes.first) + " and " + name(axes.second) +
+                 " come from one projector: their crossings say nothing about depth; a second "
+                 "projector or the single-projector method is needed");
+        continue;
+      }
+      warn(severe, "coplanar_axes",
+           "the line directions of " + name(axes.first) + " and " + name(axes.second) +
+               " lie in one plane (skewness " + number(axes.skewness, "%.3f") + ", axes " +
+               number(axes.distance_mm, "%.0f") +
+               " mm apart): equation (6) keeps a free parameter for this pair, as for "
+               "mirror-symmetric diagonal lines; raise one of the two or roll it differently");
+    }
+  }
+
+  void check_ambiguity() {
+    const double ambiguous = check_.coverage.ambiguous;
+    if (ambiguous < kSomeAmbiguity) return;
+    const AxesCheck* worst = nullptr;
+    double most = 0;
+    for (const AxesCheck& axes : check_.axes) {
+      const double views = axes.parallel_share * static_cast<double>(axes.shared);
+      if (axes.same_color && views > most) {
+        most = views;
+        worst = &axes;
+      }
+    }
+    if (worst == nullptr) return;
+    warn(ambiguous >= kMuchAmbiguity, "same_color",
+         percent(ambiguous) +
+             " of what the cameras see has two line sets of the same colour in nearly the same "
+             "direction (most often " +
+             name(worst->first) + " and " + name(worst->second) +
+             "): give them different colours or directions, or move them apart");
+  }
+
+  void check_coverage() {
+    const CoverageCheck& coverage = check_.coverage;
+    if (coverage.usable >= kEnoughUsable) return;
+    warn(coverage.usable < kTooFewUsable, "coverage",
+         "only " + percent(coverage.usable) + " of the surface can be measured (" +
+             percent(coverage.seen) + " is seen, " + percent(coverage.lit) + " is lit, " +
+             percent(coverage.seen_and_lit) +
+             " is both): add devices where they are missing, or accept a partial shape");
+  }
+
+  void check_spacing() {
+    std::size_t shared = 0;
+    double weighted = 0;
+    for (const PairCheck& pair : check_.pairs) {
+      shared += pair.shared;
+      weighted += pair.spacing_median_px * static_cast<double>(pair.shared);
+    }
+    if (shared == 0) return;
+    const double spacing = weighted / static_cast<double>(shared);
+    if (spacing >= kWideSpacing) return;
+    warn(spacing < kNarrowSpacing, "spacing",
+         "lines lie only " + number(spacing, "%.1f") +
+             " px apart in the images: enlarge pitch_px or use cameras of higher resolution");
+  }
+
+  const Rig& rig_;
+  const RigCheck& check_;
+  const RigCheckOptions& options_;
+  std::vector<RigWarning> warnings_;
+};
+
+}  // namespace
+
+std::vector<RigWarning> rig_warnings(const Rig& rig, const RigCheck& check,
+                                     const RigCheckOptions& options) {
+  return Collector(rig, check, options).collect();
+}
+
+}  // namespace pencilscan

@@ -1,0 +1,80 @@
+#include "pencilscan/planning/ring.h"
+
+#include <cmath>
+#include <utility>
+
+#include "pencilscan/core/check.h"
+
+namespace pencilscan {
+namespace {
+
+constexpr double kFullCircle = 2 * std::numbers::pi;
+
+Device device_at(const std::string& name, std::pair<int, int> size, double focal_px,
+                 double distance_mm, double azimuth_rad, double elevation_rad) {
+  Device device;
+  device.name = name;
+  device.width = size.first;
+  device.height = size.second;
+  device.K << focal_px, 0, 0.5 * (size.first - 1), 0, focal_px, 0.5 * (size.second - 1), 0, 0, 1;
+  const Vec3 eye(std::cos(elevation_rad) * std::cos(azimuth_rad),
+                 std::cos(elevation_rad) * std::sin(azimuth_rad), std::sin(elevation_rad));
+  device.device_from_world = look_at(distance_mm * eye, Vec3::Zero());
+  return device;
+}
+
+/// Device i of `count` on an arc centred at azimuth 0, or on the whole circle from azimuth 0 on;
+/// `shift` (in steps) puts the projectors between the cameras.
+double azimuth(int i, int count, double arc_rad, double shift) {
+  const double step = arc_rad / count;
+  if (arc_rad >= kFullCircle) return step * (i + shift);
+  return step * (i + 0.5) - 0.5 * arc_rad + step * (shift - 0.25);
+}
+
+LinePattern ring_pattern(const RingOptions& options, bool vertical) {
+  LinePattern pattern;  // period 8: order 3 over two colours
+  pattern.axis = vertical ? Axis::kColumn : Axis::kRow;
+  pattern.colors = vertical ? std::vector<std::string>{"blue", "cyan"}
+                            : std::vector<std::string>{"red", "yellow"};
+  pattern.pitch_px = options.pitch_px;
+  pattern.line_width_px = options.line_width_px;
+  pattern.offset_px = options.offset_px;
+  return pattern;
+}
+
+}  // namespace
+
+Rig make_ring(const RingOptions& options) {
+  PENCILSCAN_CHECK(options.cameras >= 1 && options.projectors >= 1);
+  PENCILSCAN_CHECK(options.distance_mm > options.volume_radius_mm && options.volume_radius_mm > 0);
+  PENCILSCAN_CHECK(options.arc_rad > 0 && options.arc_rad <= kFullCircle);
+  Rig rig;
+  // On an arc, equal numbers would put each projector right above a camera: move both by a quarter.
+  const bool full = options.arc_rad >= kFullCircle;
+  const bool paired = options.cameras == options.projectors;
+  const double camera_shift = full ? 0.0 : (paired ? 0.0 : 0.25);
+  const double projector_shift = full ? 0.5 : (paired ? 0.5 : 0.25);
+  for (int i = 0; i < options.cameras; ++i) {
+    Camera camera;
+    static_cast<Device&>(camera) = device_at(
+        "cam" + std::to_string(i), {options.camera_width, options.camera_height},
+        options.camera_focal_px, options.distance_mm,
+        azimuth(i, options.cameras, options.arc_rad, camera_shift), options.camera_elevation_rad);
+    rig.cameras.push_back(std::move(camera));
+  }
+  for (int i = 0; i < options.projectors; ++i) {
+    const bool vertical = i % 2 == 0;
+    Projector projector;
+    static_cast<Device&>(projector) =
+        device_at("proj" + std::to_string(i), {options.projector_width, options.projector_height},
+                  options.projector_focal_px, options.distance_mm,
+                  azimuth(i, options.projectors, options.arc_rad, projector_shift),
+                  vertical ? options.vertical_elevation_rad : options.horizontal_elevation_rad);
+    projector.patterns = {ring_pattern(options, vertical)};
+    rig.projectors.push_back(std::move(projector));
+  }
+  rig.volume = Sphere{Vec3::Zero(), options.volume_radius_mm};
+  return rig;
+}
+
+}  // namespace pencilscan
