@@ -217,9 +217,7 @@ void collect_tile(const TileResponses& tile, const std::vector<Direction>& direc
   }
 }
 
-}  // namespace
-
-std::vector<Ridgel> find_ridgels(const cv::Mat& presence, const RidgeOptions& options) {
+std::vector<Ridgel> ridgels_at_scale(const cv::Mat& presence, const RidgeOptions& options) {
   std::vector<Direction> directions;
   int margin = 0;
   for (int k = 0; k < options.orientations; ++k) {
@@ -256,6 +254,96 @@ std::vector<Ridgel> find_ridgels(const cv::Mat& presence, const RidgeOptions& op
     }
   }
   return ridgels;
+}
+
+/// Ridgels in buckets of their pixel rows, to find those around a place.
+class RidgelRows {
+ public:
+  RidgelRows(const std::vector<Ridgel>& ridgels, int rows) : ridgels_(ridgels) {
+    rows_.resize(static_cast<std::size_t>(rows));
+    for (std::size_t i = 0; i < ridgels.size(); ++i) row_of(ridgels[i].y).push_back(i);
+    for (auto& row : rows_) {
+      std::sort(row.begin(), row.end(), [&](std::size_t a, std::size_t b) {
+        return ridgels[a].x != ridgels[b].x ? ridgels[a].x < ridgels[b].x : a < b;
+      });
+    }
+  }
+
+  template <class Visit>
+  void around(float x, float y, float radius, Visit visit) const {
+    const int low = std::max(0, static_cast<int>(std::floor(y - radius)));
+    const int high =
+        std::min(static_cast<int>(rows_.size()) - 1, static_cast<int>(std::ceil(y + radius)));
+    for (int r = low; r <= high; ++r) {
+      const auto& row = rows_[static_cast<std::size_t>(r)];
+      auto it = std::lower_bound(row.begin(), row.end(), x - radius,
+                                 [&](std::size_t i, float v) { return ridgels_[i].x < v; });
+      for (; it != row.end() && ridgels_[*it].x <= x + radius; ++it) visit(*it);
+    }
+  }
+
+ private:
+  std::vector<std::size_t>& row_of(float y) {
+    const long row = std::clamp<long>(std::lround(y), 0, static_cast<long>(rows_.size()) - 1);
+    return rows_[static_cast<std::size_t>(row)];
+  }
+
+  const std::vector<Ridgel>& ridgels_;
+  std::vector<std::vector<std::size_t>> rows_;
+};
+
+float value_at(const cv::Mat& image, float x, float y) {
+  const int ix = std::clamp(static_cast<int>(std::lround(x)), 0, image.cols - 1);
+  const int iy = std::clamp(static_cast<int>(std::lround(y)), 0, image.rows - 1);
+  return image.at<float>(iy, ix);
+}
+
+/// Adds the ridgels of wide lines and removes the edges that the finer look took for lines.
+std::vector<Ridgel> merged_scales(const cv::Mat& presence, const std::vector<Ridgel>& fine,
+                                  const std::vector<Ridgel>& wide) {
+  constexpr float kSameLinePx = 1.3F;  // a fine ridgel this near to the middle is the line itself
+  constexpr float kReachPx = 5;        // half the width of the widest line
+  constexpr float kParallelCosine = 0.94F;
+  constexpr float kFlatTop = 0.88F;
+  const RidgelRows rows(fine, presence.rows);
+  std::vector<char> is_edge(fine.size(), 0);
+  std::vector<Ridgel> result;
+  std::vector<std::size_t> beside;
+  for (const Ridgel& w : wide) {
+    bool is_middle = true;
+    beside.clear();
+    rows.around(w.x, w.y, kReachPx, [&](std::size_t i) {
+      const Ridgel& f = fine[i];
+      if (std::abs(f.nx * w.nx + f.ny * w.ny) < kParallelCosine) return;
+      const float across = std::abs((f.x - w.x) * w.nx + (f.y - w.y) * w.ny);
+      const float along = std::abs(-(f.x - w.x) * w.ny + (f.y - w.y) * w.nx);
+      if (along > 2) return;
+      if (across < kSameLinePx) is_middle = false;
+      beside.push_back(i);
+    });
+    const float middle = value_at(presence, w.x, w.y);
+    for (const std::size_t i : beside) {
+      is_middle = is_middle && middle >= kFlatTop * value_at(presence, fine[i].x, fine[i].y);
+    }
+    if (!is_middle) continue;
+    for (const std::size_t i : beside) is_edge[i] = 1;
+    result.push_back(w);
+  }
+  for (std::size_t i = 0; i < fine.size(); ++i) {
+    if (is_edge[i] == 0) result.push_back(fine[i]);
+  }
+  return result;
+}
+
+}  // namespace
+
+std::vector<Ridgel> find_ridgels(const cv::Mat& presence, const RidgeOptions& options) {
+  std::vector<Ridgel> fine = ridgels_at_scale(presence, options);
+  if (options.wide_factor <= 1) return fine;
+  RidgeOptions wide = options;
+  wide.sigma_across_px *= options.wide_factor;
+  wide.sigma_along_px *= options.wide_factor;
+  return merged_scales(presence, fine, ridgels_at_scale(presence, wide));
 }
 
 }  // namespace pencilscan
