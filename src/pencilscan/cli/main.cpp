@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <csignal>
 #include <exception>
 #include <iostream>
@@ -27,7 +28,14 @@ int run(int argc, char** argv) {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return app.exit(error);  // --help, --version
-    complain(first_line(error.what()) + " (see pencilscan --help)");
+    // CLI11 says of an unknown command only that it misses a known one.
+    const auto commands = app.get_subcommands([](const CLI::App*) { return true; });
+    const bool unknown =
+        argc > 1 && argv[1][0] != '-' &&
+        std::none_of(commands.begin(), commands.end(),
+                     [&](const CLI::App* command) { return command->get_name() == argv[1]; });
+    complain((unknown ? std::string("unknown command ") + argv[1] : first_line(error.what())) +
+             " (see pencilscan --help)");
     return kBadInput;
   }
   std::cout.flush();

@@ -7,13 +7,17 @@
 namespace pencilscan {
 namespace {
 
-/// A line family that is usable on less than this share of what cameras see of it gives no depth.
-constexpr double kNoDepthShare = 0.15;
+/// A line family gives little depth when less than this share of what cameras see of it is
+/// sensitive enough, and none when its median sensitivity is below this part of the needed one.
+constexpr double kLittleDepthShare = 0.15;
+constexpr double kNoDepthPart = 0.5;
 /// A camera or projector should have this share of the volume in its image.
 constexpr double kEnoughView = 0.5;
-/// Surface that should be measurable, and be crossed by two usable line sets.
-constexpr double kEnoughUsable = 0.85;
+/// Surface that should be measurable; of what is seen, less is a fault of the rig rather than a
+/// partial rig.
+constexpr double kEnoughUsable = 0.75;
 constexpr double kTooFewUsable = 0.5;
+/// Of the surface that is seen and lit, the share that two usable line sets should cross.
 constexpr double kEnoughGrid = 0.4;
 constexpr double kTooFewGrid = 0.1;
 /// Views with same-colour ambiguity that are tolerable, and that are not.
@@ -25,7 +29,7 @@ constexpr double kNarrowSpacing = 3;
 /// Two line sets are partners in a grid when they cross on this share of what shows both.
 constexpr double kPartnerShare = 0.2;
 /// Fewer shared samples than this say nothing about a pair.
-constexpr std::size_t kFewSamples = 10;
+constexpr double kFewSamples = 10;
 
 std::string percent(double share) {
   char text[16];
@@ -103,54 +107,63 @@ class Collector {
     for (std::size_t k = 0; k < check_.pairs.size(); ++k) {
       const LineFamily family = check_.pairs[k].family;
       if (check_.pairs[k].camera != check_.pairs.front().camera) break;  // each family once
-      std::size_t shared = 0;
-      double sensitive = 0, best = 0;
+      double shared = 0, sensitive = 0, sensitivity = 0;
       for (const PairCheck& pair : check_.pairs) {
         if (pair.family.projector != family.projector || pair.family.pattern != family.pattern) {
           continue;
         }
-        shared += pair.shared;
-        sensitive += pair.sensitive_share * static_cast<double>(pair.shared);
-        best = std::max(best, pair.sensitivity_median);
+        const auto weight = static_cast<double>(pair.shared);
+        shared += weight;
+        sensitive += weight * pair.sensitive_share;
+        sensitivity += weight * pair.sensitivity_median;
       }
       if (shared < kFewSamples) {
         warn(true, "unseen_light",
              name(family) + " lights nothing that a camera sees: move it or a camera");
-      } else if (sensitive < kNoDepthShare * static_cast<double>(shared)) {
-        warn_no_depth(family, best);
+      } else if (sensitive < kLittleDepthShare * shared) {
+        warn_depth(family, sensitivity / shared, sensitive / shared);
       }
     }
   }
 
-  void warn_no_depth(const LineFamily& family, double best) {
+  void warn_depth(const LineFamily& family, double sensitivity, double share) {
     const bool rows = pattern(family).axis == Axis::kRow;
+    const bool none = sensitivity < kNoDepthPart * options_.min_sensitivity;
     warn(
-        true, "no_depth",
+        none, none ? "no_depth" : "little_depth",
         "the " + std::string(rows ? "horizontal" : "vertical") + " lines of " + name(family) +
-            " give no depth (sensitivity at best " + number(best, "%.2f") + ", needed " +
-            number(options_.min_sensitivity, "%.2f") +
-            "): they run along the epipolar lines of the cameras that see them; " +
-            (rows ? "raise or lower this projector by about 30 degrees against the cameras, or let "
-                    "it show vertical lines"
+            (none ? " give no depth" : " give little depth") + " (mean sensitivity " +
+            number(sensitivity, "%.2f") + "; " + number(options_.min_sensitivity, "%.2f") +
+            " is reached on " + percent(share) +
+            " of what cameras see of them): they run along the epipolar lines of the cameras; " +
+            (rows ? "raise or lower this projector to about 30 degrees off the cameras' height, or "
+                    "let it show vertical lines"
                   : "move it sideways against the cameras, or let it show horizontal lines"));
   }
 
+  /// Share of the surface that is both seen and lit (partial rigs are judged by their part).
+  [[nodiscard]] double of_lit(double share) const {
+    return check_.coverage.seen_and_lit > 0 ? share / check_.coverage.seen_and_lit : 0;
+  }
+
   void check_grid() {
-    const double grid = check_.coverage.grid;
+    const double grid = of_lit(check_.coverage.grid);
     if (grid >= kEnoughGrid) return;
     warn(grid < kTooFewGrid, "no_grid",
          "only " + percent(grid) +
-             " of the surface shows some camera two usable line sets of different projectors that "
-             "cross: crossings decide which line is which; mix directions of lines, and let "
-             "neighbouring projectors overlap");
+             " of the surface that is seen and lit shows some camera two usable line sets of "
+             "different projectors that cross: crossings decide which line is which; mix "
+             "directions of lines, and let neighbouring projectors overlap");
   }
 
   /// Coplanar axes among the pairs that make up the grid, and what is left without them.
   void check_axes() {
-    const double left = check_.coverage.skew_grid;
-    const bool severe = left < kEnoughGrid && left < 0.5 * check_.coverage.grid;
+    const double grid = of_lit(check_.coverage.grid);
+    const double left = of_lit(check_.coverage.skew_grid);
+    const bool severe = grid >= kTooFewGrid && left < kEnoughGrid && left < 0.5 * grid;
     for (const AxesCheck& axes : check_.axes) {
-      if (axes.shared < kFewSamples || axes.crossing_share < kPartnerShare) continue;
+      if (static_cast<double>(axes.shared) < kFewSamples || axes.crossing_share < kPartnerShare)
+        continue;
       if (axes.skewness >= options_.min_skewness) continue;
       // Families of one colour are no grid of the paper's kind; coplanarity matters where they are
       // all that there is, or where colours differ.
@@ -195,7 +208,7 @@ class Collector {
   void check_coverage() {
     const CoverageCheck& coverage = check_.coverage;
     if (coverage.usable >= kEnoughUsable) return;
-    warn(coverage.usable < kTooFewUsable, "coverage",
+    warn(coverage.usable < kTooFewUsable * coverage.seen, "coverage",
          "only " + percent(coverage.usable) + " of the surface can be measured (" +
              percent(coverage.seen) + " is seen, " + percent(coverage.lit) + " is lit, " +
              percent(coverage.seen_and_lit) +

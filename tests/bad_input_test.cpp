@@ -1,0 +1,175 @@
+// Bad input through the built program: exit code 2, one line on stderr that names file, field,
+// value and rule, and no output touched. The exit codes of success and of a full disk stand beside
+// it.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <string>
+
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::EndsWith;
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+std::string slurp(const fs::path& path) {
+  std::ifstream stream(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+struct Outcome {
+  int code = -1;
+  std::string error;  ///< stderr
+};
+
+class Program : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ =
+        fs::path(::testing::TempDir()) /
+        (std::string("program_") + ::testing::UnitTest::GetInstance()->current_test_info()->name());
+    fs::remove_all(folder_);
+    fs::create_directories(folder_);
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  /// Runs the program in the test's folder, after `setup` in the same shell.
+  Outcome run(const std::string& arguments, const std::string& setup = "true") {
+    const std::string command = "cd '" + folder_.string() + "' && " + setup + " && '" +
+                                PENCILSCAN_PROGRAM + "' " + arguments + " >stdout 2>stderr";
+    const int status = std::system(command.c_str());
+    Outcome outcome{WIFEXITED(status) ? WEXITSTATUS(status) : -1, slurp(folder_ / "stderr")};
+    fs::remove(folder_ / "stdout");
+    fs::remove(folder_ / "stderr");
+    return outcome;
+  }
+
+  /// The default ring with the first `from` replaced by `to`, as rig.json.
+  void make_rig(const std::string& from = "", const std::string& to = "") {
+    ASSERT_EQ(run("rig ring --out good.json").code, 0);
+    std::string text = slurp(folder_ / "good.json");
+    fs::remove(folder_ / "good.json");
+    const auto at = text.find(from);
+    ASSERT_NE(at, std::string::npos) << from;
+    text.replace(at, from.size(), to);
+    std::ofstream(folder_ / "rig.json") << text;
+  }
+
+  std::size_t file_count() {
+    return static_cast<std::size_t>(std::distance(fs::recursive_directory_iterator(folder_), {}));
+  }
+
+  /// Exit code 2 and one line with these parts; nothing written.
+  void expect_bad(const std::string& arguments, const std::string& part) {
+    const std::size_t before = file_count();
+    const Outcome outcome = run(arguments);
+    EXPECT_EQ(outcome.code, 2) << arguments;
+    EXPECT_THAT(outcome.error, StartsWith("pencilscan: "));
+    EXPECT_THAT(outcome.error, HasSubstr(part));
+    EXPECT_THAT(outcome.error, EndsWith("\n"));
+    EXPECT_EQ(std::count(outcome.error.begin(), outcome.error.end(), '\n'), 1) << outcome.error;
+    EXPECT_EQ(file_count(), before) << arguments;
+  }
+
+  /// The same complaint from every command that needs the rig and nothing else.
+  void expect_bad_rig(const std::string& from, const std::string& to, const std::string& part) {
+    make_rig(from, to);
+    for (const char* arguments : {"pattern --rig rig.json --out out", "rig check --rig rig.json"}) {
+      expect_bad(arguments, "rig.json: " + part);
+    }
+  }
+
+  fs::path folder_;
+};
+
+TEST_F(Program, RingPatternAndCheckWorkTogether) {
+  make_rig();
+  EXPECT_EQ(run("pattern --rig rig.json --out out --json figures.json").code, 0);
+  for (int i = 0; i < 6; ++i) {
+    EXPECT_TRUE(fs::exists(folder_ / ("out/proj" + std::to_string(i) + ".png")));
+  }
+  EXPECT_THAT(slurp(folder_ / "figures.json"), HasSubstr("\"lines\""));
+  EXPECT_EQ(run("rig check --rig rig.json --json check.json").code, 0);
+  EXPECT_THAT(slurp(folder_ / "check.json"), HasSubstr("\"warnings\": []"));
+}
+
+TEST_F(Program, HelpAndVersionSucceed) {
+  for (const char* arguments :
+       {"--help", "--version", "pattern --help", "rig ring --help", "rig check --help"}) {
+    EXPECT_EQ(run(arguments).code, 0) << arguments;
+  }
+}
+
+TEST_F(Program, CommandLineErrorsAreBadInput) {
+  expect_bad("", "subcommand");
+  expect_bad("dance", "unknown command dance");
+  expect_bad("pattern --out out", "--rig");
+  expect_bad("pattern --rig rig.json --out out --colour red", "--colour");
+  expect_bad("rig ring --out rig.json --cameras 0", "--cameras: Value 0 not in range");
+  expect_bad("rig ring --out rig.json --pitch-px nan", "--pitch-px");
+  expect_bad("rig ring --out rig.json --threads -1", "--threads");
+  expect_bad("rig ring --out rig.json --line-width-px 13", "--line-width-px = 13.0: must be");
+  expect_bad("rig ring --out rig.json --distance-mm 100", "--distance-mm = 100.0: must be");
+}
+
+TEST_F(Program, MissingOrBrokenRigFilesAreBadInput) {
+  expect_bad("pattern --rig none.json --out out", "none.json: the file does not exist");
+  expect_bad("rig check --rig .", "must be a file");
+  std::ofstream(folder_ / "rig.json") << "{\"format\": ";
+  expect_bad("rig check --rig rig.json", "rig.json: must be JSON");
+}
+
+TEST_F(Program, RigRulesNameFieldAndValue) {
+  expect_bad_rig("\"unit\": \"mm\"", "\"unit\": \"mm\", \"units\": 1", "units = 1: unknown key");
+  expect_bad_rig("\"unit\": \"mm\",", "", "unit: this key is missing");
+  expect_bad_rig("2300.0", "NaN", "must be JSON (which has no NaN or Infinity)");
+  expect_bad_rig("2300.0", "1e999", "must be JSON");
+  expect_bad_rig("2300.0", "-1", "cameras[0].K[0][0] = -1: must be > 0");
+  expect_bad_rig("\"R\": [[", "\"R\": [[7, 0, 0], [", "cameras[0].R");
+  expect_bad_rig("\"cam1\"", "\"cam0\"", "cameras[1].name = \"cam0\": names must differ");
+  expect_bad_rig("\"pitch_px\": 12.0", "\"pitch_px\": 0",
+                 "projectors[0].pattern.pitch_px = 0: must be > 0");
+  expect_bad_rig("\"blue\"", "\"navy\"",
+                 "projectors[0].pattern.colors[0] = \"navy\": must be blue");
+}
+
+TEST_F(Program, ARotationThatIsNoneIsBadInput) {
+  make_rig();
+  std::string text = slurp(folder_ / "rig.json");
+  const auto begin = text.find("\"R\": ") + 5;
+  const auto end = text.find("]]", begin) + 2;
+  text.replace(begin, end - begin, "[[1,0,0],[0,1,0],[0,0,2]]");
+  std::ofstream(folder_ / "rig.json") << text;
+  expect_bad("rig check --rig rig.json",
+             "rig.json: cameras[0].R = [[1,0,0],[0,1,0],[0,0,2]]: must be a rotation");
+}
+
+TEST_F(Program, AProjectorWithoutPatternShowsNothing) {
+  make_rig();
+  std::string text = slurp(folder_ / "rig.json");
+  const auto begin = text.find(",\n   \"pattern\"");
+  ASSERT_NE(begin, std::string::npos);
+  text.erase(begin, text.find('}', begin) + 1 - begin);
+  std::ofstream(folder_ / "rig.json") << text;
+  expect_bad("pattern --rig rig.json --out out", "rig.json: projectors[0].pattern: this key");
+}
+
+TEST_F(Program, AFullDiskIsAFailedStageAndLeavesNothing) {
+  make_rig();
+  const std::size_t before = file_count();
+  // Patterns compress well: one block of 512 bytes is too little for any of them.
+  const Outcome outcome = run("pattern --rig rig.json --out .", "ulimit -f 1");
+  EXPECT_EQ(outcome.code, 1);
+  EXPECT_THAT(outcome.error, HasSubstr("cannot be written"));
+  EXPECT_EQ(file_count(), before);
+}
+
+}  // namespace
