@@ -52,7 +52,7 @@ struct Fit {
   float amplitude = 0;
   float offset = 0;
   float width = 0;
-  float residual2 = 0;    ///< mean squared residual, degrees of freedom taken off
+  float residual2 = 0;    ///< noise variance from the odd part of the residual
   float offset_gain = 0;  ///< variance of offset for unit residual variance
   bool good = false;
 };
@@ -66,12 +66,11 @@ Fit fit_profile(const Profile& profile, int half, float amplitude, float width) 
   Vec5 x;
   x << std::max(amplitude, 1e-4F), 0, width, std::max(0.F, background - 0.1F * amplitude), 0;
   Mat5 N;
-  float sum2 = 0;
+  Profile residual{};
   constexpr int kIterations = 4;
   for (int iteration = 0; iteration < kIterations; ++iteration) {
     N.setZero();
     Vec5 g = Vec5::Zero();
-    sum2 = 0;
     const float s = x[2];
     for (int o = -half; o <= half; ++o) {
       const float d = (static_cast<float>(o) - x[1]) / s;
@@ -82,7 +81,7 @@ Fit fit_profile(const Profile& profile, int half, float amplitude, float width) 
       row << e, x[0] * e * d / s, x[0] * e * d * d / s, 1, static_cast<float>(o);
       N.noalias() += row * row.transpose();
       g.noalias() += row * r;
-      sum2 += r * r;
+      residual[static_cast<std::size_t>(kMaxHalf + o)] = r;
     }
     Mat5 damped = N;
     const float scale = x[0] * x[0];
@@ -102,7 +101,15 @@ Fit fit_profile(const Profile& profile, int half, float amplitude, float width) 
   fit.amplitude = x[0];
   fit.offset = x[1];
   fit.width = x[2];
-  fit.residual2 = sum2 / static_cast<float>(std::max(1, 2 * half + 1 - 4));
+  // Only the odd part of the residual can move the line; the even part holds the misfit of a
+  // Gaussian to a blurred box, which is no noise. Two of the parameters (offset, slope) are odd.
+  float odd2 = 0;
+  for (int o = 1; o <= half; ++o) {
+    const float d = residual[static_cast<std::size_t>(kMaxHalf + o)] -
+                    residual[static_cast<std::size_t>(kMaxHalf - o)];
+    odd2 += 0.5F * d * d;
+  }
+  fit.residual2 = odd2 / static_cast<float>(half - 2);
   N(2, 2) += 0.2F * x[0] * x[0];
   Vec5 unit = Vec5::Zero();
   unit[1] = 1;
@@ -146,9 +153,10 @@ void fit_curve(const cv::Mat& residual, bool first_round, int half_arc, Curve& c
     }
     for (float& m : mean) m /= static_cast<float>(2 * r + 1);
     const CurvePoint& p = points[static_cast<std::size_t>(i)];
-    const float width = first_round ? 1.5F : p.width_px;
-    const int half =
-        first_round ? 4 : std::clamp(static_cast<int>(std::lround(2.4F * width)) + 1, 4, kMaxHalf);
+    const float width = p.width_px;
+    // At first the neighbours are still in the image: a shorter profile sees less of them.
+    const int half = std::clamp(static_cast<int>(std::lround(2.4F * width)) + (first_round ? 0 : 1),
+                                4, kMaxHalf);
     const float top = mean[kMaxHalf] - std::min(mean[static_cast<std::size_t>(kMaxHalf - half)],
                                                 mean[static_cast<std::size_t>(kMaxHalf + half)]);
     fits[static_cast<std::size_t>(i)] = fit_profile(mean, half, top, width);
@@ -158,7 +166,6 @@ void fit_curve(const cv::Mat& residual, bool first_round, int half_arc, Curve& c
     const Fit& fit = fits[static_cast<std::size_t>(i)];
     if (!fit.good) {
       p.amplitude = 0;
-      p.width_px = p.width_px > 0 ? p.width_px : 1.5F;
       p.sigma_px = 1;
       continue;
     }

@@ -305,6 +305,7 @@ std::vector<Ridgel> merged_scales(const cv::Mat& presence, const std::vector<Rid
   constexpr float kReachPx = 5;        // half the width of the widest line
   constexpr float kParallelCosine = 0.94F;
   constexpr float kFlatTop = 0.88F;
+  constexpr float kWideLinePx = 2.6F;
   const RidgelRows rows(fine, presence.rows);
   std::vector<char> is_edge(fine.size(), 0);
   std::vector<Ridgel> result;
@@ -328,6 +329,7 @@ std::vector<Ridgel> merged_scales(const cv::Mat& presence, const std::vector<Rid
     if (!is_middle) continue;
     for (const std::size_t i : beside) is_edge[i] = 1;
     result.push_back(w);
+    result.back().width_px = kWideLinePx;
   }
   for (std::size_t i = 0; i < fine.size(); ++i) {
     if (is_edge[i] == 0) result.push_back(fine[i]);

@@ -7,9 +7,10 @@ namespace pencilscan {
 
 /// A local piece of a bright line: a maximum across one direction of the oriented filter.
 struct Ridgel {
-  float x = 0, y = 0;    ///< sub-pixel position
-  float nx = 1, ny = 0;  ///< unit normal
-  float response = 0;    ///< negative second derivative across, smoothed along
+  float x = 0, y = 0;     ///< sub-pixel position
+  float nx = 1, ny = 0;   ///< unit normal
+  float response = 0;     ///< negative second derivative across, smoothed along
+  float width_px = 1.5F;  ///< first guess of the profile's Gaussian width
 };
 
 struct RidgeOptions {

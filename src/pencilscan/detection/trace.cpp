@@ -123,7 +123,11 @@ std::vector<std::vector<int>> chains_of(const std::vector<int>& best) {
   return chains;
 }
 
-using Polyline = std::vector<Vector2f>;
+struct Vertex {
+  Vector2f position;
+  float width_px;
+};
+using Polyline = std::vector<Vertex>;
 
 std::vector<Polyline> link_ridgels(std::span<const Ridgel> ridgels, cv::Size size,
                                    const TraceOptions& options) {
@@ -143,7 +147,9 @@ std::vector<Polyline> link_ridgels(std::span<const Ridgel> ridgels, cv::Size siz
   for (const auto& chain : chains_of(best_facing_ends(ends, index, rule))) {
     if (chain.size() < 3) continue;
     Polyline line;
-    for (const int e : chain) line.push_back(ends[static_cast<std::size_t>(e)].position);
+    for (const int e : chain)
+      line.push_back({ends[static_cast<std::size_t>(e)].position,
+                      ridgels[static_cast<std::size_t>(e / 2)].width_px});
     lines.push_back(std::move(line));
   }
   return lines;
@@ -153,16 +159,19 @@ Vector2f outward_at_end(const Polyline& line, bool front) {
   constexpr std::size_t kReach = 5;
   const std::size_t n = line.size();
   const std::size_t k = std::min(kReach, n - 1);
-  return (front ? line[0] - line[k] : line[n - 1] - line[n - 1 - k]).normalized();
+  return (front ? line[0].position - line[k].position
+                : line[n - 1].position - line[n - 1 - k].position)
+      .normalized();
 }
 
 void append_bridged(Polyline& line, const Polyline& next) {
   if (!line.empty()) {
-    const Vector2f from = line.back();
-    const Vector2f way = next.front() - from;
+    const Vertex from = line.back();
+    const Vector2f way = next.front().position - from.position;
     const int missing = static_cast<int>(std::lround(way.norm())) - 1;
     for (int k = 1; k <= missing; ++k) {
-      line.push_back(from + way * (static_cast<float>(k) / static_cast<float>(missing + 1)));
+      const float share = static_cast<float>(k) / static_cast<float>(missing + 1);
+      line.push_back({from.position + share * way, from.width_px});
     }
   }
   line.insert(line.end(), next.begin(), next.end());
@@ -172,8 +181,8 @@ std::vector<Polyline> bridge_gaps(std::vector<Polyline> lines, cv::Size size, do
   // Each item is a line with two far-apart ends: index both, by end.
   std::vector<End> ends;
   for (const Polyline& line : lines) {
-    ends.push_back({line.front(), outward_at_end(line, true)});
-    ends.push_back({line.back(), outward_at_end(line, false)});
+    ends.push_back({line.front().position, outward_at_end(line, true)});
+    ends.push_back({line.back().position, outward_at_end(line, false)});
   }
   const auto max_gap = static_cast<float>(max_gap_px);
   PixelIndex index(size, ends.size());
@@ -219,9 +228,10 @@ std::vector<Curve> trace_curves(std::span<const Ridgel> ridgels, cv::Size image_
   for (const Polyline& line : lines) {
     if (static_cast<int>(line.size()) < options.min_points) continue;
     Curve curve;
-    for (const Vector2f& p : line) {
+    for (const Vertex& v : line) {
       CurvePoint point;
-      point.position = p;
+      point.position = v.position;
+      point.width_px = v.width_px;
       curve.points.push_back(point);
     }
     curves.push_back(std::move(curve));

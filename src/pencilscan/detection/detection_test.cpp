@@ -1,0 +1,195 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+#include <vector>
+
+#include "pencilscan/core/random.h"
+#include "pencilscan/detection/detect.h"
+
+namespace pencilscan {
+namespace {
+
+/// A straight bright line: centre line through `point` along (cos, sin), a box `width` wide with
+/// blurred edges, from -inf to where x reaches `end_x`.
+struct TestLine {
+  double x = 0, y = 0;
+  double angle = 0;  ///< of the direction
+  double width = 4;
+  double end_x = 1e9;
+  cv::Vec3f color = {0, 0, 1};
+
+  [[nodiscard]] double distance(double px, double py) const {
+    return -(px - x) * std::sin(angle) + (py - y) * std::cos(angle);
+  }
+};
+
+/// Image of lines over a small background, `noise` standard deviation; box edges blurred by 0.7 px.
+cv::Mat draw(const std::vector<TestLine>& lines, int width, int height, double noise) {
+  cv::Mat image(height, width, CV_32FC3);
+  const auto step = [](double d) { return 0.5 * (1 + std::erf(d / (0.7 * std::sqrt(2.0)))); };
+  for (int y = 0; y < height; ++y) {
+    Random random(11, static_cast<std::uint64_t>(y));
+    for (int x = 0; x < width; ++x) {
+      cv::Vec3f value(0.01F, 0.01F, 0.01F);
+      for (const TestLine& line : lines) {
+        const double d = line.distance(x, y);
+        const double level =
+            step(d + line.width / 2) * step(line.width / 2 - d) * step(line.end_x - x);
+        value += line.color * static_cast<float>(0.5 * level);
+      }
+      for (int c = 0; c < 3; ++c) value[c] += static_cast<float>(random.normal(0, noise));
+      image.at<cv::Vec3f>(y, x) = value;
+    }
+  }
+  return image;
+}
+
+/// One camera and one projector with blue/cyan vertical lines, another with red/yellow ones.
+Rig two_color_rig(int width, int height) {
+  Rig rig;
+  Camera camera;
+  camera.name = "cam";
+  camera.width = width;
+  camera.height = height;
+  camera.color_matrix = Mat3::Identity();
+  rig.cameras = {camera};
+  for (int p = 0; p < 2; ++p) {
+    Projector projector;
+    projector.width = projector.height = 100;
+    projector.patterns = {LinePattern()};
+    if (p == 1) projector.patterns[0].colors = {"red", "yellow"};
+    rig.projectors.push_back(projector);
+  }
+  return rig;
+}
+
+CameraDetection detect(const cv::Mat& image) {
+  const Rig rig = two_color_rig(image.cols, image.rows);
+  return detect_curves(rig.cameras[0], rig, color_families(rig), image);
+}
+
+TEST(ColorFamily, PresenceSeparatesThePapersColourPairs) {
+  const auto families = color_families(two_color_rig(10, 10));
+  ASSERT_EQ(families.size(), 2U);
+  EXPECT_NEAR((families[0].presence - Vec3(0, 0, 1)).norm(), 0, 1e-12);  // blue and cyan
+  EXPECT_NEAR((families[1].presence - Vec3(1, 0, 0)).norm(), 0, 1e-12);  // red and yellow
+  EXPECT_LT(families[0].leakage, 1e-12);
+}
+
+TEST(DetectCurves, SubPixelErrorIsSmallAndAsLargeAsSigmaSays) {
+  std::vector<TestLine> lines;
+  for (int i = 0; i < 8; ++i) lines.push_back({20.0 + 14.3 * i, 0, 1.45, 4, 1e9, {0, 0, 1}});
+  const CameraDetection found = detect(draw(lines, 160, 120, 0.01));
+  std::vector<double> errors;
+  std::size_t within = 0;
+  for (const Curve& curve : found.curves) {
+    for (const CurvePoint& p : curve.points) {
+      // At the image border profiles and averages are cut off.
+      if (p.position.y() < 8 || p.position.y() > 112) continue;
+      double best = 1e9;
+      for (const TestLine& line : lines) {
+        const double d = line.distance(p.position.x(), p.position.y());
+        if (std::abs(d) < std::abs(best)) best = d;
+      }
+      errors.push_back(std::abs(best));
+      within += std::abs(best) < p.sigma_px;
+    }
+  }
+  ASSERT_GT(errors.size(), 8 * 90U);  // nearly all of the 104 rows of each line
+  std::sort(errors.begin(), errors.end());
+  EXPECT_LT(errors[errors.size() / 2], 0.03);
+  EXPECT_LT(errors[errors.size() * 95 / 100], 0.10);
+  const double share = static_cast<double>(within) / static_cast<double>(errors.size());
+  EXPECT_GT(share, 0.45);  // ideal 0.68; neighbouring points share pixels, so the sample is small
+  EXPECT_LT(share, 0.95);
+}
+
+TEST(DetectCurves, EndsWhereTheLineEnds) {
+  const std::vector<TestLine> lines = {{0, 60, 0, 4, 100.0, {0, 0, 1}},
+                                       {0, 30, 0, 4, 70.5, {0, 0, 1}}};
+  const CameraDetection found = detect(draw(lines, 160, 90, 0.005));
+  ASSERT_EQ(found.curves.size(), 2U);
+  for (const Curve& curve : found.curves) {
+    float last = 0;
+    for (const CurvePoint& p : curve.points) last = std::max(last, p.position.x());
+    const double end = curve.points.front().position.y() > 45 ? 100.0 : 70.5;
+    EXPECT_NEAR(last, end, 1.5);  // no overshoot of the elongated filter, which reaches 7 px
+  }
+}
+
+TEST(DetectCurves, BothLinesSurviveACrossingOfOneColour) {
+  const std::vector<TestLine> lines = {{0, 60, 0.3, 4, 1e9, {0, 0, 1}},
+                                       {0, 100, -0.3, 4, 1e9, {0, 0, 1}}};
+  const CameraDetection found = detect(draw(lines, 160, 160, 0.005));
+  for (const TestLine& line : lines) {
+    std::size_t on_line = 0;
+    for (const Curve& curve : found.curves) {
+      for (const CurvePoint& p : curve.points)
+        on_line += std::abs(line.distance(p.position.x(), p.position.y())) < 0.3;
+    }
+    EXPECT_GT(on_line, 130U);
+  }
+}
+
+TEST(DetectCurves, WideLineIsOneCurveInItsMiddle) {
+  const std::vector<TestLine> lines = {{80, 0, 1.5, 8, 1e9, {0, 0, 1}}};
+  const CameraDetection found = detect(draw(lines, 160, 100, 0.005));
+  ASSERT_FALSE(found.curves.empty());
+  for (const Curve& curve : found.curves) {
+    for (const CurvePoint& p : curve.points)
+      EXPECT_NEAR(lines[0].distance(p.position.x(), p.position.y()), 0, 0.3);
+  }
+}
+
+TEST(DetectCurves, CodeTellsBlueFromCyanUnderCrossingLines) {
+  std::vector<TestLine> lines;
+  const int bits[] = {0, 0, 0, 1, 0, 1, 1, 1};
+  for (int i = 0; i < 8; ++i) {
+    lines.push_back({16.0 + 16 * i, 0, 1.5708, 4, 1e9, {0, bits[i] != 0 ? 1.F : 0.F, 1}});
+    lines.push_back({0, 10.0 + 14 * i, 0.05, 4, 1e9, {1, bits[7 - i] != 0 ? 1.F : 0.F, 0}});
+  }
+  const CameraDetection found = detect(draw(lines, 150, 125, 0.01));
+  const Rig rig = two_color_rig(150, 125);
+  const auto families = color_families(rig);
+  std::size_t right = 0;
+  std::size_t all = 0;
+  for (const Curve& curve : found.curves) {
+    if (curve.family != 0) continue;
+    for (std::size_t i = 0; i < curve.points.size(); ++i) {
+      const auto line = static_cast<int>(std::lround((curve.points[i].position.x() - 16) / 16));
+      const std::size_t cyan = families[0].colors[0] == "cyan" ? 0 : 1;
+      const bool says_cyan = curve.code[2 * i + cyan] > curve.code[2 * i + 1 - cyan];
+      ++all;
+      right += line >= 0 && line < 8 && says_cyan == (bits[line] != 0);
+    }
+  }
+  ASSERT_GT(all, 700U);
+  EXPECT_GT(static_cast<double>(right), 0.97 * static_cast<double>(all));
+}
+
+TEST(EstimateUnmixing, FindsTheCrosstalkThatTheRigDoesNotState) {
+  std::vector<TestLine> lines;
+  for (int i = 0; i < 24; ++i) {
+    lines.push_back({12.0 + 16 * i, 0, 1.5708, 4, 1e9, {0, i % 2 != 0 ? 1.F : 0.F, 1}});
+    lines.push_back({0, 10.0 + 16 * i, 0, 4, 1e9, {1, i % 2 != 0 ? 1.F : 0.F, 0}});
+  }
+  cv::Mat image = draw(lines, 400, 400, 0.002);
+  const cv::Matx33f mixing(0.92F, 0.06F, 0.02F, 0.04F, 0.92F, 0.04F, 0.02F, 0.06F, 0.92F);
+  cv::transform(image, image, mixing);
+  Rig rig = two_color_rig(400, 400);
+  rig.cameras[0].color_matrix.reset();
+  const Unmixing unmixing = estimate_unmixing(rig.cameras[0], rig, color_families(rig), image);
+  EXPECT_TRUE(unmixing.estimated);
+  const Mat3 mixed = unmixing.projector_from_camera.inverse();
+  // What reaches the presence channels of the other pair, as a share of the own channel.
+  constexpr double kTolerance = 0.06;
+  EXPECT_NEAR(mixed(0, 1), 0.065, kTolerance);
+  EXPECT_NEAR(mixed(2, 1), 0.065, kTolerance);
+  EXPECT_NEAR(mixed(0, 2), 0.022, kTolerance);
+  EXPECT_NEAR(mixed(2, 0), 0.022, kTolerance);
+}
+
+}  // namespace
+}  // namespace pencilscan
