@@ -2,6 +2,7 @@
 #include <fstream>
 #include <iostream>
 #include <memory>
+#include <nlohmann/json.hpp>
 
 #include "pencilscan/cli/command.h"
 #include "pencilscan/core/error.h"

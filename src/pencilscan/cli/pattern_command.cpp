@@ -1,6 +1,7 @@
 #include <filesystem>
 #include <iostream>
 #include <memory>
+#include <nlohmann/json.hpp>
 
 #include "pencilscan/cli/command.h"
 #include "pencilscan/core/error.h"

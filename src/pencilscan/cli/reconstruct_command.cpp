@@ -1,5 +1,6 @@
 #include <iostream>
 #include <memory>
+#include <nlohmann/json.hpp>
 
 #include "pencilscan/cli/command.h"
 #include "pencilscan/core/error.h"

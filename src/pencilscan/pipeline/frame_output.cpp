@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <nlohmann/json.hpp>
 
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/report/overlay.h"

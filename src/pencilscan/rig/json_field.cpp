@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <nlohmann/json.hpp>
 
 #include "pencilscan/core/error.h"
 
@@ -29,6 +30,12 @@ void JsonField::fail(const std::string& rule) const {
 std::string JsonField::child(const std::string& key) const {
   return field_.empty() ? key : field_ + "." + key;
 }
+
+bool JsonField::has(const char* key) const { return value_->contains(key); }
+
+bool JsonField::is_object() const { return value_->is_object(); }
+
+bool JsonField::is_array() const { return value_->is_array(); }
 
 void JsonField::check_keys(std::initializer_list<const char*> required,
                            std::initializer_list<const char*> optional) const {

@@ -1,7 +1,7 @@
 #pragma once
 
 #include <initializer_list>
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 
@@ -21,9 +21,9 @@ class JsonField {
   /// An object whose keys all are known and which has the required ones.
   void check_keys(std::initializer_list<const char*> required,
                   std::initializer_list<const char*> optional) const;
-  [[nodiscard]] bool has(const char* key) const { return value_->contains(key); }
-  [[nodiscard]] bool is_object() const { return value_->is_object(); }
-  [[nodiscard]] bool is_array() const { return value_->is_array(); }
+  [[nodiscard]] bool has(const char* key) const;
+  [[nodiscard]] bool is_object() const;
+  [[nodiscard]] bool is_array() const;
   [[nodiscard]] JsonField at(const std::string& key) const;
   /// The members of an object as (key, field).
   [[nodiscard]] std::vector<std::pair<std::string, JsonField>> members() const;
