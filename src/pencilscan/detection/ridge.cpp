@@ -32,10 +32,12 @@ Direction make_direction(int index, const RidgeOptions& options) {
   const bool major_x = std::abs(tx) > std::abs(ty);
   const double slope = major_x ? ty / tx : tx / ty;
   const double step = std::hypot(1, slope);
-  const int reach = static_cast<int>(std::ceil(2.5 * sigma / step));
+  const int stride = sigma > 2 ? 2 : 1;  // of a long Gaussian every second tap is enough
+  const int reach = stride * static_cast<int>(std::ceil(2.5 * sigma / step / stride));
   double sum = 0;
-  for (int j = -reach; j <= reach; ++j) sum += std::exp(-0.5 * std::pow(j * step / sigma, 2));
-  for (int j = -reach; j <= reach; ++j) {
+  for (int j = -reach; j <= reach; j += stride)
+    sum += std::exp(-0.5 * std::pow(j * step / sigma, 2));
+  for (int j = -reach; j <= reach; j += stride) {
     const double weight = std::exp(-0.5 * std::pow(j * step / sigma, 2)) / sum;
     const double minor = j * slope;
     const int low = static_cast<int>(std::floor(minor));
@@ -80,17 +82,18 @@ Hessian gaussian_hessian(const cv::Mat& image, double sigma) {
   return h;
 }
 
-/// Response level of pure noise: median absolute value of xx over the image, which is mostly
-/// background or smooth; and the strong response, 99th percentile of what exceeds that.
+/// Response level of pure noise, from the weak responses of the image, which is mostly background
+/// or smooth; and the strong response, 99th percentile of what exceeds that.
 struct Levels {
   float noise = 0;
   float strong = 0;
 };
 
-Levels response_levels(const Hessian& h) {
+/// Over `area`: the padding around it holds no noise.
+Levels response_levels(const Hessian& h, const cv::Rect& area) {
   std::vector<float> values;
-  for (int y = 2; y < h.xx.rows; y += 4) {
-    for (int x = 2; x < h.xx.cols; x += 4) {
+  for (int y = area.y + 1; y < area.br().y; y += 3) {
+    for (int x = area.x + 1; x < area.br().x; x += 3) {
       values.push_back(-(h.xx.at<float>(y, x) + h.yy.at<float>(y, x)));
     }
   }
@@ -98,11 +101,11 @@ Levels response_levels(const Hessian& h) {
   std::vector<float> magnitude(values.size());
   std::transform(values.begin(), values.end(), magnitude.begin(),
                  [](float v) { return std::abs(v); });
-  // The lower quartile of |N(0, s)| is 0.3186 s: background even if lines cover half the image.
-  const auto quartile = magnitude.begin() + static_cast<std::ptrdiff_t>(magnitude.size() / 4);
-  std::nth_element(magnitude.begin(), quartile, magnitude.end());
+  // The lower decile of |N(0, s)| is 0.1257 s: background even if lines cover most of the image.
+  const auto decile = magnitude.begin() + static_cast<std::ptrdiff_t>(magnitude.size() / 10);
+  std::nth_element(magnitude.begin(), decile, magnitude.end());
   Levels levels;
-  levels.noise = *quartile / 0.3186F / std::numbers::sqrt2_v<float>;
+  levels.noise = *decile / 0.1257F / std::numbers::sqrt2_v<float>;
   const float floor = 5 * levels.noise;
   std::erase_if(values, [&](float v) { return v <= floor; });
   if (!values.empty()) {
@@ -232,7 +235,7 @@ std::vector<Ridgel> ridgels_at_scale(const cv::Mat& presence, const RidgeOptions
   cv::copyMakeBorder(presence, padded, border, border + kTile, border, border + kTile,
                      cv::BORDER_REPLICATE);
   const Hessian h = gaussian_hessian(padded, options.sigma_across_px);
-  const Levels levels = response_levels(h);
+  const Levels levels = response_levels(h, {border, border, presence.cols, presence.rows});
   // Smoothing along a line keeps its response and divides that of white noise by about 2.
   const float threshold = std::max(static_cast<float>(options.noise_factor) * 0.5F * levels.noise,
                                    static_cast<float>(options.relative_threshold) * levels.strong);
@@ -337,15 +340,30 @@ std::vector<Ridgel> merged_scales(const cv::Mat& presence, const std::vector<Rid
   return result;
 }
 
+/// Ridgels of the half-size image in full-size pixels: two for each, so that they stay about one
+/// pixel apart along the line.
+std::vector<Ridgel> enlarged(const std::vector<Ridgel>& half_size) {
+  std::vector<Ridgel> result;
+  result.reserve(2 * half_size.size());
+  for (const Ridgel& r : half_size) {
+    for (const float along : {-0.5F, 0.5F}) {
+      Ridgel twice = r;
+      twice.x = 2 * r.x - along * r.ny;
+      twice.y = 2 * r.y + along * r.nx;
+      result.push_back(twice);
+    }
+  }
+  return result;
+}
+
 }  // namespace
 
 std::vector<Ridgel> find_ridgels(const cv::Mat& presence, const RidgeOptions& options) {
   std::vector<Ridgel> fine = ridgels_at_scale(presence, options);
-  if (options.wide_factor <= 1) return fine;
-  RidgeOptions wide = options;
-  wide.sigma_across_px *= options.wide_factor;
-  wide.sigma_along_px *= options.wide_factor;
-  return merged_scales(presence, fine, ridgels_at_scale(presence, wide));
+  if (!options.find_wide) return fine;
+  cv::Mat half_size;
+  cv::pyrDown(presence, half_size);
+  return merged_scales(presence, fine, enlarged(ridgels_at_scale(half_size, options)));
 }
 
 }  // namespace pencilscan

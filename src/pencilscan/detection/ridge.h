@@ -19,7 +19,7 @@ struct RidgeOptions {
   int orientations = 12;         ///< >= 6
   double noise_factor = 5.0;     ///< threshold in standard deviations of the background's response
   double relative_threshold = 0.05;  ///< of the strong (99th percentile) response
-  double wide_factor = 2;            ///< scale of the second look for wide lines; <= 1: none
+  bool find_wide = true;             ///< look again at half the size, for lines twice as wide
 };
 
 /// Ridgels of one presence image, in (x, y, direction) space: where two lines of one colour cross,
