@@ -1,6 +1,6 @@
 #include "pencilscan/detection/refine.h"
 
-#include <Eigen/Cholesky>
+#include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -14,8 +14,12 @@ constexpr int kMaxHalf = 7;  ///< largest half-length of a profile, px
 constexpr float kMinWidth = 0.6F;
 constexpr float kMaxWidth = 4.5F;
 constexpr float kModelReach = 3.0F;  ///< profiles are rendered to this many widths
+constexpr float kWidthPrior = 0.2F;  ///< weight of the width's prior, in profile samples
 
-using Profile = std::array<float, 2 * kMaxHalf + 1>;
+/// Values across a curve at -kMaxHalf..kMaxHalf px; one more, never used, fills the last register.
+using Profile = Eigen::Array<float, 2 * kMaxHalf + 2, 1>;
+
+Profile profile_offsets() { return Profile::LinSpaced(-kMaxHalf, kMaxHalf + 1); }
 
 /// Places points on a local parabola through their neighbours, and sets the normals.
 void smooth_positions(std::vector<CurvePoint>& points, int reach) {
@@ -30,16 +34,25 @@ void smooth_positions(std::vector<CurvePoint>& points, int reach) {
                               points[static_cast<std::size_t>(low)].position)
                                  .normalized();
     const Vector2f normal(tangent.y(), -tangent.x());
-    Eigen::Matrix3f N = 1e-3F * Eigen::Matrix3f::Identity();
+    // Least squares for a0 + a1 t + a2 t^2; m[k] is the sum of t^k.
+    std::array<float, 5> m{};
     Eigen::Vector3f b = Eigen::Vector3f::Zero();
     for (int j = low; j <= high; ++j) {
       const Vector2f d = points[static_cast<std::size_t>(j)].position - center;
       const float t = d.dot(tangent) * 0.25F;
-      const Eigen::Vector3f row(1, t, t * t);
-      N += row * row.transpose();
-      b += row * d.dot(normal);
+      const float v = d.dot(normal);
+      const float t2 = t * t;
+      m[0] += 1;
+      m[1] += t;
+      m[2] += t2;
+      m[3] += t2 * t;
+      m[4] += t2 * t2;
+      b += Eigen::Vector3f(v, v * t, v * t2);
     }
-    const Eigen::Vector3f x = N.ldlt().solve(b);
+    Eigen::Matrix3f N;
+    N << m[0], m[1], m[2], m[1], m[2], m[3], m[2], m[3], m[4];
+    N.diagonal().array() += 1e-3F;
+    const Eigen::Vector3f x = N.inverse() * b;
     positions[static_cast<std::size_t>(i)] = center + x[0] * normal;
     const Vector2f slope = tangent + 0.25F * x[1] * normal;
     points[static_cast<std::size_t>(i)].normal = Vector2f(slope.y(), -slope.x()).normalized();
@@ -57,65 +70,63 @@ struct Fit {
   bool good = false;
 };
 
-/// Gauss-Newton for A exp(-(o - x0)^2 / 2 s^2) + c0 + c1 o; s is held by a weak prior at `width`.
+/// Gauss-Newton for A exp(-(o - x0)^2 / 2 s^2) + c0 + c1 o within +-half px; s is held by a weak
+/// prior at `width`. c0 and c1 are eliminated: everything is taken without its part in 1 and o.
 Fit fit_profile(const Profile& profile, int half, float amplitude, float width) {
-  using Vec5 = Eigen::Matrix<float, 5, 1>;
-  using Mat5 = Eigen::Matrix<float, 5, 5>;
-  const float background = 0.5F * (profile[static_cast<std::size_t>(kMaxHalf - half)] +
-                                   profile[static_cast<std::size_t>(kMaxHalf + half)]);
-  Vec5 x;
-  x << std::max(amplitude, 1e-4F), 0, width, std::max(0.F, background - 0.1F * amplitude), 0;
-  Mat5 N;
-  Profile residual{};
-  constexpr int kIterations = 4;
-  for (int iteration = 0; iteration < kIterations; ++iteration) {
-    N.setZero();
-    Vec5 g = Vec5::Zero();
-    const float s = x[2];
-    for (int o = -half; o <= half; ++o) {
-      const float d = (static_cast<float>(o) - x[1]) / s;
-      const float e = std::exp(-0.5F * d * d);
-      const float r = profile[static_cast<std::size_t>(kMaxHalf + o)] -
-                      (x[0] * e + x[3] + x[4] * static_cast<float>(o));
-      Vec5 row;
-      row << e, x[0] * e * d / s, x[0] * e * d * d / s, 1, static_cast<float>(o);
-      N.noalias() += row * row.transpose();
-      g.noalias() += row * r;
-      residual[static_cast<std::size_t>(kMaxHalf + o)] = r;
-    }
-    Mat5 damped = N;
-    const float scale = x[0] * x[0];
-    damped(2, 2) += 0.2F * scale;
-    g[2] += 0.2F * scale * (width - x[2]);
-    damped.diagonal() *= 1.0001F;
-    damped(0, 0) += 1e-6F;
-    const Vec5 step = damped.ldlt().solve(g);
-    x[0] += step[0];
-    x[1] += std::clamp(step[1], -0.7F, 0.7F);
-    x[2] = std::clamp(x[2] + std::clamp(step[2], -0.5F, 0.5F), kMinWidth, kMaxWidth);
-    x[3] += step[3];
-    x[4] += step[4];
-    if (!(x[0] > 1e-5F)) return {};
+  constexpr int kMaxIterations = 8;  // most need two, those of dense lines all
+  constexpr float kSmallStep = 0.01F;
+  const Profile offsets = profile_offsets();
+  const Profile inside = (offsets.abs() < static_cast<float>(half) + 0.5F).cast<float>();
+  const Profile mean_weights = inside / inside.sum();
+  const Profile slope_weights = inside * offsets / (inside * offsets.square()).sum();
+  const auto without_background = [&](const Profile& p) -> Profile {
+    return inside * (p - (p * mean_weights).sum() - (p * slope_weights).sum() * offsets);
+  };
+  const Profile measured = without_background(profile);
+  float height = std::max(amplitude, 1e-4F);
+  float center = 0;
+  float s = width;
+  Profile residual = Profile::Zero();
+  Eigen::Matrix3f covariance = Eigen::Matrix3f::Zero();
+  for (int iteration = 0; iteration < kMaxIterations; ++iteration) {
+    // Derivatives by A, x0 A / s and s A / s: pure numbers whatever the amplitude.
+    const Profile d = (offsets - center) / s;
+    const Profile e = (-0.5F * d.square()).exp();
+    const Profile by_height = without_background(e);
+    const Profile by_center = without_background(e * d);
+    const Profile by_width = without_background(e * d.square());
+    residual = measured - height * by_height;
+    Eigen::Matrix3f N;
+    N(0, 0) = by_height.square().sum();
+    N(0, 1) = N(1, 0) = (by_height * by_center).sum();
+    N(0, 2) = N(2, 0) = (by_height * by_width).sum();
+    N(1, 1) = by_center.square().sum();
+    N(1, 2) = N(2, 1) = (by_center * by_width).sum();
+    N(2, 2) = by_width.square().sum() + kWidthPrior * s * s;
+    const Eigen::Vector3f g((residual * by_height).sum(), (residual * by_center).sum(),
+                            (residual * by_width).sum() + kWidthPrior * height * s * (width - s));
+    covariance = N.inverse();
+    const Eigen::Vector3f step = covariance * g;
+    const float scale = s / height;
+    covariance(1, 1) *= scale * scale;
+    height += step[0];
+    center += std::clamp(step[1] * scale, -0.7F, 0.7F);
+    s = std::clamp(s + std::clamp(step[2] * scale, -0.5F, 0.5F), kMinWidth, kMaxWidth);
+    if (!(height > 1e-5F)) return {};
+    if (std::abs(step[1] * scale) < kSmallStep && std::abs(step[2] * scale) < 5 * kSmallStep) break;
   }
   Fit fit;
-  fit.amplitude = x[0];
-  fit.offset = x[1];
-  fit.width = x[2];
+  fit.amplitude = height;
+  fit.offset = center;
+  fit.width = s;
+  fit.offset_gain = covariance(1, 1);
   // Only the odd part of the residual can move the line; the even part holds the misfit of a
   // Gaussian to a blurred box, which is no noise. Two of the parameters (offset, slope) are odd.
-  float odd2 = 0;
-  for (int o = 1; o <= half; ++o) {
-    const float d = residual[static_cast<std::size_t>(kMaxHalf + o)] -
-                    residual[static_cast<std::size_t>(kMaxHalf - o)];
-    odd2 += 0.5F * d * d;
-  }
-  fit.residual2 = odd2 / static_cast<float>(half - 2);
-  N(2, 2) += 0.2F * x[0] * x[0];
-  Vec5 unit = Vec5::Zero();
-  unit[1] = 1;
-  fit.offset_gain = N.ldlt().solve(unit)[1];
-  fit.good = std::isfinite(x[1]) && std::isfinite(fit.offset_gain) && fit.offset_gain > 0 &&
-             std::abs(x[1]) < 1.6F;
+  const auto right = residual.segment<kMaxHalf>(kMaxHalf + 1);
+  const auto left = residual.head<kMaxHalf>().reverse();
+  fit.residual2 = 0.5F * (right - left).square().sum() / static_cast<float>(half - 2);
+  fit.good = std::isfinite(center) && std::isfinite(fit.offset_gain) && fit.offset_gain > 0 &&
+             std::abs(center) < 1.6F;
   return fit;
 }
 
@@ -124,17 +135,18 @@ Fit fit_profile(const Profile& profile, int half, float amplitude, float width) 
 void sample_profiles(const cv::Mat& residual, const std::vector<CurvePoint>& points, bool add_own,
                      std::vector<Profile>& profiles) {
   profiles.resize(points.size());
+  const Profile offsets = profile_offsets();
   for (std::size_t i = 0; i < points.size(); ++i) {
     const CurvePoint& p = points[i];
-    for (int o = -kMaxHalf; o <= kMaxHalf; ++o) {
-      const auto fo = static_cast<float>(o);
-      float value = sample_bilinear(residual, p.position.x() + fo * p.normal.x(),
-                                    p.position.y() + fo * p.normal.y());
-      if (add_own && p.amplitude > 0 && std::abs(fo) <= kModelReach * p.width_px) {
-        value += p.amplitude * std::exp(-0.5F * fo * fo / (p.width_px * p.width_px));
-      }
-      profiles[i][static_cast<std::size_t>(o + kMaxHalf)] = value;
+    Profile& profile = profiles[i];
+    for (int o = 0; o <= 2 * kMaxHalf; ++o) {
+      const Vector2f at = p.position + static_cast<float>(o - kMaxHalf) * p.normal;
+      profile[o] = sample_bilinear(residual, at.x(), at.y());
     }
+    profile[2 * kMaxHalf + 1] = 0;
+    if (!add_own || p.amplitude <= 0) continue;
+    const Profile d = offsets / p.width_px;
+    profile += (d.abs() <= kModelReach).select(p.amplitude * (-0.5F * d.square()).exp(), 0.F);
   }
 }
 
@@ -146,19 +158,15 @@ void fit_curve(const cv::Mat& residual, bool first_round, int half_arc, Curve& c
   std::vector<Fit> fits(points.size());
   for (int i = 0; i < n; ++i) {
     const int r = std::min({half_arc, i, n - 1 - i});  // symmetric: no shift towards the inside
-    Profile mean{};
-    for (int j = i - r; j <= i + r; ++j) {
-      for (std::size_t o = 0; o < mean.size(); ++o)
-        mean[o] += profiles[static_cast<std::size_t>(j)][o];
-    }
-    for (float& m : mean) m /= static_cast<float>(2 * r + 1);
+    Profile mean = Profile::Zero();
+    for (int j = i - r; j <= i + r; ++j) mean += profiles[static_cast<std::size_t>(j)];
+    mean /= static_cast<float>(2 * r + 1);
     const CurvePoint& p = points[static_cast<std::size_t>(i)];
     const float width = p.width_px;
     // At first the neighbours are still in the image: a shorter profile sees less of them.
     const int half = std::clamp(static_cast<int>(std::lround(2.4F * width)) + (first_round ? 0 : 1),
                                 4, kMaxHalf);
-    const float top = mean[kMaxHalf] - std::min(mean[static_cast<std::size_t>(kMaxHalf - half)],
-                                                mean[static_cast<std::size_t>(kMaxHalf + half)]);
+    const float top = mean[kMaxHalf] - std::min(mean[kMaxHalf - half], mean[kMaxHalf + half]);
     fits[static_cast<std::size_t>(i)] = fit_profile(mean, half, top, width);
   }
   for (int i = 0; i < n; ++i) {
@@ -251,16 +259,55 @@ std::vector<Curve> cut_and_trim(const std::vector<Curve>& curves, const RefineOp
   return result;
 }
 
+/// Adds the profile between two points. Every image row (column for flat pieces) that the segment
+/// passes gets it once: the half-open range [from, to) makes neighbouring segments share no row.
+void render_segment(const CurvePoint& p, const CurvePoint& q, cv::Mat& model) {
+  if (p.amplitude <= 0 || q.amplitude <= 0) return;
+  const Vector2f way = q.position - p.position;
+  const Eigen::Index major = std::abs(p.normal.y()) < std::abs(p.normal.x()) ? 1 : 0;
+  const Eigen::Index minor = 1 - major;
+  if (std::abs(way[major]) < 1e-6F) return;
+  const float from = std::min(p.position[major], q.position[major]);
+  const float to = std::max(p.position[major], q.position[major]);
+  const int last_major = major == 1 ? model.rows - 1 : model.cols - 1;
+  const int last_minor = major == 1 ? model.cols - 1 : model.rows - 1;
+  for (int m = std::max(0, static_cast<int>(std::ceil(from)));
+       m <= last_major && static_cast<float>(m) < to; ++m) {
+    const float f = (static_cast<float>(m) - p.position[major]) / way[major];
+    const float center = p.position[minor] + f * way[minor];
+    const float amplitude = p.amplitude + f * (q.amplitude - p.amplitude);
+    const float width = p.width_px + f * (q.width_px - p.width_px);
+    const float lean = std::abs(p.normal[minor]);
+    const float reach = kModelReach * width / lean;
+    const int low = std::max(0, static_cast<int>(std::ceil(center - reach)));
+    const int high = std::min(last_minor, static_cast<int>(std::floor(center + reach)));
+    const float scale = -0.5F * lean * lean / (width * width);
+    for (int k = low; k <= high; ++k) {
+      const float d = static_cast<float>(k) - center;
+      const float value = amplitude * std::exp(scale * d * d);
+      (major == 1 ? model.at<float>(m, k) : model.at<float>(k, m)) += value;
+    }
+  }
+}
+
+/// The end point of a curve moved outwards: profiles near the end reach beyond it, and what is
+/// added back to them must have been subtracted.
+CurvePoint beyond(const CurvePoint& end, const CurvePoint& inner) {
+  constexpr float kOverhang = 2;
+  CurvePoint point = end;
+  point.position += kOverhang * (end.position - inner.position).normalized();
+  return point;
+}
+
 }  // namespace
 
 float sample_bilinear(const cv::Mat& image, float x, float y) {
-  const float fx0 = std::floor(x);
-  const float fy0 = std::floor(y);
-  const int ix = static_cast<int>(fx0);
-  const int iy = static_cast<int>(fy0);
-  if (ix < 0 || iy < 0 || ix + 1 >= image.cols || iy + 1 >= image.rows) return 0;
-  const float fx = x - fx0;
-  const float fy = y - fy0;
+  x = std::clamp(x, 0.F, static_cast<float>(image.cols - 1));
+  y = std::clamp(y, 0.F, static_cast<float>(image.rows - 1));
+  const int ix = std::min(static_cast<int>(x), image.cols - 2);
+  const int iy = std::min(static_cast<int>(y), image.rows - 2);
+  const float fx = x - static_cast<float>(ix);
+  const float fy = y - static_cast<float>(iy);
   const float* a = image.ptr<float>(iy) + ix;
   const float* b = image.ptr<float>(iy + 1) + ix;
   return (1 - fy) * ((1 - fx) * a[0] + fx * a[1]) + fy * ((1 - fx) * b[0] + fx * b[1]);
@@ -268,39 +315,14 @@ float sample_bilinear(const cv::Mat& image, float x, float y) {
 
 cv::Mat render_curves(const std::vector<Curve>& curves, cv::Size size) {
   cv::Mat model(size, CV_32F, cv::Scalar(0));
-  // Every image row (column for flat pieces) that a segment passes gets the profile once: the
-  // half-open range [from, to) makes neighbouring segments share no row.
   for (const Curve& curve : curves) {
-    for (std::size_t i = 0; i + 1 < curve.points.size(); ++i) {
-      const CurvePoint& p = curve.points[i];
-      const CurvePoint& q = curve.points[i + 1];
-      if (p.amplitude <= 0 || q.amplitude <= 0) continue;
-      const Vector2f way = q.position - p.position;
-      const Eigen::Index major = std::abs(p.normal.y()) < std::abs(p.normal.x()) ? 1 : 0;
-      const Eigen::Index minor = 1 - major;
-      if (std::abs(way[major]) < 1e-6F) continue;
-      const float from = std::min(p.position[major], q.position[major]);
-      const float to = std::max(p.position[major], q.position[major]);
-      const int last_major = major == 1 ? size.height - 1 : size.width - 1;
-      const int last_minor = major == 1 ? size.width - 1 : size.height - 1;
-      for (int m = std::max(0, static_cast<int>(std::ceil(from)));
-           m <= last_major && static_cast<float>(m) < to; ++m) {
-        const float f = (static_cast<float>(m) - p.position[major]) / way[major];
-        const float center = p.position[minor] + f * way[minor];
-        const float amplitude = p.amplitude + f * (q.amplitude - p.amplitude);
-        const float width = p.width_px + f * (q.width_px - p.width_px);
-        const float lean = std::abs(p.normal[minor]);
-        const float reach = kModelReach * width / lean;
-        const int low = std::max(0, static_cast<int>(std::ceil(center - reach)));
-        const int high = std::min(last_minor, static_cast<int>(std::floor(center + reach)));
-        const float scale = -0.5F * lean * lean / (width * width);
-        for (int k = low; k <= high; ++k) {
-          const float d = static_cast<float>(k) - center;
-          const float value = amplitude * std::exp(scale * d * d);
-          (major == 1 ? model.at<float>(m, k) : model.at<float>(k, m)) += value;
-        }
-      }
+    const std::size_t n = curve.points.size();
+    if (n < 2) continue;
+    render_segment(beyond(curve.points[0], curve.points[1]), curve.points[0], model);
+    for (std::size_t i = 0; i + 1 < n; ++i) {
+      render_segment(curve.points[i], curve.points[i + 1], model);
     }
+    render_segment(curve.points[n - 1], beyond(curve.points[n - 1], curve.points[n - 2]), model);
   }
   return model;
 }

@@ -10,7 +10,7 @@ namespace pencilscan {
 struct RefineOptions {
   int rounds = 3;    ///< fits of all curves, each with the others' last fit subtracted
   int half_arc = 3;  ///< profiles averaged on either side along the curve
-  double end_amplitude_ratio = 0.55;  ///< a curve ends where its amplitude falls below this share
+  double end_amplitude_ratio = 0.45;  ///< a curve ends where its amplitude falls below this share
                                       ///< of that 5 px further in
   double max_sigma_px = 0.5;          ///< less certain points are dropped
   int min_points = 6;
@@ -26,7 +26,7 @@ struct RefineOptions {
 /// Sum of the Gaussian profiles of all curves, CV_32FC1.
 [[nodiscard]] cv::Mat render_curves(const std::vector<Curve>& curves, cv::Size size);
 
-/// Bilinear sample, 0 outside.
+/// Bilinear sample; outside, the nearest pixel's value.
 [[nodiscard]] float sample_bilinear(const cv::Mat& image, float x, float y);
 
 }  // namespace pencilscan
