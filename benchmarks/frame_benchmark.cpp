@@ -42,7 +42,7 @@ void print_row(const std::string& stage, double seconds, double blur_seconds) {
 
 void run(const Rig& rig, const Frame& frame, int threads, int runs) {
   const ThreadLimit limit(threads);
-  cv::setNumThreads(threads);
+  cv::setNumThreads(1);  // the cameras share the threads
 
   // The reference before and after, so that a machine that became slower in between is seen.
   const double blur_before = reference_blur_seconds();

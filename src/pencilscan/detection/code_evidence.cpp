@@ -1,6 +1,6 @@
 #include "pencilscan/detection/code_evidence.h"
 
-#include <Eigen/Cholesky>
+#include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -61,7 +61,7 @@ std::vector<ColorAmplitude> color_amplitudes(const cv::Mat& image, const cv::Mat
     }
     // The others' coefficient lies between 0 and about 1: a ridge keeps it there when unobserved.
     normal(1, 1) += 1e-3F;
-    result[static_cast<std::size_t>(i)].rgb = normal.ldlt().solve(right).row(0).transpose();
+    result[static_cast<std::size_t>(i)].rgb = right.transpose() * normal.inverse().col(0);
   }
   return result;
 }

@@ -1,7 +1,9 @@
 #include "pencilscan/detection/detect.h"
 
+#include <algorithm>
+#include <opencv2/imgproc.hpp>
+
 #include "pencilscan/core/check.h"
-#include "pencilscan/core/parallel.h"
 
 namespace pencilscan {
 namespace {
@@ -18,6 +20,28 @@ std::size_t count_saturated(const cv::Mat& image) {
   return count;
 }
 
+/// The part of an image (linear light) that holds everything bright enough to be a line, with a
+/// margin for the filters. The object often covers a small part of the image only.
+cv::Rect lit_area(const cv::Mat& image) {
+  constexpr int kBlock = 8;
+  constexpr int kMargin = 24;
+  constexpr double kLitShare = 0.04;  // of the brightest block
+  cv::Mat blocks;
+  cv::resize(image, blocks,
+             {(image.cols + kBlock - 1) / kBlock, (image.rows + kBlock - 1) / kBlock}, 0, 0,
+             cv::INTER_AREA);
+  std::vector<cv::Mat> channels;
+  cv::split(blocks, channels);
+  const cv::Mat brightest = cv::max(channels[0], cv::max(channels[1], channels[2]));
+  double peak = 0;
+  cv::minMaxLoc(brightest, nullptr, &peak);
+  const cv::Rect lit = cv::boundingRect(brightest > kLitShare * peak);
+  const cv::Rect whole(0, 0, image.cols, image.rows);
+  if (lit.empty()) return whole;
+  return whole & cv::Rect(lit.x * kBlock - kMargin, lit.y * kBlock - kMargin,
+                          lit.width * kBlock + 2 * kMargin, lit.height * kBlock + 2 * kMargin);
+}
+
 }  // namespace
 
 CameraDetection detect_curves(const Camera& camera, const Rig& rig,
@@ -26,8 +50,10 @@ CameraDetection detect_curves(const Camera& camera, const Rig& rig,
   PENCILSCAN_CHECK(image.type() == CV_32FC3);
   CameraDetection result;
   result.saturated_pixels = count_saturated(image);
-  // Unmix the colour families.
-  const cv::Mat linear = linearized(image, camera.gamma);
+  // Unmix the colour families where there is light.
+  const cv::Mat whole = linearized(image, camera.gamma);
+  const cv::Rect area = lit_area(whole);
+  const cv::Mat linear = whole(area);
   result.unmixing = estimate_unmixing(camera, rig, families, linear);
   const cv::Mat rgb = unmixed(linear, result.unmixing);
   // Find and trace the curves of each family, then fit them together.
@@ -41,6 +67,10 @@ CameraDetection detect_curves(const Camera& camera, const Rig& rig,
   }
   // Read the colour code along each curve.
   measure_code(rgb, families, result.curves, options.code);
+  const Eigen::Vector2f corner(static_cast<float>(area.x), static_cast<float>(area.y));
+  for (Curve& curve : result.curves) {
+    for (CurvePoint& point : curve.points) point.position += corner;
+  }
   return result;
 }
 

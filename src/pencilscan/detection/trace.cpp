@@ -21,14 +21,15 @@ class PixelIndex {
     head_[cell] = item;
   }
 
+  /// Visits the items in a square of +-radius around p, and a few just outside.
   template <class Visit>
-  void around(const Vector2f& p, int radius, Visit visit) const {
-    const long cx = std::lround(p.x());
-    const long cy = std::lround(p.y());
-    for (long y = std::max(0L, cy - radius); y <= std::min<long>(size_.height - 1, cy + radius);
-         ++y) {
-      for (long x = std::max(0L, cx - radius); x <= std::min<long>(size_.width - 1, cx + radius);
-           ++x) {
+  void around(const Vector2f& p, float radius, Visit visit) const {
+    const long left = std::max(0L, std::lround(p.x() - radius));
+    const long top = std::max(0L, std::lround(p.y() - radius));
+    const long right = std::min<long>(size_.width - 1, std::lround(p.x() + radius));
+    const long bottom = std::min<long>(size_.height - 1, std::lround(p.y() + radius));
+    for (long y = top; y <= bottom; ++y) {
+      for (long x = left; x <= right; ++x) {
         for (int i = head_[cell_of(x, y)]; i >= 0; i = next_[static_cast<std::size_t>(i)]) visit(i);
       }
     }
@@ -64,11 +65,14 @@ struct LinkRule {
 std::vector<int> best_facing_ends(const std::vector<End>& ends, const PixelIndex& index,
                                   const LinkRule& rule) {
   std::vector<int> best(ends.size(), -1);
-  const int radius = static_cast<int>(std::ceil(rule.max_along)) + 1;
+  // The rule accepts what lies in a trapezoid ahead: search the square around that.
+  const float ahead = 0.5F * (rule.min_along + rule.max_along);
+  const float radius =
+      std::hypot(rule.max_along - ahead, rule.lateral_base + rule.lateral_slope * rule.max_along);
   for (std::size_t e = 0; e < ends.size(); ++e) {
     const End& end = ends[e];
     float best_cost = std::numeric_limits<float>::max();
-    index.around(end.position, radius, [&](int item) {
+    index.around(end.position + ahead * end.outward, radius, [&](int item) {
       if (item == static_cast<int>(e / 2)) return;
       for (int side = 0; side < 2; ++side) {
         const int f = 2 * item + side;
@@ -185,19 +189,20 @@ std::vector<Polyline> bridge_gaps(std::vector<Polyline> lines, cv::Size size, do
     ends.push_back({line.back().position, outward_at_end(line, false)});
   }
   const auto max_gap = static_cast<float>(max_gap_px);
+  const auto lateral_limit = [](float along) { return 0.6F + 0.2F * along; };
   PixelIndex index(size, ends.size());
   for (std::size_t e = 0; e < ends.size(); ++e) index.add(static_cast<int>(e), ends[e].position);
   std::vector<int> best(ends.size(), -1);
   for (std::size_t e = 0; e < ends.size(); ++e) {
     float best_cost = std::numeric_limits<float>::max();
-    index.around(ends[e].position, static_cast<int>(std::ceil(max_gap_px)) + 1, [&](int f) {
+    index.around(ends[e].position, std::hypot(max_gap, lateral_limit(max_gap)), [&](int f) {
       if (f / 2 == static_cast<int>(e / 2)) return;
       const End& other = ends[static_cast<std::size_t>(f)];
       const Vector2f way = other.position - ends[e].position;
       const float along = way.dot(ends[e].outward);
       const float cosine = -ends[e].outward.dot(other.outward);
       const float lateral = std::abs(way.x() * ends[e].outward.y() - way.y() * ends[e].outward.x());
-      if (along < 0 || along > max_gap || cosine < 0.9F || lateral > 0.6F + 0.2F * along) return;
+      if (along < 0 || along > max_gap || cosine < 0.9F || lateral > lateral_limit(along)) return;
       const float cost = along + 3 * lateral + 10 * (1 - cosine);
       if (cost < best_cost || (cost == best_cost && f < best[e])) {
         best_cost = cost;
