@@ -113,6 +113,7 @@ int run(const std::filesystem::path& rig_path, const std::filesystem::path& fram
       {"linear", Method::kLinear, MultiviewCost::kNormalized},
       {"multiview published", Method::kMultiview, MultiviewCost::kPublished},
       {"multiview", Method::kMultiview, MultiviewCost::kNormalized},
+      {"joint", Method::kJoint, MultiviewCost::kNormalized},
   };
   for (std::size_t k = 0; k < std::size(choices); ++k) {
     PointOptions options;

@@ -71,7 +71,7 @@ void add_reconstruct_command(CLI::App& app) {
       ->required();
   command->add_option("--out", options->out, "output folder, one folder per frame")->required();
   command->add_option("--method", options->method, "how lines are told apart")
-      ->check(CLI::IsMember({"linear", "multiview"}))
+      ->check(CLI::IsMember({"linear", "multiview", "joint"}))
       ->capture_default_str();
   command
       ->add_option("--multiview-cost", options->cost,

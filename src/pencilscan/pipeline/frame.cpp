@@ -66,7 +66,7 @@ PointResult measure_points(const Rig& rig, const Frame& frame, const PointOption
   result.times.push_back({"grid", grid_watch.seconds()});
 
   Stopwatch solution_watch;
-  result.labeling = solve(rig, result.graphs, options.solution);
+  result.labeling = solve(rig, result.families, result.graphs, options.solution);
   result.times.push_back({"solution", solution_watch.seconds()});
 
   Stopwatch triangulation_watch;

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "pencilscan/core/parallel.h"
+#include "pencilscan/solution/joint.h"
 #include "pencilscan/solution/linear.h"
 #include "pencilscan/solution/multiview.h"
 #include "pencilscan/solution/pencil_parameter.h"
@@ -89,11 +90,51 @@ ComponentResult solve_one(const Rig& rig, const GridGraph& graph, int component,
   return result;
 }
 
+/// Methods A and B: one component of one camera after the other.
+Labeling solve_components(const Rig& rig, std::span<const GridGraph> graphs,
+                          const SolutionOptions& options) {
+  Labeling labeling;
+  labeling.runs.resize(rig.cameras.size());
+  std::vector<ComponentTask> tasks;
+  std::vector<CurveIndex> indices;
+  indices.reserve(rig.cameras.size());
+  std::vector<const GridGraph*> of_camera(rig.cameras.size(), nullptr);
+  for (std::size_t g = 0; g < graphs.size(); ++g) {
+    const auto camera = static_cast<std::size_t>(graphs[g].camera);
+    of_camera[camera] = &graphs[g];
+    for (int k = 0; k < graphs[g].component_count; ++k) tasks.push_back({g, k});
+  }
+  const GridGraph nothing;
+  for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
+    indices.emplace_back(of_camera[c] != nullptr ? *of_camera[c] : nothing,
+                         cv::Size(rig.cameras[c].width, rig.cameras[c].height));
+  }
+  std::vector<ComponentResult> results(tasks.size());
+  parallel_for(tasks.size(), [&](std::size_t t) {
+    results[t] = solve_one(rig, graphs[tasks[t].graph], tasks[t].component, indices, options);
+  });
+  for (std::size_t t = 0; t < tasks.size(); ++t) {
+    const GridGraph& graph = graphs[tasks[t].graph];
+    auto& runs = labeling.runs[static_cast<std::size_t>(graph.camera)];
+    for (const auto& [curve, label] : results[t].labels) {
+      const auto points = graph.curves[static_cast<std::size_t>(curve)].points.size();
+      runs.push_back({curve, 0, static_cast<int>(points), label});
+    }
+    labeling.components.push_back(std::move(results[t].report));
+  }
+  for (auto& runs : labeling.runs) {
+    std::sort(runs.begin(), runs.end(),
+              [](const LabeledRun& a, const LabeledRun& b) { return a.curve < b.curve; });
+  }
+  return labeling;
+}
+
 }  // namespace
 
 std::optional<Method> method_from_name(std::string_view name) {
   if (name == "linear") return Method::kLinear;
   if (name == "multiview") return Method::kMultiview;
+  if (name == "joint") return Method::kJoint;
   return std::nullopt;
 }
 
@@ -109,34 +150,10 @@ int nearest_line(double coordinate, int local_id, int period, int line_count) {
   return local_id + period * static_cast<int>(std::clamp<long>(cycle, 0, last_cycle));
 }
 
-Labeling solve(const Rig& rig, std::span<const GridGraph> graphs, const SolutionOptions& options) {
-  Labeling labeling;
-  labeling.labels.resize(rig.cameras.size());
-  std::vector<ComponentTask> tasks;
-  std::vector<CurveIndex> indices;
-  indices.reserve(rig.cameras.size());
-  std::vector<const GridGraph*> of_camera(rig.cameras.size(), nullptr);
-  for (std::size_t g = 0; g < graphs.size(); ++g) {
-    const auto camera = static_cast<std::size_t>(graphs[g].camera);
-    of_camera[camera] = &graphs[g];
-    labeling.labels[camera].resize(graphs[g].curves.size());
-    for (int k = 0; k < graphs[g].component_count; ++k) tasks.push_back({g, k});
-  }
-  const GridGraph nothing;
-  for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
-    indices.emplace_back(of_camera[c] != nullptr ? *of_camera[c] : nothing,
-                         cv::Size(rig.cameras[c].width, rig.cameras[c].height));
-  }
-  std::vector<ComponentResult> results(tasks.size());
-  parallel_for(tasks.size(), [&](std::size_t t) {
-    results[t] = solve_one(rig, graphs[tasks[t].graph], tasks[t].component, indices, options);
-  });
-  for (std::size_t t = 0; t < tasks.size(); ++t) {
-    auto& labels = labeling.labels[static_cast<std::size_t>(graphs[tasks[t].graph].camera)];
-    for (auto& [curve, label] : results[t].labels) labels[static_cast<std::size_t>(curve)] = label;
-    labeling.components.push_back(std::move(results[t].report));
-  }
-  return labeling;
+Labeling solve(const Rig& rig, const std::vector<ColorFamily>& families,
+               std::span<const GridGraph> graphs, const SolutionOptions& options) {
+  return options.method == Method::kJoint ? solve_joint(rig, families, graphs, options.joint)
+                                          : solve_components(rig, graphs, options);
 }
 
 }  // namespace pencilscan

@@ -36,13 +36,21 @@ struct ComponentReport {
   double margin = 0;  ///< second minimum of the cost minus the first
 };
 
-/// Result of a solution over all cameras: labels[camera][curve]; nothing = undecided.
+/// A stretch of a curve with one label.
+struct LabeledRun {
+  int curve = 0;
+  int begin = 0;  ///< first point
+  int end = 0;    ///< one past the last
+  CurveLabel label;
+};
+
+/// Result of a solution over all cameras; curve points in no run are undecided.
 struct Labeling {
-  std::vector<std::vector<std::optional<CurveLabel>>> labels;
+  std::vector<std::vector<LabeledRun>> runs;  ///< per camera, ordered by (curve, begin), disjoint
   std::vector<ComponentReport> components;
 };
 
-enum class Method { kLinear, kMultiview };
+enum class Method { kLinear, kMultiview, kJoint };
 [[nodiscard]] std::optional<Method> method_from_name(std::string_view name);
 
 enum class MultiviewCost {
@@ -50,8 +58,21 @@ enum class MultiviewCost {
   kNormalized,  ///< mean over all reprojected points, unmatched ones counting as the search radius
 };
 
+struct JointOptions {
+  int piece_length = 24;  ///< points labelled as one; >= 4
+  int max_labels = 24;    ///< kept per piece before messages are passed; >= 2
+  double projection_sigma_px = 0.3;  ///< error of a plane, projector px; > 0
+  double crossing_outliers = 0.05;   ///< share of crossings that are none
+  double max_color_cost = 4;         ///< log-likelihood ratio that a piece's colour can give
+  int passes = 3;                    ///< message passing, then what the cameras say of each other
+  int rounds = 10;                   ///< of messages in a pass
+  double damping = 0.3;              ///< share of the old message kept, [0, 1)
+  double min_confidence = 0.5;       ///< pieces below stay undecided
+};
+
 struct SolutionOptions {
   Method method = Method::kMultiview;
+  JointOptions joint;
   MultiviewCost cost = MultiviewCost::kNormalized;
   double search_radius_px = 8;  ///< reprojected point to detected curve; > 0
   double step_lines = 0.25;     ///< sweep step of the most moving curve; > 0
@@ -60,7 +81,8 @@ struct SolutionOptions {
 
 /// Decides the line of every curve. This is the seam for solution methods: all take the grid graphs
 /// of all cameras and give a Labeling.
-[[nodiscard]] Labeling solve(const Rig& rig, std::span<const GridGraph> graphs,
+[[nodiscard]] Labeling solve(const Rig& rig, const std::vector<ColorFamily>& families,
+                             std::span<const GridGraph> graphs,
                              const SolutionOptions& options = {});
 
 /// The line nearest to a continuous coordinate that has this local ID (any if negative), limited to

@@ -21,14 +21,17 @@ double coordinate_per_pixel(const Camera& camera, const Projector& projector,
   return a && b ? std::abs((*b)[axis] - (*a)[axis]) : 1.0;
 }
 
-void add_curve(const Rig& rig, const GridGraph& graph, const Curve& curve, const CurveLabel& label,
+void add_run(const Rig& rig, const GridGraph& graph, const LabeledRun& run,
                const Sphere& volume, const TriangulationOptions& options,
                std::vector<MeasuredPoint>& points) {
   const Camera& camera = rig.cameras[static_cast<std::size_t>(graph.camera)];
+  const Curve& curve = graph.curves[static_cast<std::size_t>(run.curve)];
+  const CurveLabel& label = run.label;
   const Projector& projector = rig.projectors[static_cast<std::size_t>(label.pattern.projector)];
   const LinePattern& pattern = projector.patterns[static_cast<std::size_t>(label.pattern.pattern)];
   const double coordinate = pattern.position_px(label.plane);
-  for (const CurvePoint& p : curve.points) {
+  for (int i = run.begin; i < run.end; ++i) {
+    const CurvePoint& p = curve.points[static_cast<std::size_t>(i)];
     const Vec2 pixel = p.position.cast<double>();
     const RayInProjector ray(camera, projector, pixel);
     const auto depth = ray.depth(coordinate, pattern.axis);
@@ -79,10 +82,8 @@ std::vector<MeasuredPoint> triangulate(const Rig& rig, std::span<const GridGraph
   const Sphere volume = working_volume(rig);
   std::vector<std::vector<MeasuredPoint>> per_camera(graphs.size());
   parallel_for(graphs.size(), [&](std::size_t g) {
-    const auto& labels = labeling.labels[static_cast<std::size_t>(graphs[g].camera)];
-    for (std::size_t c = 0; c < labels.size(); ++c) {
-      if (labels[c])
-        add_curve(rig, graphs[g], graphs[g].curves[c], *labels[c], volume, options, per_camera[g]);
+    for (const LabeledRun& run : labeling.runs[static_cast<std::size_t>(graphs[g].camera)]) {
+      add_run(rig, graphs[g], run, volume, options, per_camera[g]);
     }
     keep_one_per_pixel(per_camera[g]);
   });

@@ -1,0 +1,152 @@
+#include "pencilscan/solution/joint.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "pencilscan/core/parallel.h"
+#include "pencilscan/solution/min_sum.h"
+#include "pencilscan/solution/other_views.h"
+#include "pencilscan/solution/piece_labels.h"
+
+namespace pencilscan {
+namespace {
+
+constexpr float kOutlierCost = 1.5F;
+
+float continuation_cost(const PieceLabel& a, const PieceLabel& b) {
+  return a.pattern == b.pattern && a.line == b.line ? -2.F : 4.F;
+}
+
+/// Adds a table over the labels of two pieces, each with "outlier" as its last label (cost 0).
+template <class Cost>
+void add_edge(PairwiseEnergy& energy, int a, int b, const std::vector<PieceLabel>& labels_a,
+              const std::vector<PieceLabel>& labels_b, Cost cost) {
+  energy.edges.push_back({a, b, energy.tables.size()});
+  for (const PieceLabel& la : labels_a) {
+    for (const PieceLabel& lb : labels_b) energy.tables.push_back(cost(la, lb));
+    energy.tables.push_back(0.F);
+  }
+  energy.tables.insert(energy.tables.end(), labels_b.size() + 1, 0.F);
+}
+
+PairwiseEnergy energy_of(const LabelledPieces& pieces, const std::vector<std::vector<float>>& views,
+                         const JointOptions& options) {
+  PairwiseEnergy energy;
+  energy.first.push_back(0);
+  for (std::size_t p = 0; p < pieces.labels.size(); ++p) {
+    for (std::size_t k = 0; k < pieces.labels[p].size(); ++k)
+      energy.unary.push_back(pieces.labels[p][k].cost + views[p][k]);
+    energy.unary.push_back(kOutlierCost);
+    energy.first.push_back(static_cast<int>(energy.unary.size()));
+  }
+  for (const PieceCrossing& x : pieces.graph.crossings) {
+    add_edge(energy, x.a, x.b, pieces.labels[static_cast<std::size_t>(x.a)],
+             pieces.labels[static_cast<std::size_t>(x.b)],
+             [&](const PieceLabel& a, const PieceLabel& b) {
+               return crossing_cost(a, b, x, pieces.inverse_depth_range, options);
+             });
+  }
+  for (const auto& [a, b] : pieces.graph.continuations) {
+    add_edge(energy, a, b, pieces.labels[static_cast<std::size_t>(a)],
+             pieces.labels[static_cast<std::size_t>(b)], continuation_cost);
+  }
+  return energy;
+}
+
+/// Beliefs as probabilities of each label; the rest is "outlier".
+PieceBeliefs beliefs_of(const LabelledPieces& pieces, const std::vector<float>& costs) {
+  constexpr float kTemperature = 2;  // loops count evidence more than once
+  PieceBeliefs beliefs;
+  std::size_t at = 0;
+  for (const auto& labels : pieces.labels) {
+    const auto first = costs.begin() + static_cast<std::ptrdiff_t>(at);
+    const auto last = first + static_cast<std::ptrdiff_t>(labels.size() + 1);
+    const float lowest = *std::min_element(first, last);
+    float sum = 0;
+    std::vector<float> p;
+    for (auto it = first; it != last; ++it) {
+      p.push_back(std::exp((lowest - *it) / kTemperature));
+      sum += p.back();
+    }
+    p.pop_back();
+    for (float& x : p) x /= sum;
+    beliefs.push_back(std::move(p));
+    at += labels.size() + 1;
+  }
+  return beliefs;
+}
+
+struct Decision {
+  int label = -1;  ///< -1: outlier
+  float margin = 0;
+};
+
+std::vector<Decision> decisions_of(const LabelledPieces& pieces, const std::vector<float>& costs) {
+  std::vector<Decision> decisions;
+  std::size_t at = 0;
+  for (const auto& labels : pieces.labels) {
+    const std::size_t n = labels.size() + 1;
+    std::size_t best = n - 1;
+    for (std::size_t k = 0; k < n; ++k) {
+      if (costs[at + k] < costs[at + best]) best = k;
+    }
+    float second = 1e9F;
+    for (std::size_t k = 0; k < n; ++k) {
+      if (k != best) second = std::min(second, costs[at + k]);
+    }
+    decisions.push_back({best + 1 == n ? -1 : static_cast<int>(best), second - costs[at + best]});
+    at += n;
+  }
+  return decisions;
+}
+
+std::vector<LabeledRun> runs_of(const LabelledPieces& pieces,
+                                const std::vector<Decision>& decisions,
+                                const JointOptions& options) {
+  std::vector<LabeledRun> runs;
+  for (std::size_t p = 0; p < decisions.size(); ++p) {
+    if (decisions[p].label < 0) continue;
+    const PieceLabel& label = pieces.labels[p][static_cast<std::size_t>(decisions[p].label)];
+    const auto confidence = static_cast<float>(1 / (1 + std::exp(0.5 - 0.7 * decisions[p].margin)));
+    if (confidence < static_cast<float>(options.min_confidence)) continue;
+    const CurvePiece& piece = pieces.graph.pieces[p];
+    runs.push_back({piece.curve, piece.begin, piece.end,
+                    CurveLabel{label.pattern, label.line, static_cast<double>(label.line),
+                               confidence}});
+  }
+  return runs;
+}
+
+}  // namespace
+
+Labeling solve_joint(const Rig& rig, const std::vector<ColorFamily>& families,
+                     std::span<const GridGraph> graphs, const JointOptions& options) {
+  std::vector<LabelledPieces> pieces(graphs.size());
+  parallel_for(graphs.size(), [&](std::size_t g) {
+    pieces[g] = possible_labels(rig, families, graphs[g], options);
+  });
+  const OtherViews others(rig, graphs, pieces);
+  std::vector<std::vector<Decision>> decisions(graphs.size());
+  std::vector<PieceBeliefs> beliefs(graphs.size());
+  for (int pass = 0; pass < options.passes; ++pass) {
+    std::vector<PieceBeliefs> next(graphs.size());
+    parallel_for(graphs.size(), [&](std::size_t g) {
+      const auto views = others.costs(g, beliefs);
+      const PairwiseEnergy energy = energy_of(pieces[g], views, options);
+      const std::vector<float> costs =
+          min_sum(energy, options.rounds, static_cast<float>(options.damping));
+      next[g] = beliefs_of(pieces[g], costs);
+      decisions[g] = decisions_of(pieces[g], costs);
+    });
+    beliefs = std::move(next);
+  }
+  Labeling labeling;
+  labeling.runs.resize(rig.cameras.size());
+  for (std::size_t g = 0; g < graphs.size(); ++g) {
+    labeling.runs[static_cast<std::size_t>(graphs[g].camera)] =
+        runs_of(pieces[g], decisions[g], options);
+  }
+  return labeling;
+}
+
+}  // namespace pencilscan

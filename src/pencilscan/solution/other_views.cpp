@@ -1,0 +1,118 @@
+#include "pencilscan/solution/other_views.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "pencilscan/solution/reprojection.h"
+
+namespace pencilscan {
+
+OtherViews::OtherViews(const Rig& rig, std::span<const GridGraph> graphs,
+                       std::span<const LabelledPieces> pieces)
+    : rig_(rig), graphs_(graphs), pieces_(pieces) {
+  for (std::size_t g = 0; g < graphs.size(); ++g) {
+    const Camera& camera = rig.cameras[static_cast<std::size_t>(graphs[g].camera)];
+    View& view = views_.emplace_back();
+    view.columns = camera.width / kCell + 1;
+    view.rows = camera.height / kCell + 1;
+    view.cells.resize(static_cast<std::size_t>(view.columns * view.rows));
+    const auto& list = pieces[g].graph.pieces;
+    for (std::size_t p = 0; p < list.size(); ++p) {
+      const Curve& curve = graphs[g].curves[static_cast<std::size_t>(list[p].curve)];
+      for (int i = list[p].begin; i < list[p].end; ++i) {
+        const CurvePoint& point = curve.points[static_cast<std::size_t>(i)];
+        const int x = std::clamp(static_cast<int>(point.position.x()) / kCell, 0, view.columns - 1);
+        const int y = std::clamp(static_cast<int>(point.position.y()) / kCell, 0, view.rows - 1);
+        view.cells[static_cast<std::size_t>(y * view.columns + x)].push_back(
+            {point.position, point.tangent(), curve.family, static_cast<int>(p)});
+      }
+    }
+  }
+}
+
+int OtherViews::find(const View& view, const Eigen::Vector2f& position,
+                     const Eigen::Vector2f& tangent, int family) const {
+  constexpr float kMaxAcross = 1.8F;
+  constexpr float kMinCosine = 0.9F;
+  const int cx = static_cast<int>(position.x()) / kCell;
+  const int cy = static_cast<int>(position.y()) / kCell;
+  float best = kMaxAcross;
+  int piece = -1;
+  for (int y = std::max(0, cy - 1); y <= std::min(view.rows - 1, cy + 1); ++y) {
+    for (int x = std::max(0, cx - 1); x <= std::min(view.columns - 1, cx + 1); ++x) {
+      for (const Entry& e : view.cells[static_cast<std::size_t>(y * view.columns + x)]) {
+        if (e.family != family) continue;
+        const Eigen::Vector2f way = position - e.position;
+        if (std::abs(way.dot(e.tangent)) > 1) continue;
+        const float across = std::abs(way.x() * e.tangent.y() - way.y() * e.tangent.x());
+        if (across >= best || std::abs(e.tangent.dot(tangent)) < kMinCosine) continue;
+        best = across;
+        piece = e.piece;
+      }
+    }
+  }
+  return piece;
+}
+
+std::vector<std::vector<float>> OtherViews::costs(std::size_t g,
+                                                  std::span<const PieceBeliefs> beliefs) const {
+  // A true label is hit where the other camera sees it (about 0.6) or by chance; a wrong one by
+  // chance only.
+  constexpr float kHitIfTrue = 0.7F;
+  constexpr float kHitByChance = 0.2F;
+  constexpr float kSameIfTrue = 0.85F;
+  constexpr float kSameByChance = 0.03F;
+  const int camera_index = graphs_[g].camera;
+  const Camera& camera = rig_.cameras[static_cast<std::size_t>(camera_index)];
+  const RigidTransform world_from_camera = camera.device_from_world.inverse();
+  std::vector<std::size_t> others;
+  for (const int c : adjacent_cameras(rig_, camera_index)) {
+    for (std::size_t k = 0; k < graphs_.size(); ++k) {
+      if (graphs_[k].camera == c) others.push_back(k);
+    }
+  }
+  constexpr float kPixels = 3;
+  const float ahead = kPixels / static_cast<float>(camera.K(0, 0));
+  std::vector<std::vector<float>> result;
+  for (std::size_t p = 0; p < pieces_[g].labels.size(); ++p) {
+    const CurvePiece& piece = pieces_[g].graph.pieces[p];
+    const int family = graphs_[g].curves[static_cast<std::size_t>(piece.curve)].family;
+    auto& costs = result.emplace_back(pieces_[g].labels[p].size(), 0.F);
+    for (std::size_t k = 0; k < costs.size(); ++k) {
+      const PieceLabel& label = pieces_[g].labels[p][k];
+      const auto point = [&](const Eigen::Vector2f& at) -> Vec3 {
+        const Eigen::Vector3f ray = at.homogeneous();
+        return world_from_camera * (ray / label.q.dot(ray)).cast<double>().eval();
+      };
+      const Vec3 here = point(piece.middle);
+      const Vec3 next = point(piece.middle + ahead * piece.tangent);
+      for (const std::size_t o : others) {
+        const Camera& other = rig_.cameras[static_cast<std::size_t>(graphs_[o].camera)];
+        const auto a = other.project(here);
+        const auto b = other.project(next);
+        if (!a || !b || !other.contains(*a)) continue;
+        const Eigen::Vector2f tangent = (*b - *a).cast<float>().normalized();
+        const int hit = find(views_[o], a->cast<float>(), tangent, family);
+        if (hit < 0) {
+          costs[k] -= std::log((1 - kHitIfTrue) / (1 - kHitByChance));
+          continue;
+        }
+        if (beliefs[o].empty()) {
+          costs[k] -= std::log(kHitIfTrue / kHitByChance);
+          continue;
+        }
+        const auto& their = pieces_[o].labels[static_cast<std::size_t>(hit)];
+        float same = 0;
+        for (std::size_t j = 0; j < their.size(); ++j) {
+          if (their[j].pattern == label.pattern && their[j].line == label.line)
+            same = beliefs[o][static_cast<std::size_t>(hit)][j];
+        }
+        costs[k] -= std::log(same * kSameIfTrue / kSameByChance +
+                             (1 - same) * (1 - kSameIfTrue) / (1 - kSameByChance));
+      }
+    }
+  }
+  return result;
+}
+
+}  // namespace pencilscan

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "pencilscan/solution/piece_labels.h"
+
+namespace pencilscan {
+
+/// Probability of each label of each piece of one camera.
+using PieceBeliefs = std::vector<std::vector<float>>;
+
+/// What the other cameras say of the labels of one: a true label puts the piece where another
+/// camera, if nothing is in its way, sees a curve of the same family, direction and line.
+class OtherViews {
+ public:
+  OtherViews(const Rig& rig, std::span<const GridGraph> graphs,
+             std::span<const LabelledPieces> pieces);
+
+  /// Cost of every label of every piece of graphs[g]; `beliefs` per graph, empty at first, when
+  /// only places and directions count.
+  [[nodiscard]] std::vector<std::vector<float>> costs(
+      std::size_t g, std::span<const PieceBeliefs> beliefs) const;
+
+ private:
+  struct Entry {
+    Eigen::Vector2f position;
+    Eigen::Vector2f tangent;
+    int family;
+    int piece;
+  };
+  struct View {
+    int columns = 0;
+    int rows = 0;
+    std::vector<std::vector<Entry>> cells;
+  };
+  static constexpr int kCell = 4;
+
+  /// The piece nearest to a place, of this family and direction; -1: none.
+  [[nodiscard]] int find(const View& view, const Eigen::Vector2f& position,
+                         const Eigen::Vector2f& tangent, int family) const;
+
+  const Rig& rig_;
+  std::span<const GridGraph> graphs_;
+  std::span<const LabelledPieces> pieces_;
+  std::vector<View> views_;
+};
+
+}  // namespace pencilscan

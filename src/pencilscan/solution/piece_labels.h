@@ -1,0 +1,41 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "pencilscan/solution/curve_pieces.h"
+#include "pencilscan/solution/labeling.h"
+#include "pencilscan/solution/line_sheets.h"
+
+namespace pencilscan {
+
+/// A line that a piece may show.
+struct PieceLabel {
+  PatternRef pattern;
+  int line = 0;
+  Eigen::Vector3f q = Eigen::Vector3f::Zero();  ///< inverse depth = q . (x, y, 1)
+  float inverse_depth_per_px = 0;               ///< per projector px across the line
+  float cost = 0;                               ///< negative log-likelihood without other pieces
+};
+
+/// The pieces of one camera with their possible labels.
+struct LabelledPieces {
+  PieceGraph graph;
+  std::vector<std::vector<PieceLabel>> labels;  ///< per piece, without "outlier"
+  float inverse_depth_range = 1;                ///< of the volume, 1/mm
+};
+
+/// All lines of the piece's family whose depth lies in the volume, with the cost of the piece's
+/// colours and of the slant that the line would give the surface; then those that its crossings
+/// support best, at most options.max_labels.
+[[nodiscard]] LabelledPieces possible_labels(const Rig& rig,
+                                             const std::vector<ColorFamily>& families,
+                                             const GridGraph& graph, const JointOptions& options);
+
+/// Energy of two crossing pieces having these labels: both give the crossing a depth, which agree
+/// for the true ones. The negative logarithm of its likelihood against depths at random.
+[[nodiscard]] float crossing_cost(const PieceLabel& a, const PieceLabel& b,
+                                  const PieceCrossing& crossing, float inverse_depth_range,
+                                  const JointOptions& options);
+
+}  // namespace pencilscan
