@@ -11,6 +11,7 @@
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/evaluation/label_error.h"
 #include "pencilscan/evaluation/line_recall.h"
+#include "pencilscan/evaluation/surface_figures.h"
 #include "pencilscan/evaluation/true_lines.h"
 #include "pencilscan/evaluation/truth_scene.h"
 #include "pencilscan/io/image.h"
@@ -83,6 +84,48 @@ void print_identities(const TruthScene& truth, const Rig& rig, const PointResult
               static_cast<double>(pattern_right) / n, static_cast<double>(id_right) / n);
 }
 
+void print_distances(const TruthScene& truth, const PointResult& result,
+                     const std::vector<PointVerdict>& verdicts) {
+  std::vector<Vec3> points;
+  for (const MeasuredPoint& p : result.points) points.emplace_back(p.x, p.y, p.z);
+  std::vector<double> distances = distances_to(truth.scene(), points);
+  if (distances.empty()) return;
+  std::sort(distances.begin(), distances.end());
+  const auto n = distances.size();
+  const auto beyond = distances.end() - std::upper_bound(distances.begin(), distances.end(), 2.0);
+  const SigmaFigures sigma = sigma_figures(result.points, verdicts);
+  std::printf(
+      "  distance mm median %.4f p90 %.4f  > 2 mm %.5f  below sigma %.3f 2 sigma %.3f  tenths",
+      distances[n / 2], distances[n * 9 / 10], static_cast<double>(beyond) / static_cast<double>(n),
+      sigma.below_one.value(), sigma.below_two.value());
+  for (const double t : sigma.tenths) std::printf(" %.2f", t);
+  std::printf("  rank %.2f\n  seconds", sigma.rank_correlation);
+  for (const StageTime& time : result.times)
+    std::printf(" %s %.3f", time.stage.c_str(), time.seconds);
+  std::printf("\n");
+}
+
+/// Of points with confidence near c, which share is right?
+void print_reliability(const PointResult& result, const std::vector<PointVerdict>& verdicts) {
+  constexpr double kBounds[] = {0, 0.5, 0.7, 0.8, 0.9, 0.95, 0.98, 0.99, 0.995, 0.999, 1.01};
+  for (std::size_t b = 0; b + 1 < std::size(kBounds); ++b) {
+    std::size_t points = 0;
+    std::size_t right = 0;
+    double sum = 0;
+    for (std::size_t i = 0; i < verdicts.size(); ++i) {
+      const double c = result.points[i].confidence;
+      if (c < kBounds[b] || c >= kBounds[b + 1]) continue;
+      ++points;
+      sum += c;
+      right += verdicts[i].right;
+    }
+    if (points == 0) continue;
+    const auto n = static_cast<double>(points);
+    std::printf("  confidence %.4f  right %.4f  of %zu points\n", sum / n,
+                static_cast<double>(right) / n, points);
+  }
+}
+
 struct MethodChoice {
   const char* name;
   Method method;
@@ -90,7 +133,8 @@ struct MethodChoice {
 };
 
 int run(const std::filesystem::path& rig_path, const std::filesystem::path& frames,
-        const std::string& name, const std::filesystem::path& mesh_path, int threads) {
+        const std::string& name, const std::filesystem::path& mesh_path, const std::string& methods,
+        int threads) {
   const ThreadLimit limit(threads);
   cv::setNumThreads(1);
   const Rig rig = read_rig(rig_path);
@@ -115,14 +159,17 @@ int run(const std::filesystem::path& rig_path, const std::filesystem::path& fram
       {"multiview", Method::kMultiview, MultiviewCost::kNormalized},
       {"joint", Method::kJoint, MultiviewCost::kNormalized},
   };
+  bool is_first = true;
   for (std::size_t k = 0; k < std::size(choices); ++k) {
+    if (!methods.empty() && methods != choices[k].name) continue;
     PointOptions options;
     options.solution.method = choices[k].method;
     options.solution.cost = choices[k].cost;
     const PointResult result = measure_points(rig, frame, options);
-    if (k == 0) {
+    if (is_first) {
       print_detection(rig, result, true_lines);
       print_identities(truth, rig, result);
+      is_first = false;
     }
     const std::vector<PointVerdict> verdicts = judge_points(truth, result.points);
     const LabelFigures labels = label_figures(truth, result.points, verdicts);
@@ -132,6 +179,8 @@ int run(const std::filesystem::path& rig_path, const std::filesystem::path& fram
         "%.4f\n",
         choices[k].name, result.points.size(), labels.wrong.value(), recall.recall.value(),
         recall.recall_dense.value(), labels.line_error_median_px);
+    print_distances(truth, result, verdicts);
+    print_reliability(result, verdicts);
   }
   return 0;
 }
@@ -145,12 +194,14 @@ int main(int argc, char** argv) {
   std::string frames;
   std::string frame = "000000";
   std::string mesh;
+  std::string method;
   int threads = 2;
   app.add_option("--rig", rig, "rig.json")->required();
   app.add_option("--frames", frames, "folder of frame folders")->required();
   app.add_option("--frame", frame, "name of the frame");
   app.add_option("--truth", mesh, "true mesh")->required();
+  app.add_option("--method", method, "one row of the table only");
   app.add_option("--threads", threads, "threads");
   CLI11_PARSE(app, argc, argv);
-  return pencilscan::run(rig, frames, frame, mesh, threads);
+  return pencilscan::run(rig, frames, frame, mesh, method, threads);
 }

@@ -10,8 +10,8 @@ namespace pencilscan {
 /// A stretch of a detected curve that is labelled as one.
 struct CurvePiece {
   int curve = 0;
-  int begin = 0;  ///< first point
-  int end = 0;    ///< one past the last
+  int begin = 0;                                      ///< first point
+  int end = 0;                                        ///< one past the last
   Eigen::Vector2f middle = Eigen::Vector2f::Zero();   ///< normalised camera coordinates
   Eigen::Vector2f tangent = Eigen::Vector2f::Zero();  ///< unit, there
   float sigma = 0;  ///< standard deviation across, normalised units

@@ -12,10 +12,7 @@ namespace pencilscan {
 namespace {
 
 constexpr float kOutlierCost = 1.5F;
-
-float continuation_cost(const PieceLabel& a, const PieceLabel& b) {
-  return a.pattern == b.pattern && a.line == b.line ? -2.F : 4.F;
-}
+constexpr float kSameLineReward = 2.F;  ///< of consecutive pieces of one curve
 
 /// Adds a table over the labels of two pieces, each with "outlier" as its last label (cost 0).
 template <class Cost>
@@ -29,16 +26,21 @@ void add_edge(PairwiseEnergy& energy, int a, int b, const std::vector<PieceLabel
   energy.tables.insert(energy.tables.end(), labels_b.size() + 1, 0.F);
 }
 
-PairwiseEnergy energy_of(const LabelledPieces& pieces, const std::vector<std::vector<float>>& views,
-                         const JointOptions& options) {
-  PairwiseEnergy energy;
-  energy.first.push_back(0);
+void set_unary(const LabelledPieces& pieces, const std::vector<std::vector<float>>& views,
+               PairwiseEnergy& energy) {
+  energy.unary.clear();
   for (std::size_t p = 0; p < pieces.labels.size(); ++p) {
     for (std::size_t k = 0; k < pieces.labels[p].size(); ++k)
       energy.unary.push_back(pieces.labels[p][k].cost + views[p][k]);
     energy.unary.push_back(kOutlierCost);
-    energy.first.push_back(static_cast<int>(energy.unary.size()));
   }
+}
+
+PairwiseEnergy pairwise_energy(const LabelledPieces& pieces, const JointOptions& options) {
+  PairwiseEnergy energy;
+  energy.first.push_back(0);
+  for (const auto& labels : pieces.labels)
+    energy.first.push_back(energy.first.back() + static_cast<int>(labels.size()) + 1);
   for (const PieceCrossing& x : pieces.graph.crossings) {
     add_edge(energy, x.a, x.b, pieces.labels[static_cast<std::size_t>(x.a)],
              pieces.labels[static_cast<std::size_t>(x.b)],
@@ -48,12 +50,17 @@ PairwiseEnergy energy_of(const LabelledPieces& pieces, const std::vector<std::ve
   }
   for (const auto& [a, b] : pieces.graph.continuations) {
     add_edge(energy, a, b, pieces.labels[static_cast<std::size_t>(a)],
-             pieces.labels[static_cast<std::size_t>(b)], continuation_cost);
+             pieces.labels[static_cast<std::size_t>(b)],
+             [&](const PieceLabel& la, const PieceLabel& lb) {
+               return la.pattern == lb.pattern && la.line == lb.line
+                          ? -kSameLineReward
+                          : static_cast<float>(options.change_cost);
+             });
   }
   return energy;
 }
 
-/// Beliefs as probabilities of each label; the rest is "outlier".
+/// Beliefs as probabilities of each label; what is missing to 1 is "outlier".
 PieceBeliefs beliefs_of(const LabelledPieces& pieces, const std::vector<float>& costs) {
   constexpr float kTemperature = 2;  // loops count evidence more than once
   PieceBeliefs beliefs;
@@ -100,6 +107,10 @@ std::vector<Decision> decisions_of(const LabelledPieces& pieces, const std::vect
   return decisions;
 }
 
+/// Share of pieces that were right at this margin, on rendered scenes with truth
+/// (benchmarks/accuracy prints the comparison).
+float confidence_of(float margin) { return 1 / (1 + std::exp(0.5F - 0.7F * margin)); }
+
 std::vector<LabeledRun> runs_of(const LabelledPieces& pieces,
                                 const std::vector<Decision>& decisions,
                                 const JointOptions& options) {
@@ -107,12 +118,12 @@ std::vector<LabeledRun> runs_of(const LabelledPieces& pieces,
   for (std::size_t p = 0; p < decisions.size(); ++p) {
     if (decisions[p].label < 0) continue;
     const PieceLabel& label = pieces.labels[p][static_cast<std::size_t>(decisions[p].label)];
-    const auto confidence = static_cast<float>(1 / (1 + std::exp(0.5 - 0.7 * decisions[p].margin)));
+    const float confidence = confidence_of(decisions[p].margin);
     if (confidence < static_cast<float>(options.min_confidence)) continue;
     const CurvePiece& piece = pieces.graph.pieces[p];
-    runs.push_back({piece.curve, piece.begin, piece.end,
-                    CurveLabel{label.pattern, label.line, static_cast<double>(label.line),
-                               confidence}});
+    runs.push_back(
+        {piece.curve, piece.begin, piece.end,
+         CurveLabel{label.pattern, label.line, static_cast<double>(label.line), confidence}});
   }
   return runs;
 }
@@ -126,15 +137,17 @@ Labeling solve_joint(const Rig& rig, const std::vector<ColorFamily>& families,
     pieces[g] = possible_labels(rig, families, graphs[g], options);
   });
   const OtherViews others(rig, graphs, pieces);
+  std::vector<PairwiseEnergy> energies(graphs.size());
+  parallel_for(graphs.size(),
+               [&](std::size_t g) { energies[g] = pairwise_energy(pieces[g], options); });
   std::vector<std::vector<Decision>> decisions(graphs.size());
   std::vector<PieceBeliefs> beliefs(graphs.size());
   for (int pass = 0; pass < options.passes; ++pass) {
     std::vector<PieceBeliefs> next(graphs.size());
     parallel_for(graphs.size(), [&](std::size_t g) {
-      const auto views = others.costs(g, beliefs);
-      const PairwiseEnergy energy = energy_of(pieces[g], views, options);
+      set_unary(pieces[g], others.costs(g, beliefs), energies[g]);
       const std::vector<float> costs =
-          min_sum(energy, options.rounds, static_cast<float>(options.damping));
+          min_sum(energies[g], options.rounds, static_cast<float>(options.damping));
       next[g] = beliefs_of(pieces[g], costs);
       decisions[g] = decisions_of(pieces[g], costs);
     });

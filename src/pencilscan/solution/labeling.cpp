@@ -131,6 +131,10 @@ Labeling solve_components(const Rig& rig, std::span<const GridGraph> graphs,
 
 }  // namespace
 
+float JointOptions::disagreement_cost() const {
+  return static_cast<float>(-std::log(crossing_outliers));
+}
+
 std::optional<Method> method_from_name(std::string_view name) {
   if (name == "linear") return Method::kLinear;
   if (name == "multiview") return Method::kMultiview;

@@ -59,15 +59,19 @@ enum class MultiviewCost {
 };
 
 struct JointOptions {
-  int piece_length = 24;  ///< points labelled as one; >= 4
-  int max_labels = 24;    ///< kept per piece before messages are passed; >= 2
+  int piece_length = 24;             ///< points labelled as one; >= 4
+  int max_labels = 24;               ///< kept per piece before messages are passed; >= 2
   double projection_sigma_px = 0.3;  ///< error of a plane, projector px; > 0
   double crossing_outliers = 0.05;   ///< share of crossings that are none
   double max_color_cost = 4;         ///< log-likelihood ratio that a piece's colour can give
-  int passes = 3;                    ///< message passing, then what the cameras say of each other
-  int rounds = 10;                   ///< of messages in a pass
+  double change_cost = 4;            ///< of a curve that jumps from one line to another
+  int passes = 2;                    ///< message passing, then what the cameras say of each other
+  int rounds = 6;                    ///< of messages in a pass
   double damping = 0.3;              ///< share of the old message kept, [0, 1)
   double min_confidence = 0.5;       ///< pieces below stay undecided
+
+  /// Cost of a crossing whose planes do not meet.
+  [[nodiscard]] float disagreement_cost() const;
 };
 
 struct SolutionOptions {

@@ -67,8 +67,8 @@ bool LineSheets::find(int line, const Eigen::Vector2f& normalized, float w_low, 
     return along_.dot(x) / along_scale_.dot(x);
   };
   if (parts_ > 1) {
-    const auto part =
-        static_cast<int>(std::clamp(position() / part_size_px_, 0.F, static_cast<float>(parts_ - 1)));
+    const auto part = static_cast<int>(
+        std::clamp(position() / part_size_px_, 0.F, static_cast<float>(parts_ - 1)));
     at = index(line, part);
     w = q_[at].dot(ray);
   }

@@ -24,7 +24,8 @@ void send_backward(const float* table, const std::vector<float>& cavity, int row
   for (int i = 0; i < rows; ++i) {
     const float* row = table + static_cast<std::ptrdiff_t>(i) * columns;
     float best = std::numeric_limits<float>::max();
-    for (int j = 0; j < columns; ++j) best = std::min(best, cavity[static_cast<std::size_t>(j)] + row[j]);
+    for (int j = 0; j < columns; ++j)
+      best = std::min(best, cavity[static_cast<std::size_t>(j)] + row[j]);
     out[static_cast<std::size_t>(i)] = best;
   }
 }
@@ -66,11 +67,13 @@ std::vector<float> min_sum(const PairwiseEnergy& energy, int rounds, float dampi
       // Both directions read the beliefs of the last round and the messages as they were then.
       std::vector<float>& c = cavity;
       c.resize(static_cast<std::size_t>(rows));
-      for (std::size_t i = 0; i < c.size(); ++i) c[i] = beliefs[first_a + i] - messages[to_a[e] + i];
+      for (std::size_t i = 0; i < c.size(); ++i)
+        c[i] = beliefs[first_a + i] - messages[to_a[e] + i];
       send_forward(table, c, rows, columns, out);
       std::vector<float> forward = out;
       c.resize(static_cast<std::size_t>(columns));
-      for (std::size_t i = 0; i < c.size(); ++i) c[i] = beliefs[first_b + i] - messages[to_b[e] + i];
+      for (std::size_t i = 0; i < c.size(); ++i)
+        c[i] = beliefs[first_b + i] - messages[to_b[e] + i];
       send_backward(table, c, rows, columns, out);
       update(to_a[e], first_a);
       out.swap(forward);

@@ -23,8 +23,8 @@ struct PairwiseEnergy {
   }
 };
 
-/// Approximate min-marginals of every label by loopy min-sum belief propagation (Pearl 1988; damped,
-/// all messages at once): laid out as `unary`. Exact on trees.
+/// Approximate min-marginals of every label by loopy min-sum belief propagation (Pearl 1988;
+/// damped, all messages at once): laid out as `unary`. Exact on trees.
 [[nodiscard]] std::vector<float> min_sum(const PairwiseEnergy& energy, int rounds, float damping);
 
 }  // namespace pencilscan

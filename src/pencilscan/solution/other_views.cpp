@@ -3,35 +3,41 @@
 #include <algorithm>
 #include <cmath>
 
+#include "pencilscan/core/parallel.h"
 #include "pencilscan/solution/reprojection.h"
 
 namespace pencilscan {
 
 OtherViews::OtherViews(const Rig& rig, std::span<const GridGraph> graphs,
                        std::span<const LabelledPieces> pieces)
-    : rig_(rig), graphs_(graphs), pieces_(pieces) {
-  for (std::size_t g = 0; g < graphs.size(); ++g) {
-    const Camera& camera = rig.cameras[static_cast<std::size_t>(graphs[g].camera)];
-    View& view = views_.emplace_back();
-    view.columns = camera.width / kCell + 1;
-    view.rows = camera.height / kCell + 1;
-    view.cells.resize(static_cast<std::size_t>(view.columns * view.rows));
-    const auto& list = pieces[g].graph.pieces;
-    for (std::size_t p = 0; p < list.size(); ++p) {
-      const Curve& curve = graphs[g].curves[static_cast<std::size_t>(list[p].curve)];
-      for (int i = list[p].begin; i < list[p].end; ++i) {
-        const CurvePoint& point = curve.points[static_cast<std::size_t>(i)];
-        const int x = std::clamp(static_cast<int>(point.position.x()) / kCell, 0, view.columns - 1);
-        const int y = std::clamp(static_cast<int>(point.position.y()) / kCell, 0, view.rows - 1);
-        view.cells[static_cast<std::size_t>(y * view.columns + x)].push_back(
-            {point.position, point.tangent(), curve.family, static_cast<int>(p)});
-      }
+    : rig_(rig), graphs_(graphs), pieces_(pieces), sightings_(graphs.size()) {
+  std::vector<View> views(graphs.size());
+  parallel_for(graphs.size(), [&](std::size_t g) { views[g] = make_view(g); });
+  parallel_for(graphs.size(), [&](std::size_t g) { sightings_[g] = look_from_others(g, views); });
+}
+
+OtherViews::View OtherViews::make_view(std::size_t g) const {
+  const Camera& camera = rig_.cameras[static_cast<std::size_t>(graphs_[g].camera)];
+  View view;
+  view.columns = camera.width / kCell + 1;
+  view.rows = camera.height / kCell + 1;
+  view.cells.resize(static_cast<std::size_t>(view.columns * view.rows));
+  const auto& list = pieces_[g].graph.pieces;
+  for (std::size_t p = 0; p < list.size(); ++p) {
+    const Curve& curve = graphs_[g].curves[static_cast<std::size_t>(list[p].curve)];
+    for (int i = list[p].begin; i < list[p].end; ++i) {
+      const CurvePoint& point = curve.points[static_cast<std::size_t>(i)];
+      const int x = std::clamp(static_cast<int>(point.position.x()) / kCell, 0, view.columns - 1);
+      const int y = std::clamp(static_cast<int>(point.position.y()) / kCell, 0, view.rows - 1);
+      view.cells[static_cast<std::size_t>(y * view.columns + x)].push_back(
+          {point.position, point.tangent(), curve.family, static_cast<int>(p)});
     }
   }
+  return view;
 }
 
 int OtherViews::find(const View& view, const Eigen::Vector2f& position,
-                     const Eigen::Vector2f& tangent, int family) const {
+                     const Eigen::Vector2f& tangent, int family) {
   constexpr float kMaxAcross = 1.8F;
   constexpr float kMinCosine = 0.9F;
   const int cx = static_cast<int>(position.x()) / kCell;
@@ -54,14 +60,8 @@ int OtherViews::find(const View& view, const Eigen::Vector2f& position,
   return piece;
 }
 
-std::vector<std::vector<float>> OtherViews::costs(std::size_t g,
-                                                  std::span<const PieceBeliefs> beliefs) const {
-  // A true label is hit where the other camera sees it (about 0.6) or by chance; a wrong one by
-  // chance only.
-  constexpr float kHitIfTrue = 0.7F;
-  constexpr float kHitByChance = 0.2F;
-  constexpr float kSameIfTrue = 0.85F;
-  constexpr float kSameByChance = 0.03F;
+std::vector<OtherViews::Sighting> OtherViews::look_from_others(std::size_t g,
+                                                               std::span<const View> views) const {
   const int camera_index = graphs_[g].camera;
   const Camera& camera = rig_.cameras[static_cast<std::size_t>(camera_index)];
   const RigidTransform world_from_camera = camera.device_from_world.inverse();
@@ -73,12 +73,11 @@ std::vector<std::vector<float>> OtherViews::costs(std::size_t g,
   }
   constexpr float kPixels = 3;
   const float ahead = kPixels / static_cast<float>(camera.K(0, 0));
-  std::vector<std::vector<float>> result;
+  std::vector<Sighting> sightings;
   for (std::size_t p = 0; p < pieces_[g].labels.size(); ++p) {
     const CurvePiece& piece = pieces_[g].graph.pieces[p];
     const int family = graphs_[g].curves[static_cast<std::size_t>(piece.curve)].family;
-    auto& costs = result.emplace_back(pieces_[g].labels[p].size(), 0.F);
-    for (std::size_t k = 0; k < costs.size(); ++k) {
+    for (std::size_t k = 0; k < pieces_[g].labels[p].size(); ++k) {
       const PieceLabel& label = pieces_[g].labels[p][k];
       const auto point = [&](const Eigen::Vector2f& at) -> Vec3 {
         const Eigen::Vector3f ray = at.homogeneous();
@@ -92,24 +91,47 @@ std::vector<std::vector<float>> OtherViews::costs(std::size_t g,
         const auto b = other.project(next);
         if (!a || !b || !other.contains(*a)) continue;
         const Eigen::Vector2f tangent = (*b - *a).cast<float>().normalized();
-        const int hit = find(views_[o], a->cast<float>(), tangent, family);
-        if (hit < 0) {
-          costs[k] -= std::log((1 - kHitIfTrue) / (1 - kHitByChance));
-          continue;
+        Sighting sighting{static_cast<int>(p), static_cast<int>(k), static_cast<int>(o), -1, -1};
+        sighting.hit = find(views[o], a->cast<float>(), tangent, family);
+        if (sighting.hit >= 0) {
+          const auto& their = pieces_[o].labels[static_cast<std::size_t>(sighting.hit)];
+          for (std::size_t j = 0; j < their.size(); ++j) {
+            if (their[j].pattern == label.pattern && their[j].line == label.line)
+              sighting.same = static_cast<int>(j);
+          }
         }
-        if (beliefs[o].empty()) {
-          costs[k] -= std::log(kHitIfTrue / kHitByChance);
-          continue;
-        }
-        const auto& their = pieces_[o].labels[static_cast<std::size_t>(hit)];
-        float same = 0;
-        for (std::size_t j = 0; j < their.size(); ++j) {
-          if (their[j].pattern == label.pattern && their[j].line == label.line)
-            same = beliefs[o][static_cast<std::size_t>(hit)][j];
-        }
-        costs[k] -= std::log(same * kSameIfTrue / kSameByChance +
-                             (1 - same) * (1 - kSameIfTrue) / (1 - kSameByChance));
+        sightings.push_back(sighting);
       }
+    }
+  }
+  return sightings;
+}
+
+std::vector<std::vector<float>> OtherViews::costs(std::size_t g,
+                                                  std::span<const PieceBeliefs> beliefs) const {
+  // A true label is hit where the other camera sees it (about 0.6) or by chance; a wrong one by
+  // chance only.
+  constexpr float kHitIfTrue = 0.7F;
+  constexpr float kHitByChance = 0.2F;
+  constexpr float kSameIfTrue = 0.85F;
+  constexpr float kSameByChance = 0.03F;
+  const float miss = -std::log((1 - kHitIfTrue) / (1 - kHitByChance));
+  const float unknown_hit = -std::log(kHitIfTrue / kHitByChance);
+  std::vector<std::vector<float>> result;
+  for (const auto& labels : pieces_[g].labels) result.emplace_back(labels.size(), 0.F);
+  for (const Sighting& s : sightings_[g]) {
+    float& cost = result[static_cast<std::size_t>(s.piece)][static_cast<std::size_t>(s.label)];
+    const PieceBeliefs& their = beliefs[static_cast<std::size_t>(s.graph)];
+    if (s.hit < 0) {
+      cost += miss;
+    } else if (their.empty()) {
+      cost += unknown_hit;
+    } else {
+      const float same =
+          s.same < 0 ? 0.F
+                     : their[static_cast<std::size_t>(s.hit)][static_cast<std::size_t>(s.same)];
+      cost -= std::log(same * kSameIfTrue / kSameByChance +
+                       (1 - same) * (1 - kSameIfTrue) / (1 - kSameByChance));
     }
   }
   return result;

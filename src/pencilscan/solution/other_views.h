@@ -19,10 +19,19 @@ class OtherViews {
 
   /// Cost of every label of every piece of graphs[g]; `beliefs` per graph, empty at first, when
   /// only places and directions count.
-  [[nodiscard]] std::vector<std::vector<float>> costs(
-      std::size_t g, std::span<const PieceBeliefs> beliefs) const;
+  [[nodiscard]] std::vector<std::vector<float>> costs(std::size_t g,
+                                                      std::span<const PieceBeliefs> beliefs) const;
 
  private:
+  /// A label of a piece, seen from another camera.
+  struct Sighting {
+    int piece = 0;
+    int label = 0;
+    int graph = 0;  ///< of the other camera
+    int hit = -1;   ///< piece there; -1: nothing where it should be
+    int same = -1;  ///< its label with the same line; -1: it has none
+  };
+
   struct Entry {
     Eigen::Vector2f position;
     Eigen::Vector2f tangent;
@@ -37,13 +46,17 @@ class OtherViews {
   static constexpr int kCell = 4;
 
   /// The piece nearest to a place, of this family and direction; -1: none.
-  [[nodiscard]] int find(const View& view, const Eigen::Vector2f& position,
-                         const Eigen::Vector2f& tangent, int family) const;
+  [[nodiscard]] static int find(const View& view, const Eigen::Vector2f& position,
+                                const Eigen::Vector2f& tangent, int family);
+
+  [[nodiscard]] View make_view(std::size_t g) const;
+  [[nodiscard]] std::vector<Sighting> look_from_others(std::size_t g,
+                                                       std::span<const View> views) const;
 
   const Rig& rig_;
   std::span<const GridGraph> graphs_;
   std::span<const LabelledPieces> pieces_;
-  std::vector<View> views_;
+  std::vector<std::vector<Sighting>> sightings_;  ///< per graph
 };
 
 }  // namespace pencilscan

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <map>
 #include <numbers>
+#include <tuple>
 
 namespace pencilscan {
 namespace {
@@ -15,13 +16,11 @@ std::vector<float> color_costs(const Curve& curve, const CurvePiece& piece, std:
   std::vector<float> evidence(colors, 0.F);
   for (int i = piece.begin; i < piece.end; ++i) {
     for (std::size_t c = 0; c < colors; ++c) {
-      evidence[c] +=
-          curve.code[static_cast<std::size_t>(i) * colors + c] / kPointsPerMeasurement;
+      evidence[c] += curve.code[static_cast<std::size_t>(i) * colors + c] / kPointsPerMeasurement;
     }
   }
   const float best = *std::max_element(evidence.begin(), evidence.end());
-  for (float& e : evidence)
-    e = std::min(best - e, static_cast<float>(options.max_color_cost));
+  for (float& e : evidence) e = std::min(best - e, static_cast<float>(options.max_color_cost));
   return evidence;
 }
 
@@ -31,58 +30,117 @@ float slant_cost(const CurvePiece& piece, const PieceLabel& label, float w) {
   return std::log1p(slope * slope);
 }
 
-float agreement_window(const PieceLabel& a, const PieceLabel& b, const JointOptions& options) {
-  return 4 * static_cast<float>(options.projection_sigma_px) *
-         std::hypot(a.inverse_depth_per_px, b.inverse_depth_per_px);
+bool before(const PieceLabel& a, const PieceLabel& b) {
+  return std::tie(a.pattern.projector, a.pattern.pattern, a.line) <
+         std::tie(b.pattern.projector, b.pattern.pattern, b.line);
 }
+
+/// Labels of one piece at one crossing, ordered by inverse depth.
+struct DepthOrder {
+  std::vector<std::pair<float, std::size_t>> entries;
+  float largest_per_px = 0;
+
+  void assign(const std::vector<PieceLabel>& labels, const Eigen::Vector3f& ray) {
+    entries.clear();
+    largest_per_px = 0;
+    for (std::size_t i = 0; i < labels.size(); ++i) {
+      entries.emplace_back(labels[i].q.dot(ray), i);
+      largest_per_px = std::max(largest_per_px, labels[i].inverse_depth_per_px);
+    }
+    std::sort(entries.begin(), entries.end());
+  }
+};
 
 /// What the crossings say of each label of each piece, every other piece free to choose.
 std::vector<std::vector<float>> crossing_support(const LabelledPieces& pieces,
                                                  const JointOptions& options) {
+  constexpr float kReach = 4;  // standard deviations
   std::vector<std::vector<float>> support;
   for (const auto& labels : pieces.labels) support.emplace_back(labels.size(), 0.F);
-  std::vector<float> w_a;
-  std::vector<float> w_b;
+  DepthOrder order_a;
+  DepthOrder order_b;
   std::vector<float> best_a;
   std::vector<float> best_b;
   for (const PieceCrossing& x : pieces.graph.crossings) {
     const auto& a = pieces.labels[static_cast<std::size_t>(x.a)];
     const auto& b = pieces.labels[static_cast<std::size_t>(x.b)];
     const Eigen::Vector3f ray = x.position.homogeneous();
-    const auto depths = [&](const std::vector<PieceLabel>& labels, std::vector<float>& w) {
-      w.clear();
-      for (const PieceLabel& label : labels) w.push_back(label.q.dot(ray));
-    };
-    depths(a, w_a);
-    depths(b, w_b);
+    order_a.assign(a, ray);
+    order_b.assign(b, ray);
     best_a.assign(a.size(), 0.F);
     best_b.assign(b.size(), 0.F);
-    for (std::size_t i = 0; i < a.size(); ++i) {
-      for (std::size_t j = 0; j < b.size(); ++j) {
-        if (std::abs(w_a[i] - w_b[j]) > agreement_window(a[i], b[j], options)) continue;
+    const auto projection = kReach * static_cast<float>(options.projection_sigma_px);
+    std::size_t first = 0;
+    for (const auto& [w, i] : order_a.entries) {
+      const float window = projection * std::hypot(order_a.largest_per_px, order_b.largest_per_px);
+      while (first < order_b.entries.size() && order_b.entries[first].first < w - window) ++first;
+      for (std::size_t k = first;
+           k < order_b.entries.size() && order_b.entries[k].first <= w + window; ++k) {
+        const std::size_t j = order_b.entries[k].second;
         const float cost = crossing_cost(a[i], b[j], x, pieces.inverse_depth_range, options);
         best_a[i] = std::min(best_a[i], cost + b[j].cost);
         best_b[j] = std::min(best_b[j], cost + a[i].cost);
       }
     }
-    for (std::size_t i = 0; i < a.size(); ++i) support[static_cast<std::size_t>(x.a)][i] += best_a[i];
-    for (std::size_t j = 0; j < b.size(); ++j) support[static_cast<std::size_t>(x.b)][j] += best_b[j];
+    for (std::size_t i = 0; i < a.size(); ++i)
+      support[static_cast<std::size_t>(x.a)][i] += best_a[i];
+    for (std::size_t j = 0; j < b.size(); ++j)
+      support[static_cast<std::size_t>(x.b)][j] += best_b[j];
   }
   return support;
 }
 
+/// out(label) = min(score of the same label in the piece before, its best + change), both lists
+/// ordered by (projector, pattern, line); minimum 0.
+std::vector<float> passed_on(const std::vector<PieceLabel>& from, const std::vector<float>& score,
+                             const std::vector<PieceLabel>& to, float change) {
+  std::vector<float> out(to.size(), change);
+  if (from.empty()) return std::vector<float>(to.size(), 0.F);
+  const float best = *std::min_element(score.begin(), score.end());
+  std::size_t i = 0;
+  for (std::size_t j = 0; j < to.size(); ++j) {
+    while (i < from.size() && before(from[i], to[j])) ++i;
+    if (i < from.size() && !before(to[j], from[i])) out[j] = std::min(change, score[i] - best);
+  }
+  return out;
+}
+
+/// Adds what the other pieces of its curve say to each label: exact min-marginals of the chain.
+std::vector<std::vector<float>> along_curves(const LabelledPieces& pieces,
+                                             const std::vector<std::vector<float>>& own,
+                                             const JointOptions& options) {
+  const auto change = static_cast<float>(options.change_cost);
+  std::vector<std::vector<float>> forward = own;
+  std::vector<std::vector<float>> backward = own;
+  const auto pass = [&](std::vector<std::vector<float>>& scores, int from, int to) {
+    const auto f = static_cast<std::size_t>(from);
+    const auto t = static_cast<std::size_t>(to);
+    const auto add = passed_on(pieces.labels[f], scores[f], pieces.labels[t], change);
+    for (std::size_t k = 0; k < add.size(); ++k) scores[t][k] += add[k];
+  };
+  const auto& chain = pieces.graph.continuations;  // ordered along each curve
+  for (std::size_t i = 0; i < chain.size(); ++i) pass(forward, chain[i].first, chain[i].second);
+  for (std::size_t i = chain.size(); i-- > 0;) pass(backward, chain[i].second, chain[i].first);
+  for (std::size_t p = 0; p < own.size(); ++p) {
+    for (std::size_t k = 0; k < own[p].size(); ++k) forward[p][k] += backward[p][k] - own[p][k];
+  }
+  return forward;
+}
+
 void keep_supported(LabelledPieces& pieces, const JointOptions& options) {
-  const auto support = crossing_support(pieces, options);
+  auto scores = crossing_support(pieces, options);
+  for (std::size_t p = 0; p < scores.size(); ++p) {
+    for (std::size_t k = 0; k < scores[p].size(); ++k) scores[p][k] += pieces.labels[p][k].cost;
+  }
+  scores = along_curves(pieces, scores, options);
   for (std::size_t p = 0; p < pieces.labels.size(); ++p) {
     auto& labels = pieces.labels[p];
     std::vector<std::size_t> order(labels.size());
     for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
-    const std::size_t count =
-        std::min(labels.size(), static_cast<std::size_t>(options.max_labels));
-    const auto score = [&](std::size_t i) { return labels[i].cost + support[p][i]; };
+    const std::size_t count = std::min(labels.size(), static_cast<std::size_t>(options.max_labels));
     std::partial_sort(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(count),
                       order.end(), [&](std::size_t i, std::size_t j) {
-                        return score(i) != score(j) ? score(i) < score(j) : i < j;
+                        return scores[p][i] != scores[p][j] ? scores[p][i] < scores[p][j] : i < j;
                       });
     order.resize(count);
     std::sort(order.begin(), order.end());
@@ -96,14 +154,18 @@ void keep_supported(LabelledPieces& pieces, const JointOptions& options) {
 
 float crossing_cost(const PieceLabel& a, const PieceLabel& b, const PieceCrossing& crossing,
                     float inverse_depth_range, const JointOptions& options) {
+  constexpr float kFarthest2 = 36;  // squared standard deviations; beyond, nothing is left
   const auto wrong = static_cast<float>(options.crossing_outliers);
-  if (a.pattern == b.pattern) return -std::log(wrong);  // lines of one pattern do not cross
-  const float r = (a.q - b.q).dot(crossing.position.homogeneous());
+  const float disagreement = options.disagreement_cost();
+  if (a.pattern == b.pattern) return disagreement;  // lines of one pattern do not cross
+  const Eigen::Vector3f q = a.q - b.q;
+  const float r = q.dot(crossing.position.homogeneous());
   const auto projection = static_cast<float>(options.projection_sigma_px);
   const float s2 = projection * projection *
                        (a.inverse_depth_per_px * a.inverse_depth_per_px +
                         b.inverse_depth_per_px * b.inverse_depth_per_px) +
-                   crossing.sigma * crossing.sigma * (a.q - b.q).head<2>().squaredNorm();
+                   crossing.sigma * crossing.sigma * q.head<2>().squaredNorm();
+  if (r * r > kFarthest2 * s2) return disagreement;
   const float density = inverse_depth_range / std::sqrt(2 * std::numbers::pi_v<float> * s2);
   return -std::log(wrong + (1 - wrong) * density * std::exp(-0.5F * r * r / s2));
 }

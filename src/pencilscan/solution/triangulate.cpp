@@ -21,9 +21,8 @@ double coordinate_per_pixel(const Camera& camera, const Projector& projector,
   return a && b ? std::abs((*b)[axis] - (*a)[axis]) : 1.0;
 }
 
-void add_run(const Rig& rig, const GridGraph& graph, const LabeledRun& run,
-               const Sphere& volume, const TriangulationOptions& options,
-               std::vector<MeasuredPoint>& points) {
+void add_run(const Rig& rig, const GridGraph& graph, const LabeledRun& run, const Sphere& volume,
+             const TriangulationOptions& options, std::vector<MeasuredPoint>& points) {
   const Camera& camera = rig.cameras[static_cast<std::size_t>(graph.camera)];
   const Curve& curve = graph.curves[static_cast<std::size_t>(run.curve)];
   const CurveLabel& label = run.label;
