@@ -7,11 +7,12 @@
 #include "pencilscan/solution/min_sum.h"
 #include "pencilscan/solution/other_views.h"
 #include "pencilscan/solution/piece_labels.h"
+#include "pencilscan/solution/surroundings.h"
 
 namespace pencilscan {
 namespace {
 
-constexpr float kOutlierCost = 1.5F;
+constexpr float kOutlierCost = 0;
 constexpr float kSameLineReward = 2.F;  ///< of consecutive pieces of one curve
 
 /// Adds a table over the labels of two pieces, each with "outlier" as its last label (cost 0).
@@ -24,6 +25,12 @@ void add_edge(PairwiseEnergy& energy, int a, int b, const std::vector<PieceLabel
     energy.tables.push_back(0.F);
   }
   energy.tables.insert(energy.tables.end(), labels_b.size() + 1, 0.F);
+}
+
+void add(const std::vector<std::vector<float>>& costs, std::vector<std::vector<float>>& sum) {
+  for (std::size_t p = 0; p < sum.size(); ++p) {
+    for (std::size_t k = 0; k < sum[p].size(); ++k) sum[p][k] += costs[p][k];
+  }
 }
 
 void set_unary(const LabelledPieces& pieces, const std::vector<std::vector<float>>& views,
@@ -137,6 +144,11 @@ Labeling solve_joint(const Rig& rig, const std::vector<ColorFamily>& families,
     pieces[g] = possible_labels(rig, families, graphs[g], options);
   });
   const OtherViews others(rig, graphs, pieces);
+  std::vector<Surroundings> surroundings;
+  for (std::size_t g = 0; g < graphs.size(); ++g) {
+    surroundings.emplace_back(rig.cameras[static_cast<std::size_t>(graphs[g].camera)], graphs[g],
+                              pieces[g]);
+  }
   std::vector<PairwiseEnergy> energies(graphs.size());
   parallel_for(graphs.size(),
                [&](std::size_t g) { energies[g] = pairwise_energy(pieces[g], options); });
@@ -145,7 +157,9 @@ Labeling solve_joint(const Rig& rig, const std::vector<ColorFamily>& families,
   for (int pass = 0; pass < options.passes; ++pass) {
     std::vector<PieceBeliefs> next(graphs.size());
     parallel_for(graphs.size(), [&](std::size_t g) {
-      set_unary(pieces[g], others.costs(g, beliefs), energies[g]);
+      auto evidence = others.costs(g, beliefs);
+      add(surroundings[g].costs(beliefs[g]), evidence);
+      set_unary(pieces[g], evidence, energies[g]);
       const std::vector<float> costs =
           min_sum(energies[g], options.rounds, static_cast<float>(options.damping));
       next[g] = beliefs_of(pieces[g], costs);

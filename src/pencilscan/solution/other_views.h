@@ -7,9 +7,6 @@
 
 namespace pencilscan {
 
-/// Probability of each label of each piece of one camera.
-using PieceBeliefs = std::vector<std::vector<float>>;
-
 /// What the other cameras say of the labels of one: a true label puts the piece where another
 /// camera, if nothing is in its way, sees a curve of the same family, direction and line.
 class OtherViews {

@@ -25,6 +25,9 @@ struct LabelledPieces {
   float inverse_depth_range = 1;                ///< of the volume, 1/mm
 };
 
+/// Probability of each label of each piece of one camera; what is missing to 1 is "no line".
+using PieceBeliefs = std::vector<std::vector<float>>;
+
 /// All lines of the piece's family whose depth lies in the volume, with the cost of the piece's
 /// colours and of the slant that the line would give the surface; then those that its crossings
 /// support best, at most options.max_labels.

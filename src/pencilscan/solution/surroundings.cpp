@@ -1,0 +1,121 @@
+#include "pencilscan/solution/surroundings.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <set>
+#include <tuple>
+
+namespace pencilscan {
+namespace {
+
+constexpr float kReachPx = 16;
+constexpr std::size_t kMaxNeighbors = 6;
+constexpr int kCell = 16;
+
+struct Place {
+  int piece = 0;
+  Eigen::Vector2f pixel;
+};
+
+}  // namespace
+
+Surroundings::Surroundings(const Camera& camera, const GridGraph& graph,
+                           const LabelledPieces& pieces)
+    : pieces_(pieces) {
+  const int columns = camera.width / kCell + 1;
+  const int rows = camera.height / kCell + 1;
+  std::vector<std::vector<Place>> cells(static_cast<std::size_t>(columns * rows));
+  const auto point = [&](const CurvePiece& piece, int i) -> const Eigen::Vector2f& {
+    return graph.curves[static_cast<std::size_t>(piece.curve)]
+        .points[static_cast<std::size_t>(i)]
+        .position;
+  };
+  const auto column = [&](float x) {
+    return std::clamp(static_cast<int>(x) / kCell, 0, columns - 1);
+  };
+  const auto row = [&](float y) { return std::clamp(static_cast<int>(y) / kCell, 0, rows - 1); };
+  const auto& list = pieces.graph.pieces;
+  for (std::size_t p = 0; p < list.size(); ++p) {
+    for (int i = list[p].begin; i < list[p].end; i += 2) {
+      const Eigen::Vector2f& x = point(list[p], i);
+      cells[static_cast<std::size_t>(row(x.y()) * columns + column(x.x()))].push_back(
+          {static_cast<int>(p), x});
+    }
+  }
+  std::set<std::pair<int, int>> crossing;
+  for (const PieceCrossing& x : pieces.graph.crossings) {
+    crossing.insert({x.a, x.b});
+    crossing.insert({x.b, x.a});
+  }
+  for (std::size_t p = 0; p < list.size(); ++p) {
+    const Eigen::Vector2f middle = point(list[p], (list[p].begin + list[p].end) / 2);
+    std::vector<std::tuple<float, int, Eigen::Vector2f>> nearest;  // best place of each piece
+    for (int y = row(middle.y() - kReachPx); y <= row(middle.y() + kReachPx); ++y) {
+      for (int x = column(middle.x() - kReachPx); x <= column(middle.x() + kReachPx); ++x) {
+        for (const Place& place : cells[static_cast<std::size_t>(y * columns + x)]) {
+          const float d = (place.pixel - middle).norm();
+          if (d > kReachPx || list[static_cast<std::size_t>(place.piece)].curve == list[p].curve)
+            continue;
+          const auto known = std::find_if(nearest.begin(), nearest.end(), [&](const auto& n) {
+            return std::get<1>(n) == place.piece;
+          });
+          if (known == nearest.end()) {
+            nearest.emplace_back(d, place.piece, place.pixel);
+          } else if (d < std::get<0>(*known)) {
+            *known = {d, place.piece, place.pixel};
+          }
+        }
+      }
+    }
+    std::erase_if(nearest, [&](const auto& n) {
+      return crossing.contains({static_cast<int>(p), std::get<1>(n)});
+    });
+    std::sort(nearest.begin(), nearest.end(), [](const auto& a, const auto& b) {
+      return std::pair(std::get<0>(a), std::get<1>(a)) < std::pair(std::get<0>(b), std::get<1>(b));
+    });
+    if (nearest.size() > kMaxNeighbors) nearest.resize(kMaxNeighbors);
+    for (const auto& [d, other, pixel] : nearest) {
+      neighbors_.push_back({static_cast<int>(p), other,
+                            camera.normalized_from_pixel(pixel.cast<double>()).cast<float>()});
+    }
+  }
+}
+
+std::vector<std::vector<float>> Surroundings::costs(const PieceBeliefs& beliefs) const {
+  constexpr float kSlope = 1;   // usual depth change per sideways change
+  constexpr float kFewest = 2;  // one neighbour alone counts half
+  constexpr float kWeight = 2;  // of all neighbours together: they mostly say the same
+  std::vector<std::vector<float>> result;
+  for (const auto& labels : pieces_.labels) result.emplace_back(labels.size(), 0.F);
+  if (beliefs.empty()) return result;
+  std::vector<float> count(result.size(), 0.F);
+  for (const Neighbor& n : neighbors_) count[static_cast<std::size_t>(n.piece)] += 1;
+  for (const Neighbor& n : neighbors_) {
+    const auto p = static_cast<std::size_t>(n.piece);
+    const auto o = static_cast<std::size_t>(n.other);
+    const Eigen::Vector2f& middle = pieces_.graph.pieces[p].middle;
+    const float distance = std::max(1e-6F, (middle - n.place).norm());
+    // Slope of the volume's whole depth, at this distance: what labels at random give.
+    const auto& theirs = pieces_.labels[o];
+    for (std::size_t k = 0; k < result[p].size(); ++k) {
+      const float w = pieces_.labels[p][k].q.dot(middle.homogeneous());
+      const float range = pieces_.inverse_depth_range / (w * distance);
+      float likelihood = 0;
+      float known = 0;
+      for (std::size_t j = 0; j < theirs.size(); ++j) {
+        const float belief = beliefs[o][j];
+        if (belief < 0.01F) continue;
+        const float slope = (theirs[j].q.dot(n.place.homogeneous()) - w) / (w * distance);
+        known += belief;
+        likelihood += belief * range * kSlope /
+                      (std::numbers::pi_v<float> * (kSlope * kSlope + slope * slope));
+      }
+      result[p][k] -=
+          kWeight / std::max(kFewest, count[p]) * std::log(std::max(0.05F, likelihood + 1 - known));
+    }
+  }
+  return result;
+}
+
+}  // namespace pencilscan
