@@ -59,7 +59,7 @@ void print_identities(const TruthScene& truth, const Rig& rig, const PointResult
   std::size_t pattern_right = 0;
   std::size_t id_right = 0;
   for (const GridGraph& graph : result.graphs) {
-    for (std::size_t k = 0; k < graph.curves.size(); ++k) {
+    for (std::size_t k = 0; k < graph.identities.size(); ++k) {
       const CurveIdentity& identity = graph.identities[k];
       for (std::size_t i = 0; i < graph.curves[k].points.size(); i += 8) {
         ++points;

@@ -48,6 +48,7 @@ void identify(const Rig& rig, const std::vector<ColorFamily>& families, const Gr
   const Camera& camera = rig.cameras[static_cast<std::size_t>(graph.camera)];
   graph.crossings =
       find_crossings(graph.curves, {camera.width, camera.height}, options.min_angle_rad);
+  if (!options.identify) return;
   vote_for_projectors(rig, families, options, graph);
   relations = neighbor_relations(rig, graph);
   infer_local_ids(rig, families, relations, graph);
@@ -66,9 +67,11 @@ void find_components(GridGraph& graph) {
   };
   std::vector<char> connected(graph.curves.size(), 0);
   for (const Crossing& x : graph.crossings) {
-    const auto& a = graph.identities[static_cast<std::size_t>(x.curve_a)].pattern;
-    const auto& b = graph.identities[static_cast<std::size_t>(x.curve_b)].pattern;
-    if (!a || !b || *a == *b) continue;
+    if (!graph.identities.empty()) {
+      const auto& a = graph.identities[static_cast<std::size_t>(x.curve_a)].pattern;
+      const auto& b = graph.identities[static_cast<std::size_t>(x.curve_b)].pattern;
+      if (!a || !b || *a == *b) continue;
+    }
     connected[static_cast<std::size_t>(x.curve_a)] =
         connected[static_cast<std::size_t>(x.curve_b)] = 1;
     const int ra = root(x.curve_a);

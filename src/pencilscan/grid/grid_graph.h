@@ -22,13 +22,14 @@ struct GridGraph {
   int camera = 0;
   std::vector<Curve> curves;
   std::vector<Crossing> crossings;
-  std::vector<CurveIdentity> identities;  ///< one per curve
+  std::vector<CurveIdentity> identities;  ///< one per curve; empty where options.identify is off
   std::vector<int> component_of_curve;    ///< -1: no crossing with another projector's curve
   int component_count = 0;
   std::size_t cut_connections = 0;  ///< wrong connections cut by code or neighbours
 };
 
 struct GridOptions {
+  bool identify = true;         ///< decide pattern and local ID of each curve on its own
   double min_angle_rad = 0.26;  ///< flatter crossings are not used
   double projection_sigma_px =
       0.5;                        ///< calibration and detection, projector px, for projector votes

@@ -58,10 +58,13 @@ PointResult measure_points(const Rig& rig, const Frame& frame, const PointOption
   result.times.push_back({"detection", detection_watch.seconds()});
 
   Stopwatch grid_watch;
+  GridOptions grid = options.grid;
+  // The joint solution decides pattern and line at once.
+  grid.identify = grid.identify && options.solution.method != Method::kJoint;
   result.graphs.resize(cameras);
   parallel_for(cameras, [&](std::size_t c) {
     result.graphs[c] = build_grid_graph(rig, result.families, static_cast<int>(c),
-                                        std::move(result.detections[c].curves), options.grid);
+                                        std::move(result.detections[c].curves), grid);
   });
   result.times.push_back({"grid", grid_watch.seconds()});
 

@@ -50,6 +50,13 @@ ordered_json camera_report(const Rig& rig, const Frame& frame, const PointResult
     std::nth_element(sigmas.begin(), middle, sigmas.end());
     report["curve_sigma_median_px"] = number(*middle);
   }
+  if (c < result.labeling.undecided.size()) {
+    const UndecidedPoints& undecided = result.labeling.undecided[c];
+    report["undecided_points"] = {{"no_crossing", undecided.no_crossing},
+                                  {"ambiguous", undecided.ambiguous},
+                                  {"contradicted", undecided.contradicted},
+                                  {"outside_volume", undecided.outside_volume}};
+  }
   report["saturated_pixels"] = result.detections[c].saturated_pixels;
   report["crosstalk_estimated"] = result.detections[c].unmixing.estimated;
   return report;
@@ -84,17 +91,42 @@ ordered_json component_report(const Rig& rig, const ComponentReport& component) 
   return report;
 }
 
-/// Every detected curve of a camera; undecided ones have key -1.
-std::vector<OverlayCurve> overlay_curves(const GridGraph& graph, OverlayKey key) {
+/// Every detected curve of a camera, by what the grid graph found, or else in pieces by the labels;
+/// undecided ones have key -1.
+std::vector<OverlayCurve> overlay_curves(const Rig& rig, const GridGraph& graph,
+                                         const std::vector<LabeledRun>& runs, OverlayKey key) {
   std::vector<OverlayCurve> curves;
-  for (std::size_t k = 0; k < graph.curves.size(); ++k) {
-    const CurveIdentity& identity = graph.identities[k];
-    OverlayCurve curve;
-    for (const CurvePoint& p : graph.curves[k].points) curve.points.push_back(p.position);
-    if (identity.pattern) {
-      curve.key = key == OverlayKey::kLocalId ? identity.local_id : identity.pattern->projector;
+  const auto add = [&](std::size_t curve, int begin, int end, int value) {
+    OverlayCurve overlay;
+    overlay.key = value;
+    for (int i = begin; i < end; ++i)
+      overlay.points.push_back(graph.curves[curve].points[static_cast<std::size_t>(i)].position);
+    curves.push_back(std::move(overlay));
+  };
+  if (!graph.identities.empty()) {
+    for (std::size_t k = 0; k < graph.curves.size(); ++k) {
+      const CurveIdentity& identity = graph.identities[k];
+      const int value = !identity.pattern             ? -1
+                        : key == OverlayKey::kLocalId ? identity.local_id
+                                                      : identity.pattern->projector;
+      add(k, 0, static_cast<int>(graph.curves[k].points.size()), value);
     }
-    curves.push_back(std::move(curve));
+    return curves;
+  }
+  auto run = runs.begin();
+  for (std::size_t k = 0; k < graph.curves.size(); ++k) {
+    const int end = static_cast<int>(graph.curves[k].points.size());
+    int at = 0;
+    for (; run != runs.end() && run->curve == static_cast<int>(k); ++run) {
+      if (run->begin > at) add(k, at, run->begin, -1);
+      const PatternRef& ref = run->label.pattern;
+      const LinePattern& pattern = rig.projectors[static_cast<std::size_t>(ref.projector)]
+                                       .patterns[static_cast<std::size_t>(ref.pattern)];
+      add(k, run->begin, run->end,
+          key == OverlayKey::kLocalId ? pattern.local_id(run->label.line) : ref.projector);
+      at = run->end;
+    }
+    if (at < end) add(k, at, end, -1);
   }
   return curves;
 }
@@ -148,8 +180,10 @@ void write_frame_pictures(const std::filesystem::path& folder, const Rig& rig, c
     const OverlayKey key = i % 2 == 0 ? OverlayKey::kLocalId : OverlayKey::kProjector;
     OverlayOptions options;
     options.key_name = key == OverlayKey::kLocalId ? "local ID" : "projector";
-    overlays[i] = {rig.cameras[c].name + (i % 2 == 0 ? "_local_id" : "_projector"),
-                   draw_overlay(frame.images[c], overlay_curves(points.graphs[c], key), options)};
+    overlays[i] = {
+        rig.cameras[c].name + (i % 2 == 0 ? "_local_id" : "_projector"),
+        draw_overlay(frame.images[c],
+                     overlay_curves(rig, points.graphs[c], points.labeling.runs[c], key), options)};
   });
   write_pictures(folder, overlays);
   FrameResults results{.rig = rig};

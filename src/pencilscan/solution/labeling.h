@@ -44,10 +44,19 @@ struct LabeledRun {
   CurveLabel label;
 };
 
+/// Curve points that a solution left undecided, by reason.
+struct UndecidedPoints {
+  std::size_t no_crossing = 0;     ///< nothing crosses them, and their surroundings do not decide
+  std::size_t ambiguous = 0;       ///< several lines fit
+  std::size_t contradicted = 0;    ///< no line fits their crossings
+  std::size_t outside_volume = 0;  ///< no line meets their rays in the volume
+};
+
 /// Result of a solution over all cameras; curve points in no run are undecided.
 struct Labeling {
   std::vector<std::vector<LabeledRun>> runs;  ///< per camera, ordered by (curve, begin), disjoint
-  std::vector<ComponentReport> components;
+  std::vector<ComponentReport> components;    ///< linear and multi-view only
+  std::vector<UndecidedPoints> undecided;     ///< per camera; joint only
 };
 
 enum class Method { kLinear, kMultiview, kJoint };
@@ -65,10 +74,10 @@ struct JointOptions {
   double crossing_outliers = 0.05;   ///< share of crossings that are none
   double max_color_cost = 4;         ///< log-likelihood ratio that a piece's colour can give
   double change_cost = 4;            ///< of a curve that jumps from one line to another
-  int passes = 3;                    ///< message passing, then what the cameras say of each other
+  int passes = 2;                    ///< message passing, then what the cameras say of each other
   int rounds = 6;                    ///< of messages in a pass
   double damping = 0.3;              ///< share of the old message kept, [0, 1)
-  double min_confidence = 0.5;       ///< pieces below stay undecided
+  double min_confidence = 0.95;      ///< pieces below stay undecided
 
   /// Cost of a crossing whose planes do not meet.
   [[nodiscard]] float disagreement_cost() const;
