@@ -15,7 +15,7 @@ struct ReconstructOptions {
   std::string rig;
   std::string frames;
   std::string out;
-  std::string method = "multiview";
+  std::string method = "joint";
   std::string cost = "normalized";
   bool no_pictures = false;
   bool overwrite = false;
@@ -70,7 +70,9 @@ void add_reconstruct_command(CLI::App& app) {
   command->add_option("--frames", options->frames, "folder that holds the frame folders")
       ->required();
   command->add_option("--out", options->out, "output folder, one folder per frame")->required();
-  command->add_option("--method", options->method, "how lines are told apart")
+  command
+      ->add_option("--method", options->method,
+                   "how lines are told apart: joint, or the paper's two")
       ->check(CLI::IsMember({"linear", "multiview", "joint"}))
       ->capture_default_str();
   command

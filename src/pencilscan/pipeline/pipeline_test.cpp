@@ -112,18 +112,23 @@ fs::path* PipelineTest::folder_ = nullptr;
 Rig* PipelineTest::rig_ = nullptr;
 Frame* PipelineTest::frame_ = nullptr;
 
-TEST_F(PipelineTest, MultiviewLabelsTheBallAndLinearWorksWithOneCamera) {
-  const PointResult result = measure_points(*rig_, *frame_);
+TEST_F(PipelineTest, JointAndMultiviewLabelTheBallAndLinearWorksWithOneCamera) {
   const TruthScene truth(ball(), *rig_);
-  const auto verdicts = judge_points(truth, result.points);
-  // A noise-free convex object: nearly every point must carry its true line.
-  EXPECT_LT(label_figures(truth, result.points, verdicts).wrong.value(), 0.02);
   std::vector<TrueLinePixel> lines;
   for (int c = 0; c < 2; ++c) {
     const auto part = true_line_pixels(truth, c);
     lines.insert(lines.end(), part.begin(), part.end());
   }
-  EXPECT_GT(line_recall(*rig_, lines, result.points).recall.value(), 0.85);
+  // A noise-free convex object: nearly every point must carry its true line.
+  for (const auto& [method, max_wrong, min_recall] :
+       {std::tuple(Method::kJoint, 0.002, 0.85), std::tuple(Method::kMultiview, 0.02, 0.85)}) {
+    PointOptions options;
+    options.solution.method = method;
+    const PointResult result = measure_points(*rig_, *frame_, options);
+    const auto verdicts = judge_points(truth, result.points);
+    EXPECT_LT(label_figures(truth, result.points, verdicts).wrong.value(), max_wrong);
+    EXPECT_GT(line_recall(*rig_, lines, result.points).recall.value(), min_recall);
+  }
 
   Rig minimum = *rig_;
   minimum.cameras.resize(1);

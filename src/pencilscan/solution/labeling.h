@@ -84,7 +84,7 @@ struct JointOptions {
 };
 
 struct SolutionOptions {
-  Method method = Method::kMultiview;
+  Method method = Method::kJoint;
   JointOptions joint;
   MultiviewCost cost = MultiviewCost::kNormalized;
   double search_radius_px = 8;  ///< reprojected point to detected curve; > 0
