@@ -11,7 +11,7 @@ struct CurvePoint {
   Eigen::Vector2f normal = Eigen::Vector2f::UnitX();  ///< unit; (normal, tangent) turns like (x, y)
   float sigma_px = 0;   ///< standard deviation of the position along the normal
   float amplitude = 0;  ///< height of the line above its surroundings, presence channel
-  float width_px = 0;   ///< Gaussian standard deviation of the profile
+  float width_px = 0;   ///< standard deviation of the profile
   float response = 0;   ///< ridge filter response
 
   [[nodiscard]] Eigen::Vector2f tangent() const { return {-normal.y(), normal.x()}; }

@@ -15,9 +15,38 @@ constexpr float kMinWidth = 0.6F;
 constexpr float kMaxWidth = 4.5F;
 constexpr float kModelReach = 3.0F;  ///< profiles are rendered to this many widths
 constexpr float kWidthPrior = 0.2F;  ///< weight of the width's prior, in profile samples
+constexpr float kTiltPrior = 1.0F;   ///< weight of the prior of even light along the profile
 
 /// Values across a curve at -kMaxHalf..kMaxHalf px; one more, never used, fills the last register.
 using Profile = Eigen::Array<float, 2 * kMaxHalf + 2, 1>;
+
+/// What a camera sees across a projected line: a box with blurred edges, the difference of two
+/// logistic steps at +-half of scale `edge`, with second moment width^2 = (half^2 + (pi edge)^2)
+/// / 3. Its edges place the line where light that varies along the profile would pull a Gaussian
+/// aside, and subtracting it leaves less behind, where weaker lines lie.
+struct LineProfile {
+  float half = 1;
+  float edge = 0.5F;
+  float scale = 1;  ///< makes the height 1
+
+  explicit LineProfile(float width) {
+    constexpr float kEdge = 0.5F;      // px: pixel, lens and projector blur together
+    constexpr float kBluntest = 0.5F;  // of the width: beyond, no box is left
+    edge = std::min(kEdge, kBluntest * width);
+    constexpr float kPi2 = 9.8696F;
+    half = std::sqrt(3 * width * width - kPi2 * edge * edge);
+    scale = 1 / std::tanh(0.5F * half / edge);
+  }
+  template <class Value>
+  [[nodiscard]] Value at(const Value& d) const {
+    using std::exp;
+    const float rate = 1 / edge;
+    // Steps at -half and half, written so that neither exponential overflows within reach.
+    const Value e = exp(-rate * d);
+    const float a = std::exp(-rate * half);
+    return scale * (1 / (1 + a * e) - a / (a + e));
+  }
+};
 
 Profile profile_offsets() { return Profile::LinSpaced(-kMaxHalf, kMaxHalf + 1); }
 
@@ -70,11 +99,13 @@ struct Fit {
   bool good = false;
 };
 
-/// Gauss-Newton for A exp(-(o - x0)^2 / 2 s^2) + c0 + c1 o within +-half px; s is held by a weak
-/// prior at `width`. c0 and c1 are eliminated: everything is taken without its part in 1 and o.
+/// Gauss-Newton for A f((o - x0), s) (1 + g (o - x0)) + c0 + c1 o within +-half px, f being a
+/// LineProfile. s is held by a weak prior at `width`, the slope g of the light along the profile by
+/// one at 0. c0 and c1 are eliminated: everything is taken without its part in 1 and o.
 Fit fit_profile(const Profile& profile, int half, float amplitude, float width) {
   constexpr int kMaxIterations = 8;  // most need two, those of dense lines all
   constexpr float kSmallStep = 0.01F;
+  constexpr float kStep = 0.05F;  // px, for derivatives by differences
   const Profile offsets = profile_offsets();
   const Profile inside = (offsets.abs() < static_cast<float>(half) + 0.5F).cast<float>();
   const Profile mean_weights = inside / inside.sum();
@@ -86,42 +117,45 @@ Fit fit_profile(const Profile& profile, int half, float amplitude, float width) 
   float height = std::max(amplitude, 1e-4F);
   float center = 0;
   float s = width;
+  float tilt = 0;
   Profile residual = Profile::Zero();
-  Eigen::Matrix3f covariance = Eigen::Matrix3f::Zero();
+  Eigen::Matrix4f covariance = Eigen::Matrix4f::Zero();
   for (int iteration = 0; iteration < kMaxIterations; ++iteration) {
-    // Derivatives by A, x0 A / s and s A / s: pure numbers whatever the amplitude.
-    const Profile d = (offsets - center) / s;
-    const Profile e = (-0.5F * d.square()).exp();
-    const Profile by_height = without_background(e);
-    const Profile by_center = without_background(e * d);
-    const Profile by_width = without_background(e * d.square());
-    residual = measured - height * by_height;
-    Eigen::Matrix3f N;
-    N(0, 0) = by_height.square().sum();
-    N(0, 1) = N(1, 0) = (by_height * by_center).sum();
-    N(0, 2) = N(2, 0) = (by_height * by_width).sum();
-    N(1, 1) = by_center.square().sum();
-    N(1, 2) = N(2, 1) = (by_center * by_width).sum();
-    N(2, 2) = by_width.square().sum() + kWidthPrior * s * s;
-    const Eigen::Vector3f g((residual * by_height).sum(), (residual * by_center).sum(),
-                            (residual * by_width).sum() + kWidthPrior * height * s * (width - s));
-    covariance = N.inverse();
-    const Eigen::Vector3f step = covariance * g;
-    const float scale = s / height;
-    covariance(1, 1) *= scale * scale;
-    height += step[0];
-    center += std::clamp(step[1] * scale, -0.7F, 0.7F);
-    s = std::clamp(s + std::clamp(step[2] * scale, -0.5F, 0.5F), kMinWidth, kMaxWidth);
+    // Derivatives divided by the height: pure numbers whatever the amplitude.
+    const LineProfile shape(s);
+    const Profile d = offsets - center;
+    const Profile e = shape.at(d);
+    const Profile light = 1 + tilt * d;
+    Eigen::Matrix<float, Profile::RowsAtCompileTime, 4> J;
+    J.col(0) = without_background(light * e);
+    J.col(1) = without_background(light * (shape.at(Profile(d - kStep)) - e) / kStep);
+    J.col(2) = without_background(light * (LineProfile(s + kStep).at(d) - e) / kStep);
+    J.col(3) = without_background(d * e);
+    residual = measured - height * J.col(0).array();
+    Eigen::Matrix4f N = J.transpose() * J;
+    Eigen::Vector4f g = J.transpose() * residual.matrix();
+    N(2, 2) += kWidthPrior;
+    g[2] += kWidthPrior * height * (width - s);
+    N(3, 3) += kTiltPrior;
+    g[3] -= kTiltPrior * height * tilt;
+    covariance = N.inverse() / (height * height);
+    const Eigen::Vector4f step = height * covariance * g;
+    const float moved = std::clamp(step[1], -0.7F, 0.7F);
+    const float widened = std::clamp(step[2], -0.5F, 0.5F);
+    tilt = std::clamp(tilt + step[3], -0.15F, 0.15F);
+    height += height * step[0];
+    center += moved;
+    s = std::clamp(s + widened, kMinWidth, kMaxWidth);
     if (!(height > 1e-5F)) return {};
-    if (std::abs(step[1] * scale) < kSmallStep && std::abs(step[2] * scale) < 5 * kSmallStep) break;
+    if (std::abs(moved) < kSmallStep && std::abs(widened) < 5 * kSmallStep) break;
   }
   Fit fit;
   fit.amplitude = height;
   fit.offset = center;
   fit.width = s;
   fit.offset_gain = covariance(1, 1);
-  // Only the odd part of the residual can move the line; the even part holds the misfit of a
-  // Gaussian to a blurred box, which is no noise. Two of the parameters (offset, slope) are odd.
+  // Only the odd part of the residual can move the line; the even part holds the misfit of the
+  // profile, which is no noise. Two of the parameters (offset, slope) are odd.
   const auto right = residual.segment<kMaxHalf>(kMaxHalf + 1);
   const auto left = residual.head<kMaxHalf>().reverse();
   fit.residual2 = 0.5F * (right - left).square().sum() / static_cast<float>(half - 2);
@@ -145,8 +179,8 @@ void sample_profiles(const cv::Mat& residual, const std::vector<CurvePoint>& poi
     }
     profile[2 * kMaxHalf + 1] = 0;
     if (!add_own || p.amplitude <= 0) continue;
-    const Profile d = offsets / p.width_px;
-    profile += (d.abs() <= kModelReach).select(p.amplitude * (-0.5F * d.square()).exp(), 0.F);
+    profile += (offsets.abs() <= kModelReach * p.width_px)
+                   .select(p.amplitude * LineProfile(p.width_px).at(offsets), 0.F);
   }
 }
 
@@ -281,10 +315,10 @@ void render_segment(const CurvePoint& p, const CurvePoint& q, cv::Mat& model) {
     const float reach = kModelReach * width / lean;
     const int low = std::max(0, static_cast<int>(std::ceil(center - reach)));
     const int high = std::min(last_minor, static_cast<int>(std::floor(center + reach)));
-    const float scale = -0.5F * lean * lean / (width * width);
+    const LineProfile shape(width);
     for (int k = low; k <= high; ++k) {
       const float d = static_cast<float>(k) - center;
-      const float value = amplitude * std::exp(scale * d * d);
+      const float value = amplitude * shape.at(lean * d);
       (major == 1 ? model.at<float>(m, k) : model.at<float>(k, m)) += value;
     }
   }

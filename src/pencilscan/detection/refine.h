@@ -9,21 +9,22 @@ namespace pencilscan {
 
 struct RefineOptions {
   int rounds = 3;    ///< fits of all curves, each with the others' last fit subtracted
-  int half_arc = 3;  ///< profiles averaged on either side along the curve
+  int half_arc = 4;  ///< profiles averaged on either side along the curve
   double end_amplitude_ratio = 0.45;  ///< a curve ends where its amplitude falls below this share
                                       ///< of that 5 px further in
-  double max_sigma_px = 0.5;          ///< less certain points are dropped
+  double max_sigma_px = 0.8;          ///< less certain points are dropped
   int min_points = 6;
 };
 
 /// Sub-pixel positions: on each point the cross profile, averaged along the curve, is fitted by a
-/// Gaussian line on a sloped background (Gauss-Newton), all other curves subtracted. Sets position,
+/// blurred box under sloping light on a sloped background (Gauss-Newton), all other curves
+/// subtracted. Sets position,
 /// normal, amplitude, width and sigma of every point; cuts curves where they jump or vanish, and
 /// trims ends that overshoot a silhouette or depth step.
 [[nodiscard]] std::vector<Curve> refine_curves(const cv::Mat& presence, std::vector<Curve> curves,
                                                const RefineOptions& options = {});
 
-/// Sum of the Gaussian profiles of all curves, CV_32FC1.
+/// Sum of the profiles of all curves, CV_32FC1.
 [[nodiscard]] cv::Mat render_curves(const std::vector<Curve>& curves, cv::Size size);
 
 /// Bilinear sample; outside, the nearest pixel's value.
