@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 
+#include "pencilscan/detection/nearest.h"
 #include "pencilscan/detection/refine.h"
 
 namespace pencilscan {
@@ -25,8 +26,8 @@ Sums point_sums(const cv::Mat& image, const cv::Mat& others, const CurvePoint& p
   Sums sums;
   for (int o = -kHalf; o <= kHalf; ++o) {
     const auto fo = static_cast<float>(o);
-    const int x = static_cast<int>(std::lround(p.position.x() + fo * p.normal.x()));
-    const int y = static_cast<int>(std::lround(p.position.y() + fo * p.normal.y()));
+    const int x = nearest(p.position.x() + fo * p.normal.x());
+    const int y = nearest(p.position.y() + fo * p.normal.y());
     if (x < 0 || y < 0 || x >= image.cols || y >= image.rows) continue;
     const float d = (static_cast<float>(x) - p.position.x()) * p.normal.x() +
                     (static_cast<float>(y) - p.position.y()) * p.normal.y();

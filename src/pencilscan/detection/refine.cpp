@@ -25,26 +25,26 @@ using Profile = Eigen::Array<float, 2 * kMaxHalf + 2, 1>;
 /// / 3. Its edges place the line where light that varies along the profile would pull a Gaussian
 /// aside, and subtracting it leaves less behind, where weaker lines lie.
 struct LineProfile {
-  float half = 1;
-  float edge = 0.5F;
+  float rate = 2;   ///< 1 / edge
+  float tail = 0;   ///< exp(-half / edge)
   float scale = 1;  ///< makes the height 1
 
   explicit LineProfile(float width) {
     constexpr float kEdge = 0.5F;      // px: pixel, lens and projector blur together
     constexpr float kBluntest = 0.5F;  // of the width: beyond, no box is left
-    edge = std::min(kEdge, kBluntest * width);
+    const float edge = std::min(kEdge, kBluntest * width);
     constexpr float kPi2 = 9.8696F;
-    half = std::sqrt(3 * width * width - kPi2 * edge * edge);
-    scale = 1 / std::tanh(0.5F * half / edge);
+    const float half = std::sqrt(3 * width * width - kPi2 * edge * edge);
+    rate = 1 / edge;
+    tail = std::exp(-rate * half);
+    scale = (1 + tail) / (1 - tail);
   }
   template <class Value>
   [[nodiscard]] Value at(const Value& d) const {
     using std::exp;
-    const float rate = 1 / edge;
-    // Steps at -half and half, written so that neither exponential overflows within reach.
+    // Steps at -half and half, written so that no exponential overflows within reach.
     const Value e = exp(-rate * d);
-    const float a = std::exp(-rate * half);
-    return scale * (1 / (1 + a * e) - a / (a + e));
+    return scale * (1 / (1 + tail * e) - tail / (tail + e));
   }
 };
 
@@ -126,14 +126,22 @@ Fit fit_profile(const Profile& profile, int half, float amplitude, float width) 
     const Profile d = offsets - center;
     const Profile e = shape.at(d);
     const Profile light = 1 + tilt * d;
-    Eigen::Matrix<float, Profile::RowsAtCompileTime, 4> J;
-    J.col(0) = without_background(light * e);
-    J.col(1) = without_background(light * (shape.at(Profile(d - kStep)) - e) / kStep);
-    J.col(2) = without_background(light * (LineProfile(s + kStep).at(d) - e) / kStep);
-    J.col(3) = without_background(d * e);
-    residual = measured - height * J.col(0).array();
-    Eigen::Matrix4f N = J.transpose() * J;
-    Eigen::Vector4f g = J.transpose() * residual.matrix();
+    const std::array<Profile, 4> J = {
+        without_background(light * e),
+        without_background(light * (shape.at(Profile(d - kStep)) - e) / kStep),
+        without_background(light * (LineProfile(s + kStep).at(d) - e) / kStep),
+        without_background(d * e)};
+    residual = measured - height * J[0];
+    Eigen::Matrix4f N;
+    Eigen::Vector4f g;
+    for (std::size_t i = 0; i < 4; ++i) {
+      const auto row = static_cast<Eigen::Index>(i);
+      for (std::size_t j = 0; j <= i; ++j) {
+        const auto column = static_cast<Eigen::Index>(j);
+        N(row, column) = N(column, row) = (J[i] * J[j]).sum();
+      }
+      g[row] = (J[i] * residual).sum();
+    }
     N(2, 2) += kWidthPrior;
     g[2] += kWidthPrior * height * (width - s);
     N(3, 3) += kTiltPrior;

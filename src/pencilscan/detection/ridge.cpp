@@ -5,6 +5,8 @@
 #include <numbers>
 #include <opencv2/imgproc.hpp>
 
+#include "pencilscan/detection/nearest.h"
+
 namespace pencilscan {
 namespace {
 
@@ -287,7 +289,7 @@ class RidgelRows {
 
  private:
   std::vector<std::size_t>& row_of(float y) {
-    const long row = std::clamp<long>(std::lround(y), 0, static_cast<long>(rows_.size()) - 1);
+    const int row = std::clamp(nearest(y), 0, static_cast<int>(rows_.size()) - 1);
     return rows_[static_cast<std::size_t>(row)];
   }
 
@@ -296,8 +298,8 @@ class RidgelRows {
 };
 
 float value_at(const cv::Mat& image, float x, float y) {
-  const int ix = std::clamp(static_cast<int>(std::lround(x)), 0, image.cols - 1);
-  const int iy = std::clamp(static_cast<int>(std::lround(y)), 0, image.rows - 1);
+  const int ix = std::clamp(nearest(x), 0, image.cols - 1);
+  const int iy = std::clamp(nearest(y), 0, image.rows - 1);
   return image.at<float>(iy, ix);
 }
 

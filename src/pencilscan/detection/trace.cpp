@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "pencilscan/detection/nearest.h"
+
 namespace pencilscan {
 namespace {
 
@@ -16,7 +18,7 @@ class PixelIndex {
       : size_(size), head_(static_cast<std::size_t>(size.area()), -1), next_(items, -1) {}
 
   void add(int item, const Vector2f& p) {
-    const std::size_t cell = cell_of(std::lround(p.x()), std::lround(p.y()));
+    const std::size_t cell = cell_of(nearest(p.x()), nearest(p.y()));
     next_[static_cast<std::size_t>(item)] = head_[cell];
     head_[cell] = item;
   }
@@ -24,21 +26,21 @@ class PixelIndex {
   /// Visits the items in a square of +-radius around p, and a few just outside.
   template <class Visit>
   void around(const Vector2f& p, float radius, Visit visit) const {
-    const long left = std::max(0L, std::lround(p.x() - radius));
-    const long top = std::max(0L, std::lround(p.y() - radius));
-    const long right = std::min<long>(size_.width - 1, std::lround(p.x() + radius));
-    const long bottom = std::min<long>(size_.height - 1, std::lround(p.y() + radius));
-    for (long y = top; y <= bottom; ++y) {
-      for (long x = left; x <= right; ++x) {
+    const int left = std::max(0, nearest(p.x() - radius));
+    const int top = std::max(0, nearest(p.y() - radius));
+    const int right = std::min(size_.width - 1, nearest(p.x() + radius));
+    const int bottom = std::min(size_.height - 1, nearest(p.y() + radius));
+    for (int y = top; y <= bottom; ++y) {
+      for (int x = left; x <= right; ++x) {
         for (int i = head_[cell_of(x, y)]; i >= 0; i = next_[static_cast<std::size_t>(i)]) visit(i);
       }
     }
   }
 
  private:
-  [[nodiscard]] std::size_t cell_of(long x, long y) const {
-    const long cx = std::clamp<long>(x, 0, size_.width - 1);
-    const long cy = std::clamp<long>(y, 0, size_.height - 1);
+  [[nodiscard]] std::size_t cell_of(int x, int y) const {
+    const int cx = std::clamp(x, 0, size_.width - 1);
+    const int cy = std::clamp(y, 0, size_.height - 1);
     return static_cast<std::size_t>(cy * size_.width + cx);
   }
 

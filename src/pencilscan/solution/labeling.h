@@ -75,7 +75,7 @@ struct JointOptions {
   double max_color_cost = 4;         ///< log-likelihood ratio that a piece's colour can give
   double change_cost = 4;            ///< of a curve that jumps from one line to another
   int passes = 2;                    ///< message passing, then what the cameras say of each other
-  int rounds = 6;                    ///< of messages in a pass
+  int rounds = 4;                    ///< of messages in a pass
   double damping = 0.3;              ///< share of the old message kept, [0, 1)
   double min_confidence = 0.95;      ///< pieces below stay undecided
 

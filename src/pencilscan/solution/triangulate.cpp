@@ -21,6 +21,14 @@ double coordinate_per_pixel(const Camera& camera, const Projector& projector,
   return a && b ? std::abs((*b)[axis] - (*a)[axis]) : 1.0;
 }
 
+/// Standard deviation of a curve point across the curve, px.
+double position_sigma(const Curve& curve, int i, const TriangulationOptions& options) {
+  const int from_end = std::min(i, static_cast<int>(curve.points.size()) - 1 - i);
+  const double end = options.end_sigma_px * std::exp(-from_end / options.end_reach);
+  return std::hypot(options.position_factor * curve.points[static_cast<std::size_t>(i)].sigma_px,
+                    end);
+}
+
 void add_run(const Rig& rig, const GridGraph& graph, const LabeledRun& run, const Sphere& volume,
              const TriangulationOptions& options, std::vector<MeasuredPoint>& points) {
   const Camera& camera = rig.cameras[static_cast<std::size_t>(graph.camera)];
@@ -39,7 +47,9 @@ void add_run(const Rig& rig, const GridGraph& graph, const LabeledRun& run, cons
     if ((x - volume.center).norm() > options.volume_margin * volume.radius) continue;
     const double slope = std::abs(ray.slope(*depth, pattern.axis));
     const double gain = coordinate_per_pixel(camera, projector, pattern, p, *depth);
-    const double sigma_px = std::hypot(gain * p.sigma_px, options.projection_sigma_px);
+    const double position = position_sigma(curve, i, options);
+    const double sigma_px = std::hypot(gain * position, options.projection_sigma_px);
+    const double footprint = options.footprint_sigma_px * *depth / camera.K(0, 0);
     const double ray_length = camera.normalized_from_pixel(pixel).homogeneous().norm();
     MeasuredPoint point;
     point.x = static_cast<float>(x.x());
@@ -51,7 +61,8 @@ void add_run(const Rig& rig, const GridGraph& graph, const LabeledRun& run, cons
     point.projector = static_cast<std::uint8_t>(label.pattern.projector);
     point.pattern = static_cast<std::uint8_t>(label.pattern.pattern);
     point.line = static_cast<std::uint16_t>(label.line);
-    point.sigma = static_cast<float>(sigma_px / std::max(1e-6, slope) * ray_length);
+    point.sigma =
+        static_cast<float>(std::hypot(sigma_px / std::max(1e-6, slope), footprint) * ray_length);
     point.confidence = label.confidence;
     point.plane = static_cast<float>(label.plane);
     points.push_back(point);
