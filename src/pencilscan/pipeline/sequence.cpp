@@ -102,7 +102,7 @@ void reconstruct_frame(const Rig& rig, const FrameFiles& files, const fs::path& 
   const double reading = total.seconds();
   PointResult points = measure_points(rig, frame, options.points);
   if (points.points.empty()) {
-    throw StageError("frame " + files.name + ": no curve could be given its projector line");
+    throw StageError("no curve could be given its projector line");
   }
   const Stopwatch surface_watch;
   const SurfaceResult surface = reconstruct_surface(rig, points.points, options.surface);
