@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/solution/min_sum.h"
@@ -155,21 +156,20 @@ Labeling solve_joint(const Rig& rig, const std::vector<ColorFamily>& families,
     pieces[g] = possible_labels(rig, families, graphs[g], options);
   });
   const OtherViews others(rig, graphs, pieces);
-  std::vector<Surroundings> surroundings;
-  for (std::size_t g = 0; g < graphs.size(); ++g) {
-    surroundings.emplace_back(rig.cameras[static_cast<std::size_t>(graphs[g].camera)], graphs[g],
-                              pieces[g]);
-  }
+  std::vector<std::optional<Surroundings>> surroundings(graphs.size());
   std::vector<PairwiseEnergy> energies(graphs.size());
-  parallel_for(graphs.size(),
-               [&](std::size_t g) { energies[g] = pairwise_energy(pieces[g], options); });
+  parallel_for(graphs.size(), [&](std::size_t g) {
+    surroundings[g].emplace(rig.cameras[static_cast<std::size_t>(graphs[g].camera)], graphs[g],
+                            pieces[g]);
+    energies[g] = pairwise_energy(pieces[g], options);
+  });
   std::vector<std::vector<Decision>> decisions(graphs.size());
   std::vector<PieceBeliefs> beliefs(graphs.size());
   for (int pass = 0; pass < options.passes; ++pass) {
     std::vector<PieceBeliefs> next(graphs.size());
     parallel_for(graphs.size(), [&](std::size_t g) {
       auto evidence = others.costs(g, beliefs);
-      add(surroundings[g].costs(beliefs[g]), evidence);
+      add(surroundings[g]->costs(beliefs[g]), evidence);
       set_unary(pieces[g], evidence, energies[g]);
       const std::vector<float> costs =
           min_sum(energies[g], options.rounds, static_cast<float>(options.damping));
