@@ -5,50 +5,14 @@
 #include <array>
 #include <cmath>
 
+#include "pencilscan/core/lanes.h"
+#include "pencilscan/detection/nearest.h"
+#include "pencilscan/detection/profile_fit.h"
+
 namespace pencilscan {
 namespace {
 
 using Eigen::Vector2f;
-
-constexpr int kMaxHalf = 7;  ///< largest half-length of a profile, px
-constexpr float kMinWidth = 0.6F;
-constexpr float kMaxWidth = 4.5F;
-constexpr float kModelReach = 3.0F;  ///< profiles are rendered to this many widths
-constexpr float kWidthPrior = 0.2F;  ///< weight of the width's prior, in profile samples
-constexpr float kTiltPrior = 1.0F;   ///< weight of the prior of even light along the profile
-
-/// Values across a curve at -kMaxHalf..kMaxHalf px; one more, never used, fills the last register.
-using Profile = Eigen::Array<float, 2 * kMaxHalf + 2, 1>;
-
-/// What a camera sees across a projected line: a box with blurred edges, the difference of two
-/// logistic steps at +-half of scale `edge`, with second moment width^2 = (half^2 + (pi edge)^2)
-/// / 3. Its edges place the line where light that varies along the profile would pull a Gaussian
-/// aside, and subtracting it leaves less behind, where weaker lines lie.
-struct LineProfile {
-  float rate = 2;   ///< 1 / edge
-  float tail = 0;   ///< exp(-half / edge)
-  float scale = 1;  ///< makes the height 1
-
-  explicit LineProfile(float width) {
-    constexpr float kEdge = 0.5F;      // px: pixel, lens and projector blur together
-    constexpr float kBluntest = 0.5F;  // of the width: beyond, no box is left
-    const float edge = std::min(kEdge, kBluntest * width);
-    constexpr float kPi2 = 9.8696F;
-    const float half = std::sqrt(3 * width * width - kPi2 * edge * edge);
-    rate = 1 / edge;
-    tail = std::exp(-rate * half);
-    scale = (1 + tail) / (1 - tail);
-  }
-  template <class Value>
-  [[nodiscard]] Value at(const Value& d) const {
-    using std::exp;
-    // Steps at -half and half, written so that no exponential overflows within reach.
-    const Value e = exp(-rate * d);
-    return scale * (1 / (1 + tail * e) - tail / (tail + e));
-  }
-};
-
-Profile profile_offsets() { return Profile::LinSpaced(-kMaxHalf, kMaxHalf + 1); }
 
 /// Places points on a local parabola through their neighbours, and sets the normals.
 void smooth_positions(std::vector<CurvePoint>& points, int reach) {
@@ -94,82 +58,43 @@ struct Fit {
   float amplitude = 0;
   float offset = 0;
   float width = 0;
-  float residual2 = 0;    ///< noise variance from the odd part of the residual
-  float offset_gain = 0;  ///< variance of offset for unit residual variance
+  float residual2 = 0;
+  float offset_gain = 0;
   bool good = false;
 };
 
-/// Gauss-Newton for A f((o - x0), s) (1 + g (o - x0)) + c0 + c1 o within +-half px, f being a
-/// LineProfile. s is held by a weak prior at `width`, the slope g of the light along the profile by
-/// one at 0. c0 and c1 are eliminated: everything is taken without its part in 1 and o.
-Fit fit_profile(const Profile& profile, int half, float amplitude, float width) {
-  constexpr int kMaxIterations = 8;  // most need two, those of dense lines all
-  constexpr float kSmallStep = 0.01F;
-  constexpr float kStep = 0.05F;  // px, for derivatives by differences
-  const Profile offsets = profile_offsets();
-  const Profile inside = (offsets.abs() < static_cast<float>(half) + 0.5F).cast<float>();
-  const Profile mean_weights = inside / inside.sum();
-  const Profile slope_weights = inside * offsets / (inside * offsets.square()).sum();
-  const auto without_background = [&](const Profile& p) -> Profile {
-    return inside * (p - (p * mean_weights).sum() - (p * slope_weights).sum() * offsets);
-  };
-  const Profile measured = without_background(profile);
-  float height = std::max(amplitude, 1e-4F);
-  float center = 0;
-  float s = width;
-  float tilt = 0;
-  Profile residual = Profile::Zero();
-  Eigen::Matrix4f covariance = Eigen::Matrix4f::Zero();
-  for (int iteration = 0; iteration < kMaxIterations; ++iteration) {
-    // Derivatives divided by the height: pure numbers whatever the amplitude.
-    const LineProfile shape(s);
-    const Profile d = offsets - center;
-    const Profile e = shape.at(d);
-    const Profile light = 1 + tilt * d;
-    const std::array<Profile, 4> J = {
-        without_background(light * e),
-        without_background(light * (shape.at(Profile(d - kStep)) - e) / kStep),
-        without_background(light * (LineProfile(s + kStep).at(d) - e) / kStep),
-        without_background(d * e)};
-    residual = measured - height * J[0];
-    Eigen::Matrix4f N;
-    Eigen::Vector4f g;
-    for (std::size_t i = 0; i < 4; ++i) {
-      const auto row = static_cast<Eigen::Index>(i);
-      for (std::size_t j = 0; j <= i; ++j) {
-        const auto column = static_cast<Eigen::Index>(j);
-        N(row, column) = N(column, row) = (J[i] * J[j]).sum();
-      }
-      g[row] = (J[i] * residual).sum();
-    }
-    N(2, 2) += kWidthPrior;
-    g[2] += kWidthPrior * height * (width - s);
-    N(3, 3) += kTiltPrior;
-    g[3] -= kTiltPrior * height * tilt;
-    covariance = N.inverse() / (height * height);
-    const Eigen::Vector4f step = height * covariance * g;
-    const float moved = std::clamp(step[1], -0.7F, 0.7F);
-    const float widened = std::clamp(step[2], -0.5F, 0.5F);
-    tilt = std::clamp(tilt + step[3], -0.15F, 0.15F);
-    height += height * step[0];
-    center += moved;
-    s = std::clamp(s + widened, kMinWidth, kMaxWidth);
-    if (!(height > 1e-5F)) return {};
-    if (std::abs(moved) < kSmallStep && std::abs(widened) < 5 * kSmallStep) break;
+/// Values across a curve at -kMaxHalf..kMaxHalf px; one more, never used, fills the last register.
+using Profile = std::array<float, 2 * kLanes>;
+
+/// sample_bilinear() at position + o normal for the offsets o of a Profile.
+PENCILSCAN_CLONES
+void sample_across(const cv::Mat& image, const CurvePoint& point, Profile& profile) {
+  const auto* data = image.ptr<float>();
+  const auto row = static_cast<int>(image.step1());
+  for (int block = 0; block < 2; ++block) {
+    Lanes offset;
+    for (int k = 0; k < kLanes; ++k) offset[k] = static_cast<float>(block * kLanes + k - kMaxHalf);
+    Lanes x = point.position.x() + offset * point.normal.x();
+    Lanes y = point.position.y() + offset * point.normal.y();
+    clamp(0, static_cast<float>(image.cols - 1), x);
+    clamp(0, static_cast<float>(image.rows - 1), y);
+    IntLanes ix = __builtin_convertvector(x, IntLanes);
+    IntLanes iy = __builtin_convertvector(y, IntLanes);
+    ix = ix > image.cols - 2 ? ix - 1 : ix;
+    iy = iy > image.rows - 2 ? iy - 1 : iy;
+    x -= __builtin_convertvector(ix, Lanes);
+    y -= __builtin_convertvector(iy, Lanes);
+    const IntLanes at = iy * row + ix;
+    std::array<Lanes, 4> corner{};
+    gather(data, at, corner[0]);
+    gather(data + 1, at, corner[1]);
+    gather(data + row, at, corner[2]);
+    gather(data + row + 1, at, corner[3]);
+    const Lanes value =
+        (1 - y) * ((1 - x) * corner[0] + x * corner[1]) + y * ((1 - x) * corner[2] + x * corner[3]);
+    for (int k = 0; k < kLanes; ++k)
+      profile[static_cast<std::size_t>(block * kLanes + k)] = value[k];
   }
-  Fit fit;
-  fit.amplitude = height;
-  fit.offset = center;
-  fit.width = s;
-  fit.offset_gain = covariance(1, 1);
-  // Only the odd part of the residual can move the line; the even part holds the misfit of the
-  // profile, which is no noise. Two of the parameters (offset, slope) are odd.
-  const auto right = residual.segment<kMaxHalf>(kMaxHalf + 1);
-  const auto left = residual.head<kMaxHalf>().reverse();
-  fit.residual2 = 0.5F * (right - left).square().sum() / static_cast<float>(half - 2);
-  fit.good = std::isfinite(center) && std::isfinite(fit.offset_gain) && fit.offset_gain > 0 &&
-             std::abs(center) < 1.6F;
-  return fit;
 }
 
 /// Samples the image across the curve, with the curve's own model added back where `residual` holds
@@ -177,19 +102,40 @@ Fit fit_profile(const Profile& profile, int half, float amplitude, float width) 
 void sample_profiles(const cv::Mat& residual, const std::vector<CurvePoint>& points, bool add_own,
                      std::vector<Profile>& profiles) {
   profiles.resize(points.size());
-  const Profile offsets = profile_offsets();
+  Profile own;
   for (std::size_t i = 0; i < points.size(); ++i) {
     const CurvePoint& p = points[i];
-    Profile& profile = profiles[i];
-    for (int o = 0; o <= 2 * kMaxHalf; ++o) {
-      const Vector2f at = p.position + static_cast<float>(o - kMaxHalf) * p.normal;
-      profile[o] = sample_bilinear(residual, at.x(), at.y());
-    }
-    profile[2 * kMaxHalf + 1] = 0;
+    sample_across(residual, p, profiles[i]);
     if (!add_own || p.amplitude <= 0) continue;
-    profile += (offsets.abs() <= kModelReach * p.width_px)
-                   .select(p.amplitude * LineProfile(p.width_px).at(offsets), 0.F);
+    line_profile(p.width_px, own);
+    for (std::size_t k = 0; k < own.size(); ++k) profiles[i][k] += p.amplitude * own[k];
   }
+}
+
+/// Fits of eight points at once, from `first` on.
+void fit_batch(const std::vector<CurvePoint>& points, const std::vector<Profile>& profiles,
+               bool first_round, int half_arc, int first, ProfileFits& fits) {
+  const int n = static_cast<int>(points.size());
+  ProfileBatch batch;
+  for (int k = 0; k < kLanes; ++k) {
+    const int i = std::min(first + k, n - 1);
+    const int r = std::min({half_arc, i, n - 1 - i});  // symmetric: no shift towards the inside
+    Profile mean{};
+    for (int j = i - r; j <= i + r; ++j) {
+      const Profile& profile = profiles[static_cast<std::size_t>(j)];
+      for (std::size_t o = 0; o < mean.size(); ++o) mean[o] += profile[o];
+    }
+    const float weight = 1 / static_cast<float>(2 * r + 1);
+    for (std::size_t o = 0; o < kProfileSize; ++o) batch.value[o][k] = weight * mean[o];
+    const float width = points[static_cast<std::size_t>(i)].width_px;
+    // At first the neighbours are still in the image: a shorter profile sees less of them.
+    const int half = std::clamp(nearest(2.4F * width) + (first_round ? 0 : 1), 4, kMaxHalf);
+    const auto at = [&](int o) { return batch.value[static_cast<std::size_t>(kMaxHalf + o)][k]; };
+    batch.half[k] = static_cast<float>(half);
+    batch.amplitude[k] = at(0) - std::min(at(-half), at(half));
+    batch.width[k] = width;
+  }
+  fit_profiles(batch, fits);
 }
 
 void fit_curve(const cv::Mat& residual, bool first_round, int half_arc, Curve& curve) {
@@ -198,18 +144,14 @@ void fit_curve(const cv::Mat& residual, bool first_round, int half_arc, Curve& c
   sample_profiles(residual, points, !first_round, profiles);
   const int n = static_cast<int>(points.size());
   std::vector<Fit> fits(points.size());
-  for (int i = 0; i < n; ++i) {
-    const int r = std::min({half_arc, i, n - 1 - i});  // symmetric: no shift towards the inside
-    Profile mean = Profile::Zero();
-    for (int j = i - r; j <= i + r; ++j) mean += profiles[static_cast<std::size_t>(j)];
-    mean /= static_cast<float>(2 * r + 1);
-    const CurvePoint& p = points[static_cast<std::size_t>(i)];
-    const float width = p.width_px;
-    // At first the neighbours are still in the image: a shorter profile sees less of them.
-    const int half = std::clamp(static_cast<int>(std::lround(2.4F * width)) + (first_round ? 0 : 1),
-                                4, kMaxHalf);
-    const float top = mean[kMaxHalf] - std::min(mean[kMaxHalf - half], mean[kMaxHalf + half]);
-    fits[static_cast<std::size_t>(i)] = fit_profile(mean, half, top, width);
+  for (int first = 0; first < n; first += kLanes) {
+    ProfileFits batch;
+    fit_batch(points, profiles, first_round, half_arc, first, batch);
+    for (int k = 0; k < std::min(kLanes, n - first); ++k) {
+      fits[static_cast<std::size_t>(first + k)] = {batch.amplitude[k],   batch.offset[k],
+                                                   batch.width[k],       batch.residual2[k],
+                                                   batch.offset_gain[k], batch.good[k] != 0};
+    }
   }
   for (int i = 0; i < n; ++i) {
     CurvePoint& p = points[static_cast<std::size_t>(i)];
@@ -253,8 +195,8 @@ void smooth_widths(std::vector<CurvePoint>& points) {
 }
 
 bool sound(const CurvePoint& p, const RefineOptions& options) {
-  return p.amplitude > 0 && p.sigma_px < options.max_sigma_px && p.width_px > kMinWidth &&
-         p.width_px < kMaxWidth;
+  return p.amplitude > 0 && p.sigma_px < options.max_sigma_px && p.width_px > kMinLineWidth &&
+         p.width_px < kMaxLineWidth;
 }
 
 /// True when going from b to c leaves the direction from a to b by a jump.
@@ -323,12 +265,10 @@ void render_segment(const CurvePoint& p, const CurvePoint& q, cv::Mat& model) {
     const float reach = kModelReach * width / lean;
     const int low = std::max(0, static_cast<int>(std::ceil(center - reach)));
     const int high = std::min(last_minor, static_cast<int>(std::floor(center + reach)));
-    const LineProfile shape(width);
-    for (int k = low; k <= high; ++k) {
-      const float d = static_cast<float>(k) - center;
-      const float value = amplitude * shape.at(lean * d);
-      (major == 1 ? model.at<float>(m, k) : model.at<float>(k, m)) += value;
-    }
+    float* image = major == 1 ? model.ptr<float>(m, low) : model.ptr<float>(low, m);
+    add_line_profile(amplitude, width, lean * (static_cast<float>(low) - center), lean,
+                     high - low + 1, image,
+                     major == 1 ? 1 : static_cast<std::ptrdiff_t>(model.step1()));
   }
 }
 

@@ -1,0 +1,306 @@
+#include "pencilscan/detection/profile_fit.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+namespace pencilscan {
+namespace {
+
+constexpr float kWidthPrior = 0.2F;  ///< weight of the width's prior, in profile samples
+constexpr float kTiltPrior = 1.0F;   ///< weight of the prior of even light along the profile
+constexpr float kEdge = 0.5F;        ///< px: pixel, lens and projector blur together
+constexpr float kBluntest = 0.5F;    ///< edge, of the width: beyond, no box is left
+constexpr float kPi2 = 9.8696F;
+
+PENCILSCAN_INLINE void select(const IntLanes& mask, const Lanes& value, Lanes& result) {
+  result = mask ? value : result;
+}
+
+/// Line profiles of eight widths.
+struct LineShape {
+  Lanes rate;            ///< 1 / edge
+  Lanes half;            ///< px
+  Lanes tail;            ///< exp(-half / edge)
+  Lanes scale;           ///< makes the height 1
+  Lanes half_per_width;  ///< d half / d width
+  IntLanes is_blunt;     ///< edge in proportion to the width
+};
+
+PENCILSCAN_INLINE void make_shape(const Lanes& width, LineShape& shape) {
+  Lanes edge = width * kBluntest;
+  shape.is_blunt = edge < kEdge;
+  edge = shape.is_blunt ? edge : edge - edge + kEdge;
+  const Lanes square = 3 * width * width - kPi2 * edge * edge;
+  for (int k = 0; k < kLanes; ++k) shape.half[k] = std::sqrt(square[k]);
+  shape.rate = 1 / edge;
+  exponential(-shape.rate * shape.half, shape.tail);
+  shape.scale = (1 + shape.tail) / (1 - shape.tail);
+  shape.half_per_width = 3 * width / shape.half;
+}
+
+/// The two steps of the profile at d, given e = exp(-rate d): 1 / (1 + tail e) and
+/// tail / (tail + e), written so that nothing overflows within reach.
+PENCILSCAN_INLINE void steps_at(const LineShape& shape, const Lanes& e, Lanes& rising,
+                                Lanes& falling) {
+  const Lanes one_plus = 1 + shape.tail * e;
+  const Lanes tail_plus = shape.tail + e;
+  const Lanes inverse = 1 / (one_plus * tail_plus);
+  rising = tail_plus * inverse;
+  falling = shape.tail * one_plus * inverse;
+}
+
+struct Parameters {
+  Lanes height;
+  Lanes center;
+  Lanes width;
+  Lanes tilt;
+};
+
+/// Order of the unknowns: the centre last, so that elimination ends with its variance.
+constexpr int kUnknowns = 4;
+enum Unknown { kHeight, kWidth, kTilt, kCenter };
+
+/// Normal equations of one step, for unknowns divided by the height: pure numbers whatever the
+/// amplitude. Upper triangle.
+struct NormalEquations {
+  std::array<std::array<Lanes, kUnknowns>, kUnknowns> matrix;
+  std::array<Lanes, kUnknowns> right;
+};
+
+/// Solves in place by Cholesky's decomposition without roots; `right` becomes the solution.
+PENCILSCAN_INLINE void solve(NormalEquations& n, Lanes& center_variance) {
+  auto& [m, x] = n;
+  for (std::size_t i = 0; i < kUnknowns; ++i) {
+    const Lanes inverse = 1 / m[i][i];
+    for (std::size_t j = i + 1; j < kUnknowns; ++j) {
+      const Lanes factor = m[i][j] * inverse;
+      for (std::size_t k = j; k < kUnknowns; ++k) m[j][k] -= factor * m[i][k];
+      x[j] -= factor * x[i];
+    }
+    m[i][i] = inverse;
+  }
+  center_variance = m[kCenter][kCenter];
+  for (std::size_t i = kUnknowns; i-- > 0;) {
+    for (std::size_t j = i + 1; j < kUnknowns; ++j) x[i] -= m[i][j] * x[j];
+    x[i] *= m[i][i];
+  }
+}
+
+/// Samples that count, and what takes a background of level and slope away from a profile.
+struct Background {
+  std::array<Lanes, kProfileSize> inside;  ///< 1 or 0
+  Lanes inverse_count;
+  Lanes inverse_moment;  ///< 1 / sum of offset^2
+
+  PENCILSCAN_INLINE explicit Background(const Lanes& half) {
+    Lanes count{};
+    Lanes moment{};
+    for (int i = 0; i < kProfileSize; ++i) {
+      const auto o = static_cast<float>(i - kMaxHalf);
+      const Lanes zero{};
+      Lanes& w = inside[static_cast<std::size_t>(i)];
+      w = half >= std::abs(o) ? zero + 1 : zero;
+      count += w;
+      moment += w * (o * o);
+    }
+    inverse_count = 1 / count;
+    inverse_moment = 1 / moment;
+  }
+
+  PENCILSCAN_INLINE void remove_from(std::array<Lanes, kProfileSize>& profile) const {
+    Lanes sum{};
+    Lanes slope{};
+    for (int i = 0; i < kProfileSize; ++i) {
+      const auto at = static_cast<std::size_t>(i);
+      profile[at] *= inside[at];
+      sum += profile[at];
+      slope += profile[at] * static_cast<float>(i - kMaxHalf);
+    }
+    sum *= inverse_count;
+    slope *= inverse_moment;
+    for (int i = 0; i < kProfileSize; ++i) {
+      const auto at = static_cast<std::size_t>(i);
+      profile[at] -= inside[at] * (sum + slope * static_cast<float>(i - kMaxHalf));
+    }
+  }
+};
+
+/// Sets up one step; `model` becomes the line of height 1 under its light, with background.
+PENCILSCAN_INLINE void linearize(const std::array<Lanes, kProfileSize>& measured,
+                                 const Background& background, const Parameters& at,
+                                 std::array<Lanes, kProfileSize>& model, Lanes& model_slope,
+                                 NormalEquations& n) {
+  LineShape shape;
+  make_shape(at.width, shape);
+  // exp(-rate (o - center)) from one offset to the next is a product.
+  Lanes e;
+  Lanes ratio;
+  exponential(shape.rate * (at.center + static_cast<float>(kMaxHalf)), e);
+  exponential(-shape.rate, ratio);
+  std::array<Lanes, kUnknowns> sum{};
+  std::array<Lanes, kUnknowns> slope{};
+  n = {};
+  // d scale / d half, relative
+  const Lanes scale_change = -2 * shape.rate * shape.tail / ((1 - shape.tail) * (1 + shape.tail));
+  const Lanes inverse_width = 1 / at.width;
+  for (int i = 0; i < kProfileSize; ++i) {
+    const auto s = static_cast<std::size_t>(i);
+    const auto o = static_cast<float>(i - kMaxHalf);
+    const Lanes d = o - at.center;
+    Lanes rising;
+    Lanes falling;
+    steps_at(shape, e, rising, falling);
+    e *= ratio;
+    const Lanes f = shape.scale * (rising - falling);
+    const Lanes steep = shape.scale * shape.rate;
+    const Lanes rise = steep * rising * (1 - rising);
+    const Lanes fall = steep * falling * (1 - falling);
+    const Lanes f_d = rise - fall;
+    // A blunt profile is stretched, the others become wider between the same edges.
+    const Lanes f_width = shape.is_blunt ? -d * inverse_width * f_d
+                                         : (rise + fall + scale_change * f) * shape.half_per_width;
+    const Lanes light = (1 + at.tilt * d) * background.inside[s];
+    std::array<Lanes, kUnknowns> J;
+    J[kHeight] = light * f;
+    J[kWidth] = light * f_width;
+    J[kTilt] = background.inside[s] * d * f;
+    J[kCenter] = -light * f_d;
+    model[s] = J[kHeight];
+    for (std::size_t j = 0; j < kUnknowns; ++j) {
+      sum[j] += J[j];
+      slope[j] += J[j] * o;
+      n.right[j] += J[j] * measured[s];
+      for (std::size_t k = j; k < kUnknowns; ++k) n.matrix[j][k] += J[j] * J[k];
+    }
+  }
+  model_slope = slope[kHeight] * background.inverse_moment;
+  for (std::size_t j = 0; j < kUnknowns; ++j) {
+    const Lanes mean = sum[j] * background.inverse_count;
+    const Lanes lean = slope[j] * background.inverse_moment;
+    for (std::size_t k = j; k < kUnknowns; ++k) n.matrix[j][k] -= mean * sum[k] + lean * slope[k];
+  }
+  for (std::size_t j = 0; j < kUnknowns; ++j) n.right[j] -= at.height * n.matrix[0][j];
+}
+
+/// Only the odd part of the residual can move the line; the even part holds the misfit of the
+/// profile, which is no noise. Two of the parameters (offset, slope) are odd.
+PENCILSCAN_INLINE void odd_variance(const std::array<Lanes, kProfileSize>& measured,
+                                    const std::array<Lanes, kProfileSize>& model,
+                                    const Lanes& model_slope, const Background& background,
+                                    const Lanes& height, const Lanes& half, Lanes& variance) {
+  Lanes sum{};
+  for (int o = 1; o <= kMaxHalf; ++o) {
+    const auto right = static_cast<std::size_t>(kMaxHalf + o);
+    const auto left = static_cast<std::size_t>(kMaxHalf - o);
+    const Lanes line = model[right] - model[left] - static_cast<float>(2 * o) * model_slope;
+    const Lanes odd = measured[right] - measured[left] - height * line;
+    sum += background.inside[right] * odd * odd;
+  }
+  variance = 0.5F * sum / (half - 2);
+}
+
+}  // namespace
+
+PENCILSCAN_CLONES
+void line_profile(float width, std::array<float, 2 * kLanes>& values) {
+  Lanes widths;
+  fill(width, widths);
+  LineShape shape;
+  make_shape(widths, shape);
+  for (int block = 0; block < 2; ++block) {
+    Lanes d;
+    for (int k = 0; k < kLanes; ++k) d[k] = static_cast<float>(block * kLanes + k - kMaxHalf);
+    Lanes e;
+    exponential(-shape.rate * d, e);
+    Lanes rising;
+    Lanes falling;
+    steps_at(shape, e, rising, falling);
+    Lanes f = shape.scale * (rising - falling);
+    f = d * d <= (kModelReach * width) * (kModelReach * width) ? f : f - f;
+    for (int k = 0; k < kLanes; ++k) values[static_cast<std::size_t>(block * kLanes + k)] = f[k];
+  }
+}
+
+PENCILSCAN_CLONES
+void add_line_profile(float amplitude, float width, float first, float step, int count,
+                      float* image, std::ptrdiff_t stride) {
+  Lanes widths;
+  fill(width, widths);
+  LineShape shape;
+  make_shape(widths, shape);
+  Lanes place;
+  for (int k = 0; k < kLanes; ++k) place[k] = static_cast<float>(k);
+  for (int i = 0; i < count; i += kLanes) {
+    const Lanes d = first + step * (place + static_cast<float>(i));
+    Lanes e;
+    exponential(-shape.rate * d, e);
+    Lanes rising;
+    Lanes falling;
+    steps_at(shape, e, rising, falling);
+    const Lanes f = amplitude * shape.scale * (rising - falling);
+    for (int k = 0; k < std::min(kLanes, count - i); ++k) image[(i + k) * stride] += f[k];
+  }
+}
+
+PENCILSCAN_CLONES
+void fit_profiles(const ProfileBatch& batch, ProfileFits& fits) {
+  constexpr int kMaxIterations = 8;  // most need two, those of dense lines all
+  constexpr float kSmallMove = 0.01F;
+  constexpr float kSmallWidening = 0.05F;
+  constexpr float kMinHeight = 1e-5F;
+  const Lanes zero{};
+  const Background background(batch.half);
+  std::array<Lanes, kProfileSize> measured = batch.value;
+  background.remove_from(measured);
+  Parameters now{batch.amplitude, zero, batch.width, zero};
+  now.height = now.height > 1e-4F ? now.height : zero + 1e-4F;
+  IntLanes is_open = zero == zero;
+  fits = ProfileFits();
+  fits.good = is_open;
+  std::array<Lanes, kProfileSize> model;
+  for (int iteration = 0; iteration < kMaxIterations && any(is_open); ++iteration) {
+    NormalEquations n;
+    Lanes model_slope;
+    linearize(measured, background, now, model, model_slope, n);
+    n.matrix[kWidth][kWidth] += kWidthPrior;
+    n.right[kWidth] += kWidthPrior * now.height * (batch.width - now.width);
+    n.matrix[kTilt][kTilt] += kTiltPrior;
+    n.right[kTilt] -= kTiltPrior * now.height * now.tilt;
+    Lanes center_variance;
+    solve(n, center_variance);
+    Lanes variance;
+    odd_variance(measured, model, model_slope, background, now.height, batch.half, variance);
+    select(is_open, variance, fits.residual2);
+    select(is_open, center_variance / (now.height * now.height), fits.offset_gain);
+    // The step, in units of the height except for the height's own.
+    Lanes moved = n.right[kCenter] / now.height;
+    Lanes widened = n.right[kWidth] / now.height;
+    clamp(-0.7F, 0.7F, moved);
+    clamp(-0.5F, 0.5F, widened);
+    Parameters next = now;
+    next.tilt += n.right[kTilt] / now.height;
+    clamp(-0.15F, 0.15F, next.tilt);
+    next.height += n.right[kHeight];
+    next.center += moved;
+    next.width += widened;
+    clamp(kMinLineWidth, kMaxLineWidth, next.width);
+    select(is_open, next.height, now.height);
+    select(is_open, next.center, now.center);
+    select(is_open, next.width, now.width);
+    select(is_open, next.tilt, now.tilt);
+    // NaN fails too.
+    fits.good &= now.height > kMinHeight;
+    const IntLanes is_small = (moved * moved < kSmallMove * kSmallMove) &
+                              (widened * widened < kSmallWidening * kSmallWidening);
+    is_open &= ~is_small & fits.good;
+  }
+  constexpr float kMaxOffset = 1.6F;
+  fits.amplitude = now.height;
+  fits.offset = now.center;
+  fits.width = now.width;
+  fits.good &= (now.center * now.center < kMaxOffset * kMaxOffset) & (fits.offset_gain > 0) &
+               (fits.offset_gain < 1e30F);
+}
+
+}  // namespace pencilscan
