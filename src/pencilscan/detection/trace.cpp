@@ -3,51 +3,16 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
-#include "pencilscan/detection/nearest.h"
+#include "pencilscan/detection/cell_index.h"
 
 namespace pencilscan {
 namespace {
 
 using Eigen::Vector2f;
 
-/// Buckets of items by pixel.
-class PixelIndex {
- public:
-  PixelIndex(cv::Size size, std::size_t items)
-      : size_(size), head_(static_cast<std::size_t>(size.area()), -1), next_(items, -1) {}
-
-  void add(int item, const Vector2f& p) {
-    const std::size_t cell = cell_of(nearest(p.x()), nearest(p.y()));
-    next_[static_cast<std::size_t>(item)] = head_[cell];
-    head_[cell] = item;
-  }
-
-  /// Visits the items in a square of +-radius around p, and a few just outside.
-  template <class Visit>
-  void around(const Vector2f& p, float radius, Visit visit) const {
-    const int left = std::max(0, nearest(p.x() - radius));
-    const int top = std::max(0, nearest(p.y() - radius));
-    const int right = std::min(size_.width - 1, nearest(p.x() + radius));
-    const int bottom = std::min(size_.height - 1, nearest(p.y() + radius));
-    for (int y = top; y <= bottom; ++y) {
-      for (int x = left; x <= right; ++x) {
-        for (int i = head_[cell_of(x, y)]; i >= 0; i = next_[static_cast<std::size_t>(i)]) visit(i);
-      }
-    }
-  }
-
- private:
-  [[nodiscard]] std::size_t cell_of(int x, int y) const {
-    const int cx = std::clamp(x, 0, size_.width - 1);
-    const int cy = std::clamp(y, 0, size_.height - 1);
-    return static_cast<std::size_t>(cy * size_.width + cx);
-  }
-
-  cv::Size size_;
-  std::vector<int> head_;
-  std::vector<int> next_;
-};
+constexpr int kCellPx = 2;  ///< of the indices: about an item each
 
 /// A directed end of something: item 2 i is the end against the tangent, 2 i + 1 along it.
 struct End {
@@ -64,7 +29,7 @@ struct LinkRule {
 };
 
 /// For every end the best facing end, or -1. Ends of one item never match each other.
-std::vector<int> best_facing_ends(const std::vector<End>& ends, const PixelIndex& index,
+std::vector<int> best_facing_ends(const std::vector<End>& ends, const CellIndex& index,
                                   const LinkRule& rule) {
   std::vector<int> best(ends.size(), -1);
   // The rule accepts what lies in a trapezoid ahead: search the square around that.
@@ -74,8 +39,9 @@ std::vector<int> best_facing_ends(const std::vector<End>& ends, const PixelIndex
   for (std::size_t e = 0; e < ends.size(); ++e) {
     const End& end = ends[e];
     float best_cost = std::numeric_limits<float>::max();
-    index.around(end.position + ahead * end.outward, radius, [&](int item) {
-      if (item == static_cast<int>(e / 2)) return;
+    const Vector2f middle = end.position + ahead * end.outward;
+    index.around(middle.x(), middle.y(), radius, [&](int item) {
+      if (item == static_cast<int>(e / 2)) return true;
       for (int side = 0; side < 2; ++side) {
         const int f = 2 * item + side;
         const End& other = ends[static_cast<std::size_t>(f)];
@@ -92,6 +58,7 @@ std::vector<int> best_facing_ends(const std::vector<End>& ends, const PixelIndex
           best[e] = f;
         }
       }
+      return true;
     });
   }
   return best;
@@ -139,15 +106,15 @@ std::vector<Polyline> link_ridgels(std::span<const Ridgel> ridgels, cv::Size siz
                                    const TraceOptions& options) {
   std::vector<End> ends;
   ends.reserve(2 * ridgels.size());
-  PixelIndex index(size, ridgels.size());
   for (std::size_t i = 0; i < ridgels.size(); ++i) {
     const Ridgel& r = ridgels[i];
     const Vector2f position(r.x, r.y);
     const Vector2f tangent(-r.ny, r.nx);
     ends.push_back({position, -tangent});
     ends.push_back({position, tangent});
-    index.add(static_cast<int>(i), position);
   }
+  const CellIndex index(size, kCellPx, ridgels.size(),
+                        [&](std::size_t i) { return std::pair(ridgels[i].x, ridgels[i].y); });
   const LinkRule rule{0.3F, 2.3F, 0.3F, 0.3F, static_cast<float>(std::cos(options.max_turn_rad))};
   std::vector<Polyline> lines;
   for (const auto& chain : chains_of(best_facing_ends(ends, index, rule))) {
@@ -192,24 +159,28 @@ std::vector<Polyline> bridge_gaps(std::vector<Polyline> lines, cv::Size size, do
   }
   const auto max_gap = static_cast<float>(max_gap_px);
   const auto lateral_limit = [](float along) { return 0.6F + 0.2F * along; };
-  PixelIndex index(size, ends.size());
-  for (std::size_t e = 0; e < ends.size(); ++e) index.add(static_cast<int>(e), ends[e].position);
+  const CellIndex index(size, kCellPx, ends.size(), [&](std::size_t e) {
+    return std::pair(ends[e].position.x(), ends[e].position.y());
+  });
   std::vector<int> best(ends.size(), -1);
   for (std::size_t e = 0; e < ends.size(); ++e) {
     float best_cost = std::numeric_limits<float>::max();
-    index.around(ends[e].position, std::hypot(max_gap, lateral_limit(max_gap)), [&](int f) {
-      if (f / 2 == static_cast<int>(e / 2)) return;
+    const Vector2f& here = ends[e].position;
+    index.around(here.x(), here.y(), std::hypot(max_gap, lateral_limit(max_gap)), [&](int f) {
+      if (f / 2 == static_cast<int>(e / 2)) return true;
       const End& other = ends[static_cast<std::size_t>(f)];
       const Vector2f way = other.position - ends[e].position;
       const float along = way.dot(ends[e].outward);
       const float cosine = -ends[e].outward.dot(other.outward);
       const float lateral = std::abs(way.x() * ends[e].outward.y() - way.y() * ends[e].outward.x());
-      if (along < 0 || along > max_gap || cosine < 0.9F || lateral > lateral_limit(along)) return;
+      if (along < 0 || along > max_gap || cosine < 0.9F || lateral > lateral_limit(along))
+        return true;
       const float cost = along + 3 * lateral + 10 * (1 - cosine);
       if (cost < best_cost || (cost == best_cost && f < best[e])) {
         best_cost = cost;
         best[e] = f;
       }
+      return true;
     });
   }
   std::vector<Polyline> joined;
