@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstring>
+
 /// Eight numbers that are computed with at once, for the few loops that take most of the time.
 /// They compile on any machine; PENCILSCAN_CLONES before a function adds a version of it for
 /// processors with AVX2, chosen when the program starts. Both round alike (no fused
@@ -23,6 +25,14 @@ constexpr int kLanes = 8;
 
 using Lanes __attribute__((vector_size(4 * kLanes))) = float;
 using IntLanes __attribute__((vector_size(4 * kLanes))) = int;  ///< of comparisons: 0 or -1
+
+PENCILSCAN_INLINE void load(const float* from, Lanes& lanes) {
+  std::memcpy(&lanes, from, sizeof(lanes));
+}
+
+PENCILSCAN_INLINE void store(const Lanes& lanes, float* to) {
+  std::memcpy(to, &lanes, sizeof(lanes));
+}
 
 /// The same number in all lanes.
 PENCILSCAN_INLINE void fill(float value, Lanes& lanes) { lanes = value - Lanes{}; }

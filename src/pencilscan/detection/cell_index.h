@@ -34,18 +34,31 @@ class CellIndex {
     }
   }
 
+  /// Items ordered by cell.
+  [[nodiscard]] const std::vector<int>& items() const { return items_; }
+
   /// Visits the items in a square of +-radius around (x, y), and some just outside, until `visit`
   /// gives false.
   template <class Visit>
   void around(float x, float y, float radius, Visit visit) const {
+    ranges(x, y, radius, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) {
+        if (!visit(items_[i])) return false;
+      }
+      return true;
+    });
+  }
+
+  /// The same as ranges of items().
+  template <class Visit>
+  void ranges(float x, float y, float radius, Visit visit) const {
     const int left = column(x - radius);
     const int right = column(x + radius);
     const int bottom = row(y + radius);
     for (int r = row(y - radius); r <= bottom; ++r) {
-      const int end = first_[static_cast<std::size_t>(r * columns_ + right) + 1];
-      for (int i = first_[static_cast<std::size_t>(r * columns_ + left)]; i < end; ++i) {
-        if (!visit(items_[static_cast<std::size_t>(i)])) return;
-      }
+      const auto begin = first_[static_cast<std::size_t>(r * columns_ + left)];
+      const auto end = first_[static_cast<std::size_t>(r * columns_ + right) + 1];
+      if (!visit(static_cast<std::size_t>(begin), static_cast<std::size_t>(end))) return;
     }
   }
 

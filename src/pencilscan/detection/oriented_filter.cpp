@@ -9,10 +9,6 @@
 namespace pencilscan {
 namespace {
 
-PENCILSCAN_INLINE void load(const float* from, Lanes& lanes) {
-  std::memcpy(&lanes, from, sizeof(lanes));
-}
-
 FilterDirection make_direction(double theta, double sigma) {
   FilterDirection direction{
       static_cast<float>(std::cos(theta)), static_cast<float>(std::sin(theta)), {}};
@@ -59,8 +55,7 @@ void steer(const Hessian& h, const FilterDirection& direction, int x, int y, int
       load(xx + i, lxx);
       load(xy + i, lxy);
       load(yy + i, lyy);
-      const Lanes sum = a * lxx + b * lxy + c * lyy;
-      std::memcpy(out + i, &sum, sizeof(sum));
+      store(a * lxx + b * lxy + c * lyy, out + i);
     }
   }
 }

@@ -20,13 +20,14 @@ PencilOfPlanes pencil_of_planes(const Device& camera, const Device& projector, A
 
 RayInProjector::RayInProjector(const Device& camera, const Device& projector,
                                const Vec2& camera_pixel)
-    : projector_(&projector) {
-  const RigidTransform projector_from_camera =
-      projector.device_from_world * camera.device_from_world.inverse();
-  direction_ =
-      projector_from_camera.rotation * camera.normalized_from_pixel(camera_pixel).homogeneous();
-  origin_ = projector_from_camera.translation;
-}
+    : RayInProjector(projector.device_from_world * camera.device_from_world.inverse(), projector,
+                     camera.normalized_from_pixel(camera_pixel)) {}
+
+RayInProjector::RayInProjector(const RigidTransform& projector_from_camera, const Device& projector,
+                               const Vec2& normalized)
+    : projector_(&projector),
+      direction_(projector_from_camera.rotation * normalized.homogeneous()),
+      origin_(projector_from_camera.translation) {}
 
 std::optional<Vec2> RayInProjector::pixel(double depth) const {
   const Vec3 x = origin_ + depth * direction_;

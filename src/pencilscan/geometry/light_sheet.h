@@ -36,6 +36,9 @@ struct PencilOfPlanes {
 class RayInProjector {
  public:
   RayInProjector(const Device& camera, const Device& projector, const Vec2& camera_pixel);
+  /// The same for many pixels of one camera: its ray through (x, y, 1).
+  RayInProjector(const RigidTransform& projector_from_camera, const Device& projector,
+                 const Vec2& normalized);
 
   /// Projector pixel of the point at camera depth z; nothing behind the projector.
   [[nodiscard]] std::optional<Vec2> pixel(double depth) const;

@@ -49,12 +49,11 @@ PairwiseEnergy pairwise_energy(const LabelledPieces& pieces, const JointOptions&
   energy.first.push_back(0);
   for (const auto& labels : pieces.labels)
     energy.first.push_back(energy.first.back() + static_cast<int>(labels.size()) + 1);
+  const CrossingCost crossing_cost(pieces.inverse_depth_range, options);
   for (const PieceCrossing& x : pieces.graph.crossings) {
     add_edge(energy, x.a, x.b, pieces.labels[static_cast<std::size_t>(x.a)],
              pieces.labels[static_cast<std::size_t>(x.b)],
-             [&](const PieceLabel& a, const PieceLabel& b) {
-               return crossing_cost(a, b, x, pieces.inverse_depth_range, options);
-             });
+             [&](const PieceLabel& a, const PieceLabel& b) { return crossing_cost(a, b, x); });
   }
   for (const auto& [a, b] : pieces.graph.continuations) {
     add_edge(energy, a, b, pieces.labels[static_cast<std::size_t>(a)],

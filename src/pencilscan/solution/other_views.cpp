@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/solution/reprojection.h"
@@ -18,45 +19,51 @@ OtherViews::OtherViews(const Rig& rig, std::span<const GridGraph> graphs,
 
 OtherViews::View OtherViews::make_view(std::size_t g) const {
   const Camera& camera = rig_.cameras[static_cast<std::size_t>(graphs_[g].camera)];
-  View view;
-  view.columns = camera.width / kCell + 1;
-  view.rows = camera.height / kCell + 1;
-  view.cells.resize(static_cast<std::size_t>(view.columns * view.rows));
+  int families = 0;
+  for (const Curve& curve : graphs_[g].curves) families = std::max(families, curve.family + 1);
+  std::vector<std::vector<Entry>> entries(static_cast<std::size_t>(families));
   const auto& list = pieces_[g].graph.pieces;
   for (std::size_t p = 0; p < list.size(); ++p) {
     const Curve& curve = graphs_[g].curves[static_cast<std::size_t>(list[p].curve)];
     for (int i = list[p].begin; i < list[p].end; ++i) {
       const CurvePoint& point = curve.points[static_cast<std::size_t>(i)];
-      const int x = std::clamp(static_cast<int>(point.position.x()) / kCell, 0, view.columns - 1);
-      const int y = std::clamp(static_cast<int>(point.position.y()) / kCell, 0, view.rows - 1);
-      view.cells[static_cast<std::size_t>(y * view.columns + x)].push_back(
-          {point.position, point.tangent(), curve.family, static_cast<int>(p)});
+      entries[static_cast<std::size_t>(curve.family)].push_back(
+          {point.position, point.tangent(), static_cast<int>(p)});
     }
+  }
+  View view;
+  for (const auto& of_family : entries) {
+    CellIndex index({camera.width, camera.height}, kCellPx, of_family.size(), [&](std::size_t i) {
+      return std::pair(of_family[i].position.x(), of_family[i].position.y());
+    });
+    std::vector<Entry> ordered;
+    ordered.reserve(of_family.size());
+    for (const int i : index.items()) ordered.push_back(of_family[static_cast<std::size_t>(i)]);
+    view.push_back({std::move(index), std::move(ordered)});
   }
   return view;
 }
 
-int OtherViews::find(const View& view, const Eigen::Vector2f& position,
-                     const Eigen::Vector2f& tangent, int family) {
+int OtherViews::find(const FamilyView& view, const Eigen::Vector2f& position,
+                     const Eigen::Vector2f& tangent) {
   constexpr float kMaxAcross = 1.8F;
+  constexpr float kMaxAlong = 1;
   constexpr float kMinCosine = 0.9F;
-  const int cx = static_cast<int>(position.x()) / kCell;
-  const int cy = static_cast<int>(position.y()) / kCell;
   float best = kMaxAcross;
   int piece = -1;
-  for (int y = std::max(0, cy - 1); y <= std::min(view.rows - 1, cy + 1); ++y) {
-    for (int x = std::max(0, cx - 1); x <= std::min(view.columns - 1, cx + 1); ++x) {
-      for (const Entry& e : view.cells[static_cast<std::size_t>(y * view.columns + x)]) {
-        if (e.family != family) continue;
-        const Eigen::Vector2f way = position - e.position;
-        if (std::abs(way.dot(e.tangent)) > 1) continue;
-        const float across = std::abs(way.x() * e.tangent.y() - way.y() * e.tangent.x());
-        if (across >= best || std::abs(e.tangent.dot(tangent)) < kMinCosine) continue;
-        best = across;
-        piece = e.piece;
-      }
+  const float reach = std::sqrt(kMaxAcross * kMaxAcross + kMaxAlong * kMaxAlong);
+  view.index.ranges(position.x(), position.y(), reach, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const Entry& e = view.entries[i];
+      const Eigen::Vector2f way = position - e.position;
+      if (std::abs(way.dot(e.tangent)) > kMaxAlong) continue;
+      const float across = std::abs(way.x() * e.tangent.y() - way.y() * e.tangent.x());
+      if (across >= best || std::abs(e.tangent.dot(tangent)) < kMinCosine) continue;
+      best = across;
+      piece = e.piece;
     }
-  }
+    return true;
+  });
   return piece;
 }
 
@@ -92,7 +99,10 @@ std::vector<OtherViews::Sighting> OtherViews::look_from_others(std::size_t g,
         if (!a || !b || !other.contains(*a)) continue;
         const Eigen::Vector2f tangent = (*b - *a).cast<float>().normalized();
         Sighting sighting{static_cast<int>(p), static_cast<int>(k), static_cast<int>(o), -1, -1};
-        sighting.hit = find(views[o], a->cast<float>(), tangent, family);
+        if (static_cast<std::size_t>(family) < views[o].size()) {
+          sighting.hit =
+              find(views[o][static_cast<std::size_t>(family)], a->cast<float>(), tangent);
+        }
         if (sighting.hit >= 0) {
           const auto& their = pieces_[o].labels[static_cast<std::size_t>(sighting.hit)];
           for (std::size_t j = 0; j < their.size(); ++j) {

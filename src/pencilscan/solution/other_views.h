@@ -3,6 +3,7 @@
 #include <span>
 #include <vector>
 
+#include "pencilscan/detection/cell_index.h"
 #include "pencilscan/solution/piece_labels.h"
 
 namespace pencilscan {
@@ -32,19 +33,19 @@ class OtherViews {
   struct Entry {
     Eigen::Vector2f position;
     Eigen::Vector2f tangent;
-    int family;
     int piece;
   };
-  struct View {
-    int columns = 0;
-    int rows = 0;
-    std::vector<std::vector<Entry>> cells;
+  /// Curve points of one camera and family, by place.
+  struct FamilyView {
+    CellIndex index;
+    std::vector<Entry> entries;  ///< in the index's order
   };
-  static constexpr int kCell = 4;
+  using View = std::vector<FamilyView>;
+  static constexpr int kCellPx = 2;
 
-  /// The piece nearest to a place, of this family and direction; -1: none.
-  [[nodiscard]] static int find(const View& view, const Eigen::Vector2f& position,
-                                const Eigen::Vector2f& tangent, int family);
+  /// The piece nearest to a place, of this direction; -1: none.
+  [[nodiscard]] static int find(const FamilyView& view, const Eigen::Vector2f& position,
+                                const Eigen::Vector2f& tangent);
 
   [[nodiscard]] View make_view(std::size_t g) const;
   [[nodiscard]] std::vector<Sighting> look_from_others(std::size_t g,

@@ -57,6 +57,7 @@ std::vector<std::vector<float>> crossing_support(const LabelledPieces& pieces,
   constexpr float kReach = 4;  // standard deviations
   std::vector<std::vector<float>> support;
   for (const auto& labels : pieces.labels) support.emplace_back(labels.size(), 0.F);
+  const CrossingCost crossing_cost(pieces.inverse_depth_range, options);
   DepthOrder order_a;
   DepthOrder order_b;
   std::vector<float> best_a;
@@ -77,7 +78,7 @@ std::vector<std::vector<float>> crossing_support(const LabelledPieces& pieces,
       for (std::size_t k = first;
            k < order_b.entries.size() && order_b.entries[k].first <= w + window; ++k) {
         const std::size_t j = order_b.entries[k].second;
-        const float cost = crossing_cost(a[i], b[j], x, pieces.inverse_depth_range, options);
+        const float cost = crossing_cost(a[i], b[j], x);
         best_a[i] = std::min(best_a[i], cost + b[j].cost);
         best_b[j] = std::min(best_b[j], cost + a[i].cost);
       }
@@ -152,22 +153,23 @@ void keep_supported(LabelledPieces& pieces, const JointOptions& options) {
 
 }  // namespace
 
-float crossing_cost(const PieceLabel& a, const PieceLabel& b, const PieceCrossing& crossing,
-                    float inverse_depth_range, const JointOptions& options) {
+CrossingCost::CrossingCost(float inverse_depth_range, const JointOptions& options)
+    : wrong_(static_cast<float>(options.crossing_outliers)),
+      disagreement_(options.disagreement_cost()),
+      projection2_(static_cast<float>(options.projection_sigma_px * options.projection_sigma_px)),
+      density_((1 - wrong_) * inverse_depth_range / std::sqrt(2 * std::numbers::pi_v<float>)) {}
+
+float CrossingCost::operator()(const PieceLabel& a, const PieceLabel& b,
+                               const PieceCrossing& crossing) const {
   constexpr float kFarthest2 = 36;  // squared standard deviations; beyond, nothing is left
-  const auto wrong = static_cast<float>(options.crossing_outliers);
-  const float disagreement = options.disagreement_cost();
-  if (a.pattern == b.pattern) return disagreement;  // lines of one pattern do not cross
+  if (a.pattern == b.pattern) return disagreement_;  // lines of one pattern do not cross
   const Eigen::Vector3f q = a.q - b.q;
   const float r = q.dot(crossing.position.homogeneous());
-  const auto projection = static_cast<float>(options.projection_sigma_px);
-  const float s2 = projection * projection *
-                       (a.inverse_depth_per_px * a.inverse_depth_per_px +
-                        b.inverse_depth_per_px * b.inverse_depth_per_px) +
+  const float s2 = projection2_ * (a.inverse_depth_per_px * a.inverse_depth_per_px +
+                                   b.inverse_depth_per_px * b.inverse_depth_per_px) +
                    crossing.sigma * crossing.sigma * q.head<2>().squaredNorm();
-  if (r * r > kFarthest2 * s2) return disagreement;
-  const float density = inverse_depth_range / std::sqrt(2 * std::numbers::pi_v<float> * s2);
-  return -std::log(wrong + (1 - wrong) * density * std::exp(-0.5F * r * r / s2));
+  if (r * r > kFarthest2 * s2) return disagreement_;
+  return -std::log(wrong_ + density_ / std::sqrt(s2) * std::exp(-0.5F * r * r / s2));
 }
 
 LabelledPieces possible_labels(const Rig& rig, const std::vector<ColorFamily>& families,

@@ -37,8 +37,18 @@ using PieceBeliefs = std::vector<std::vector<float>>;
 
 /// Energy of two crossing pieces having these labels: both give the crossing a depth, which agree
 /// for the true ones. The negative logarithm of its likelihood against depths at random.
-[[nodiscard]] float crossing_cost(const PieceLabel& a, const PieceLabel& b,
-                                  const PieceCrossing& crossing, float inverse_depth_range,
-                                  const JointOptions& options);
+class CrossingCost {
+ public:
+  CrossingCost(float inverse_depth_range, const JointOptions& options);
+
+  [[nodiscard]] float operator()(const PieceLabel& a, const PieceLabel& b,
+                                 const PieceCrossing& crossing) const;
+
+ private:
+  float wrong_;
+  float disagreement_;
+  float projection2_;  ///< variance, squared projector px
+  float density_;      ///< of right depths, at its peak for unit deviation
+};
 
 }  // namespace pencilscan

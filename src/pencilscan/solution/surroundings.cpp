@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <set>
 #include <tuple>
+#include <utility>
 
 namespace pencilscan {
 namespace {
@@ -15,6 +15,7 @@ constexpr int kCell = 16;
 
 struct Place {
   int piece = 0;
+  int curve = 0;
   Eigen::Vector2f pixel;
 };
 
@@ -40,28 +41,34 @@ Surroundings::Surroundings(const Camera& camera, const GridGraph& graph,
     for (int i = list[p].begin; i < list[p].end; i += 2) {
       const Eigen::Vector2f& x = point(list[p], i);
       cells[static_cast<std::size_t>(row(x.y()) * columns + column(x.x()))].push_back(
-          {static_cast<int>(p), x});
+          {static_cast<int>(p), list[p].curve, x});
     }
   }
-  std::set<std::pair<int, int>> crossing;
+  std::vector<std::pair<int, int>> crossing;
   for (const PieceCrossing& x : pieces.graph.crossings) {
-    crossing.insert({x.a, x.b});
-    crossing.insert({x.b, x.a});
+    crossing.emplace_back(x.a, x.b);
+    crossing.emplace_back(x.b, x.a);
   }
+  std::sort(crossing.begin(), crossing.end());
+  // Squared distance and best place of each piece around.
+  std::vector<std::tuple<float, int, Eigen::Vector2f>> nearest;
   for (std::size_t p = 0; p < list.size(); ++p) {
     const Eigen::Vector2f middle = point(list[p], (list[p].begin + list[p].end) / 2);
-    std::vector<std::tuple<float, int, Eigen::Vector2f>> nearest;  // best place of each piece
+    nearest.clear();
+    auto known = nearest.end();
     for (int y = row(middle.y() - kReachPx); y <= row(middle.y() + kReachPx); ++y) {
       for (int x = column(middle.x() - kReachPx); x <= column(middle.x() + kReachPx); ++x) {
         for (const Place& place : cells[static_cast<std::size_t>(y * columns + x)]) {
-          const float d = (place.pixel - middle).norm();
-          if (d > kReachPx || list[static_cast<std::size_t>(place.piece)].curve == list[p].curve)
-            continue;
-          const auto known = std::find_if(nearest.begin(), nearest.end(), [&](const auto& n) {
-            return std::get<1>(n) == place.piece;
-          });
+          const float d = (place.pixel - middle).squaredNorm();
+          if (d > kReachPx * kReachPx || place.curve == list[p].curve) continue;
+          // Places of one piece follow each other.
+          if (known == nearest.end() || std::get<1>(*known) != place.piece) {
+            known = std::find_if(nearest.begin(), nearest.end(),
+                                 [&](const auto& n) { return std::get<1>(n) == place.piece; });
+          }
           if (known == nearest.end()) {
             nearest.emplace_back(d, place.piece, place.pixel);
+            known = nearest.end() - 1;
           } else if (d < std::get<0>(*known)) {
             *known = {d, place.piece, place.pixel};
           }
@@ -69,7 +76,8 @@ Surroundings::Surroundings(const Camera& camera, const GridGraph& graph,
       }
     }
     std::erase_if(nearest, [&](const auto& n) {
-      return crossing.contains({static_cast<int>(p), std::get<1>(n)});
+      return std::binary_search(crossing.begin(), crossing.end(),
+                                std::pair(static_cast<int>(p), std::get<1>(n)));
     });
     std::sort(nearest.begin(), nearest.end(), [](const auto& a, const auto& b) {
       return std::pair(std::get<0>(a), std::get<1>(a)) < std::pair(std::get<0>(b), std::get<1>(b));
@@ -91,28 +99,32 @@ std::vector<std::vector<float>> Surroundings::costs(const PieceBeliefs& beliefs)
   if (beliefs.empty()) return result;
   std::vector<float> count(result.size(), 0.F);
   for (const Neighbor& n : neighbors_) count[static_cast<std::size_t>(n.piece)] += 1;
+  std::vector<std::pair<float, float>> theirs;  // belief and inverse depth of likely labels
   for (const Neighbor& n : neighbors_) {
     const auto p = static_cast<std::size_t>(n.piece);
     const auto o = static_cast<std::size_t>(n.other);
     const Eigen::Vector2f& middle = pieces_.graph.pieces[p].middle;
     const float distance = std::max(1e-6F, (middle - n.place).norm());
-    // Slope of the volume's whole depth, at this distance: what labels at random give.
-    const auto& theirs = pieces_.labels[o];
+    theirs.clear();
+    float known = 0;
+    for (std::size_t j = 0; j < pieces_.labels[o].size(); ++j) {
+      if (beliefs[o][j] < 0.01F) continue;
+      theirs.emplace_back(beliefs[o][j], pieces_.labels[o][j].q.dot(n.place.homogeneous()));
+      known += beliefs[o][j];
+    }
+    const float weight = kWeight / std::max(kFewest, count[p]);
     for (std::size_t k = 0; k < result[p].size(); ++k) {
       const float w = pieces_.labels[p][k].q.dot(middle.homogeneous());
-      const float range = pieces_.inverse_depth_range / (w * distance);
+      const float per_slope = 1 / (w * distance);
+      // Slope of the volume's whole depth, at this distance: what labels at random give.
+      const float range = pieces_.inverse_depth_range * per_slope;
       float likelihood = 0;
-      float known = 0;
-      for (std::size_t j = 0; j < theirs.size(); ++j) {
-        const float belief = beliefs[o][j];
-        if (belief < 0.01F) continue;
-        const float slope = (theirs[j].q.dot(n.place.homogeneous()) - w) / (w * distance);
-        known += belief;
-        likelihood += belief * range * kSlope /
-                      (std::numbers::pi_v<float> * (kSlope * kSlope + slope * slope));
+      for (const auto& [belief, their_w] : theirs) {
+        const float slope = (their_w - w) * per_slope;
+        likelihood += belief / (kSlope * kSlope + slope * slope);
       }
-      result[p][k] -=
-          kWeight / std::max(kFewest, count[p]) * std::log(std::max(0.05F, likelihood + 1 - known));
+      likelihood *= range * kSlope / std::numbers::pi_v<float>;
+      result[p][k] -= weight * std::log(std::max(0.05F, likelihood + 1 - known));
     }
   }
   return result;

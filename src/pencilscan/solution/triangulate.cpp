@@ -2,22 +2,38 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <tuple>
+#include <utility>
 
 #include "pencilscan/core/parallel.h"
 
 namespace pencilscan {
 namespace {
 
+/// A camera and a projector whose light it sees.
+struct DevicePair {
+  const Camera& camera;
+  const Projector& projector;
+  RigidTransform projector_from_camera;
+
+  [[nodiscard]] RayInProjector ray(const Vec2& normalized) const {
+    return {projector_from_camera, projector, normalized};
+  }
+};
+
 /// d(line coordinate, projector px)/d(camera px across the curve), by a finite difference at equal
 /// depth.
-double coordinate_per_pixel(const Camera& camera, const Projector& projector,
-                            const LinePattern& pattern, const CurvePoint& point, double depth) {
+double coordinate_per_pixel(const DevicePair& pair, const LinePattern& pattern,
+                            const CurvePoint& point, double depth) {
   const Vec2 pixel = point.position.cast<double>();
   const Vec2 normal = point.normal.cast<double>();
   const auto axis = static_cast<Eigen::Index>(pattern.axis);
-  const auto a = RayInProjector(camera, projector, pixel - 0.5 * normal).pixel(depth);
-  const auto b = RayInProjector(camera, projector, pixel + 0.5 * normal).pixel(depth);
+  const auto at = [&](double offset) {
+    return pair.ray(pair.camera.normalized_from_pixel(pixel + offset * normal)).pixel(depth);
+  };
+  const auto a = at(-0.5);
+  const auto b = at(0.5);
   return a && b ? std::abs((*b)[axis] - (*a)[axis]) : 1.0;
 }
 
@@ -36,21 +52,24 @@ void add_run(const Rig& rig, const GridGraph& graph, const LabeledRun& run, cons
   const CurveLabel& label = run.label;
   const Projector& projector = rig.projectors[static_cast<std::size_t>(label.pattern.projector)];
   const LinePattern& pattern = projector.patterns[static_cast<std::size_t>(label.pattern.pattern)];
+  const RigidTransform world_from_camera = camera.device_from_world.inverse();
+  const DevicePair pair{camera, projector, projector.device_from_world * world_from_camera};
   const double coordinate = pattern.position_px(label.plane);
   for (int i = run.begin; i < run.end; ++i) {
     const CurvePoint& p = curve.points[static_cast<std::size_t>(i)];
     const Vec2 pixel = p.position.cast<double>();
-    const RayInProjector ray(camera, projector, pixel);
+    const Vec3 direction = camera.normalized_from_pixel(pixel).homogeneous();
+    const RayInProjector ray = pair.ray(direction.head<2>());
     const auto depth = ray.depth(coordinate, pattern.axis);
     if (!depth) continue;
-    const Vec3 x = camera.point_at_depth(pixel, *depth);
+    const Vec3 x = world_from_camera * (*depth * direction);
     if ((x - volume.center).norm() > options.volume_margin * volume.radius) continue;
     const double slope = std::abs(ray.slope(*depth, pattern.axis));
-    const double gain = coordinate_per_pixel(camera, projector, pattern, p, *depth);
+    const double gain = coordinate_per_pixel(pair, pattern, p, *depth);
     const double position = position_sigma(curve, i, options);
     const double sigma_px = std::hypot(gain * position, options.projection_sigma_px);
     const double footprint = options.footprint_sigma_px * *depth / camera.K(0, 0);
-    const double ray_length = camera.normalized_from_pixel(pixel).homogeneous().norm();
+    const double ray_length = direction.norm();
     MeasuredPoint point;
     point.x = static_cast<float>(x.x());
     point.y = static_cast<float>(x.y());
@@ -69,19 +88,36 @@ void add_run(const Rig& rig, const GridGraph& graph, const LabeledRun& run, cons
   }
 }
 
+/// Of one camera's points.
 void keep_one_per_pixel(std::vector<MeasuredPoint>& points) {
-  const auto key = [](const MeasuredPoint& p) {
-    return std::make_tuple(p.camera, p.projector, p.pattern, p.line, std::lround(p.v),
-                           std::lround(p.u));
+  struct Place {
+    std::uint64_t key;  ///< projector, pattern, line, row, column
+    std::uint32_t point;
   };
-  std::sort(points.begin(), points.end(), [&](const MeasuredPoint& a, const MeasuredPoint& b) {
-    return std::tuple_cat(key(a), std::make_tuple(a.sigma, a.u, a.v)) <
-           std::tuple_cat(key(b), std::make_tuple(b.sigma, b.u, b.v));
+  const auto bits = [](float pixel) {
+    constexpr float kMargin = 1024;  // curves may leave the image a little
+    return static_cast<std::uint64_t>(std::clamp(pixel + kMargin + 0.5F, 0.F, 65535.F));
+  };
+  std::vector<Place> places;
+  places.reserve(points.size());
+  for (std::uint32_t i = 0; i < points.size(); ++i) {
+    const MeasuredPoint& p = points[i];
+    const std::uint64_t line =
+        std::uint64_t{p.projector} << 24 | std::uint64_t{p.pattern} << 16 | std::uint64_t{p.line};
+    places.push_back({line << 32 | bits(p.v) << 16 | bits(p.u), i});
+  }
+  std::sort(places.begin(), places.end(), [&](const Place& a, const Place& b) {
+    if (a.key != b.key) return a.key < b.key;
+    const MeasuredPoint& p = points[a.point];
+    const MeasuredPoint& q = points[b.point];
+    return std::tie(p.sigma, p.u, p.v) < std::tie(q.sigma, q.u, q.v);
   });
-  const auto last =
-      std::unique(points.begin(), points.end(),
-                  [&](const MeasuredPoint& a, const MeasuredPoint& b) { return key(a) == key(b); });
-  points.erase(last, points.end());
+  std::vector<MeasuredPoint> kept;
+  kept.reserve(points.size());
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    if (i == 0 || places[i].key != places[i - 1].key) kept.push_back(points[places[i].point]);
+  }
+  points = std::move(kept);
 }
 
 }  // namespace
