@@ -1,11 +1,12 @@
 #include "pencilscan/detection/refine.h"
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <span>
 
 #include "pencilscan/core/lanes.h"
+#include "pencilscan/detection/curve_smoothing.h"
 #include "pencilscan/detection/nearest.h"
 #include "pencilscan/detection/profile_fit.h"
 
@@ -13,46 +14,6 @@ namespace pencilscan {
 namespace {
 
 using Eigen::Vector2f;
-
-/// Places points on a local parabola through their neighbours, and sets the normals.
-void smooth_positions(std::vector<CurvePoint>& points, int reach) {
-  const int n = static_cast<int>(points.size());
-  std::vector<Vector2f> positions(points.size());
-  for (int i = 0; i < n; ++i) {
-    const int r = std::min(reach, n / 2);
-    const int low = std::clamp(i - r, 0, std::max(0, n - 1 - 2 * r));
-    const int high = std::min(n - 1, low + 2 * r);
-    const Vector2f center = points[static_cast<std::size_t>(i)].position;
-    const Vector2f tangent = (points[static_cast<std::size_t>(high)].position -
-                              points[static_cast<std::size_t>(low)].position)
-                                 .normalized();
-    const Vector2f normal(tangent.y(), -tangent.x());
-    // Least squares for a0 + a1 t + a2 t^2; m[k] is the sum of t^k.
-    std::array<float, 5> m{};
-    Eigen::Vector3f b = Eigen::Vector3f::Zero();
-    for (int j = low; j <= high; ++j) {
-      const Vector2f d = points[static_cast<std::size_t>(j)].position - center;
-      const float t = d.dot(tangent) * 0.25F;
-      const float v = d.dot(normal);
-      const float t2 = t * t;
-      m[0] += 1;
-      m[1] += t;
-      m[2] += t2;
-      m[3] += t2 * t;
-      m[4] += t2 * t2;
-      b += Eigen::Vector3f(v, v * t, v * t2);
-    }
-    Eigen::Matrix3f N;
-    N << m[0], m[1], m[2], m[1], m[2], m[3], m[2], m[3], m[4];
-    N.diagonal().array() += 1e-3F;
-    const Eigen::Vector3f x = N.inverse() * b;
-    positions[static_cast<std::size_t>(i)] = center + x[0] * normal;
-    const Vector2f slope = tangent + 0.25F * x[1] * normal;
-    points[static_cast<std::size_t>(i)].normal = Vector2f(slope.y(), -slope.x()).normalized();
-  }
-  for (int i = 0; i < n; ++i)
-    points[static_cast<std::size_t>(i)].position = positions[static_cast<std::size_t>(i)];
-}
 
 struct Fit {
   float amplitude = 0;
@@ -112,21 +73,33 @@ void sample_profiles(const cv::Mat& residual, const std::vector<CurvePoint>& poi
   }
 }
 
+PENCILSCAN_CLONES
+void mean_profile(const Profile* first, int count, Profile& mean) {
+  Lanes left{};
+  Lanes right{};
+  for (int j = 0; j < count; ++j) {
+    Lanes values;
+    load(first[j].data(), values);
+    left += values;
+    load(first[j].data() + kLanes, values);
+    right += values;
+  }
+  const float weight = 1 / static_cast<float>(count);
+  store(weight * left, mean.data());
+  store(weight * right, mean.data() + kLanes);
+}
+
 /// Fits of eight points at once, from `first` on.
 void fit_batch(const std::vector<CurvePoint>& points, const std::vector<Profile>& profiles,
                bool first_round, int half_arc, int first, ProfileFits& fits) {
   const int n = static_cast<int>(points.size());
   ProfileBatch batch;
+  Profile mean;
   for (int k = 0; k < kLanes; ++k) {
     const int i = std::min(first + k, n - 1);
     const int r = std::min({half_arc, i, n - 1 - i});  // symmetric: no shift towards the inside
-    Profile mean{};
-    for (int j = i - r; j <= i + r; ++j) {
-      const Profile& profile = profiles[static_cast<std::size_t>(j)];
-      for (std::size_t o = 0; o < mean.size(); ++o) mean[o] += profile[o];
-    }
-    const float weight = 1 / static_cast<float>(2 * r + 1);
-    for (std::size_t o = 0; o < kProfileSize; ++o) batch.value[o][k] = weight * mean[o];
+    mean_profile(&profiles[static_cast<std::size_t>(i - r)], 2 * r + 1, mean);
+    for (std::size_t o = 0; o < kProfileSize; ++o) batch.value[o][k] = mean[o];
     const float width = points[static_cast<std::size_t>(i)].width_px;
     // At first the neighbours are still in the image: a shorter profile sees less of them.
     const int half = std::clamp(nearest(2.4F * width) + (first_round ? 0 : 1), 4, kMaxHalf);
@@ -153,6 +126,13 @@ void fit_curve(const cv::Mat& residual, bool first_round, int half_arc, Curve& c
                                                    batch.offset_gain[k], batch.good[k] != 0};
     }
   }
+  // Sums of the residual variances of good fits, and their number, before each point.
+  std::vector<double> level_before(points.size() + 1, 0.0);
+  std::vector<int> good_before(points.size() + 1, 0);
+  for (std::size_t i = 0; i < fits.size(); ++i) {
+    level_before[i + 1] = level_before[i] + (fits[i].good ? double{fits[i].residual2} : 0.0);
+    good_before[i + 1] = good_before[i] + (fits[i].good ? 1 : 0);
+  }
   for (int i = 0; i < n; ++i) {
     CurvePoint& p = points[static_cast<std::size_t>(i)];
     const Fit& fit = fits[static_cast<std::size_t>(i)];
@@ -162,36 +142,15 @@ void fit_curve(const cv::Mat& residual, bool first_round, int half_arc, Curve& c
       continue;
     }
     // The residual level of one profile has few degrees of freedom: average it along the curve.
-    float level = 0;
-    int count = 0;
-    for (int j = std::max(0, i - 6); j <= std::min(n - 1, i + 6); ++j) {
-      if (!fits[static_cast<std::size_t>(j)].good) continue;
-      level += fits[static_cast<std::size_t>(j)].residual2;
-      ++count;
-    }
+    const auto low = static_cast<std::size_t>(std::max(0, i - 6));
+    const auto high = static_cast<std::size_t>(std::min(n, i + 7));
+    const double level = (level_before[high] - level_before[low]) /
+                         static_cast<double>(good_before[high] - good_before[low]);
     p.position += fit.offset * p.normal;
     p.amplitude = fit.amplitude;
     p.width_px = fit.width;
-    p.sigma_px = std::sqrt(level / static_cast<float>(count) * fit.offset_gain);
+    p.sigma_px = std::sqrt(static_cast<float>(std::max(0.0, level)) * fit.offset_gain);
   }
-}
-
-/// Running median of widths: the width varies slowly, single fits trade it against the background.
-void smooth_widths(std::vector<CurvePoint>& points) {
-  constexpr int kReach = 4;
-  const int n = static_cast<int>(points.size());
-  std::vector<float> widths(points.size());
-  for (int i = 0; i < n; ++i) {
-    std::array<float, 2 * kReach + 1> window;
-    std::size_t count = 0;
-    for (int j = std::max(0, i - kReach); j <= std::min(n - 1, i + kReach); ++j) {
-      window[count++] = points[static_cast<std::size_t>(j)].width_px;
-    }
-    std::nth_element(window.begin(), window.begin() + static_cast<std::ptrdiff_t>(count / 2),
-                     window.begin() + static_cast<std::ptrdiff_t>(count));
-    widths[static_cast<std::size_t>(i)] = window[count / 2];
-  }
-  for (std::size_t i = 0; i < points.size(); ++i) points[i].width_px = widths[i];
 }
 
 bool sound(const CurvePoint& p, const RefineOptions& options) {
@@ -207,7 +166,8 @@ bool jumps(const CurvePoint& a, const CurvePoint& b) {
   return way.norm() > 3 || lateral > 0.5F + 0.3F * along;
 }
 
-void trim_ends(std::vector<CurvePoint>& points, double ratio) {
+/// The points without faint ends.
+std::span<const CurvePoint> trimmed(std::span<const CurvePoint> points, double ratio) {
   constexpr std::size_t kInward = 5;
   const auto faint = [&](const CurvePoint& end, const CurvePoint& inner) {
     return end.amplitude < static_cast<float>(ratio) * inner.amplitude;
@@ -216,29 +176,29 @@ void trim_ends(std::vector<CurvePoint>& points, double ratio) {
   std::size_t last = points.size();
   while (first + kInward < last && faint(points[first], points[first + kInward])) ++first;
   while (last > first + kInward && faint(points[last - 1], points[last - 1 - kInward])) --last;
-  points = std::vector<CurvePoint>(points.begin() + static_cast<std::ptrdiff_t>(first),
-                                   points.begin() + static_cast<std::ptrdiff_t>(last));
+  return points.subspan(first, last - first);
 }
 
 std::vector<Curve> cut_and_trim(const std::vector<Curve>& curves, const RefineOptions& options) {
   std::vector<Curve> result;
   for (const Curve& curve : curves) {
-    Curve piece;
-    piece.family = curve.family;
-    const auto finish = [&] {
-      trim_ends(piece.points, options.end_amplitude_ratio);
-      if (static_cast<int>(piece.points.size()) >= options.min_points) result.push_back(piece);
-      piece.points.clear();
+    const std::span<const CurvePoint> points(curve.points);
+    std::size_t begin = 0;
+    const auto finish = [&](std::size_t end) {
+      const auto piece = trimmed(points.subspan(begin, end - begin), options.end_amplitude_ratio);
+      if (static_cast<int>(piece.size()) >= options.min_points)
+        result.push_back({curve.family, {piece.begin(), piece.end()}, {}});
     };
-    for (const CurvePoint& p : curve.points) {
-      if (!sound(p, options)) {
-        finish();
-        continue;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      if (!sound(points[i], options)) {
+        finish(i);
+        begin = i + 1;
+      } else if (i > begin && jumps(points[i - 1], points[i])) {
+        finish(i);
+        begin = i;
       }
-      if (!piece.points.empty() && jumps(piece.points.back(), p)) finish();
-      piece.points.push_back(p);
     }
-    finish();
+    finish(points.size());
   }
   return result;
 }
@@ -311,9 +271,8 @@ cv::Mat render_curves(const std::vector<Curve>& curves, cv::Size size) {
 
 std::vector<Curve> refine_curves(const cv::Mat& presence, std::vector<Curve> curves,
                                  const RefineOptions& options) {
-  constexpr int kSmoothingReach = 4;
   for (int round = 0; round < options.rounds; ++round) {
-    for (Curve& curve : curves) smooth_positions(curve.points, kSmoothingReach);
+    for (Curve& curve : curves) smooth_positions(curve.points);
     const cv::Mat residual =
         round > 0 ? cv::Mat(presence - render_curves(curves, presence.size())) : presence;
     for (Curve& curve : curves) {
