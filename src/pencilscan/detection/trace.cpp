@@ -1,6 +1,7 @@
 #include "pencilscan/detection/trace.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -14,12 +15,7 @@ using Eigen::Vector2f;
 
 constexpr int kCellPx = 2;  ///< of the indices: about an item each
 
-/// A directed end of something: item 2 i is the end against the tangent, 2 i + 1 along it.
-struct End {
-  Vector2f position;
-  Vector2f outward;  ///< unit
-};
-
+/// What links a ridgel to the next: it lies ahead, hardly aside, and turns little.
 struct LinkRule {
   float min_along;
   float max_along;
@@ -28,34 +24,43 @@ struct LinkRule {
   float min_cosine;
 };
 
-/// For every end the best facing end, or -1. Ends of one item never match each other.
-std::vector<int> best_facing_ends(const std::vector<End>& ends, const CellIndex& index,
+/// For every end of the ridgels (2 i against the tangent of ridgel i, 2 i + 1 along it) the best
+/// facing end, or -1.
+std::vector<int> best_facing_ends(std::span<const Ridgel> ridgels, cv::Size size,
                                   const LinkRule& rule) {
-  std::vector<int> best(ends.size(), -1);
-  // The rule accepts what lies in a trapezoid ahead: search the square around that.
-  const float ahead = 0.5F * (rule.min_along + rule.max_along);
+  const CellIndex index(size, kCellPx, ridgels.size(),
+                        [&](std::size_t i) { return std::pair(ridgels[i].x, ridgels[i].y); });
+  std::vector<Ridgel> ordered;
+  ordered.reserve(ridgels.size());
+  for (const int i : index.items()) ordered.push_back(ridgels[static_cast<std::size_t>(i)]);
   const float radius =
-      std::hypot(rule.max_along - ahead, rule.lateral_base + rule.lateral_slope * rule.max_along);
-  for (std::size_t e = 0; e < ends.size(); ++e) {
-    const End& end = ends[e];
-    float best_cost = std::numeric_limits<float>::max();
-    const Vector2f middle = end.position + ahead * end.outward;
-    index.around(middle.x(), middle.y(), radius, [&](int item) {
-      if (item == static_cast<int>(e / 2)) return true;
-      for (int side = 0; side < 2; ++side) {
-        const int f = 2 * item + side;
-        const End& other = ends[static_cast<std::size_t>(f)];
-        const Vector2f way = other.position - end.position;
-        const float along = way.dot(end.outward);
+      std::hypot(rule.max_along, rule.lateral_base + rule.lateral_slope * rule.max_along);
+  std::vector<int> best(2 * ridgels.size(), -1);
+  for (std::size_t e = 0; e < ridgels.size(); ++e) {
+    const Ridgel& own = ridgels[e];
+    std::array<float, 2> best_cost{};
+    best_cost.fill(std::numeric_limits<float>::max());
+    index.ranges(own.x, own.y, radius, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t k = begin; k < end; ++k) {
+        const Ridgel& other = ordered[k];
+        const float x = other.x - own.x;
+        const float y = other.y - own.y;
+        const float forward = y * own.nx - x * own.ny;  // along the tangent (-ny, nx)
+        const float along = std::abs(forward);
         if (along < rule.min_along || along > rule.max_along) continue;
-        const float cosine = -end.outward.dot(other.outward);
-        if (cosine < rule.min_cosine) continue;
-        const float lateral = std::abs(way.x() * end.outward.y() - way.y() * end.outward.x());
+        const float lateral = std::abs(x * own.nx + y * own.ny);
         if (lateral > rule.lateral_base + rule.lateral_slope * along) continue;
+        const float turned = own.nx * other.nx + own.ny * other.ny;  // < 0: runs the other way
+        const float cosine = std::abs(turned);
+        if (cosine < rule.min_cosine) continue;
+        // The end that looks back at us.
+        const std::size_t side = forward > 0 ? 1 : 0;
+        const int f = 2 * index.items()[k] + ((turned > 0) == (side == 1) ? 0 : 1);
         const float cost = along + 2 * lateral + 4 * (1 - cosine);
-        if (cost < best_cost || (cost == best_cost && f < best[e])) {
-          best_cost = cost;
-          best[e] = f;
+        int& known = best[2 * e + side];
+        if (cost < best_cost[side] || (cost == best_cost[side] && f < known)) {
+          best_cost[side] = cost;
+          known = f;
         }
       }
       return true;
@@ -104,29 +109,26 @@ using Polyline = std::vector<Vertex>;
 
 std::vector<Polyline> link_ridgels(std::span<const Ridgel> ridgels, cv::Size size,
                                    const TraceOptions& options) {
-  std::vector<End> ends;
-  ends.reserve(2 * ridgels.size());
-  for (std::size_t i = 0; i < ridgels.size(); ++i) {
-    const Ridgel& r = ridgels[i];
-    const Vector2f position(r.x, r.y);
-    const Vector2f tangent(-r.ny, r.nx);
-    ends.push_back({position, -tangent});
-    ends.push_back({position, tangent});
-  }
-  const CellIndex index(size, kCellPx, ridgels.size(),
-                        [&](std::size_t i) { return std::pair(ridgels[i].x, ridgels[i].y); });
   const LinkRule rule{0.3F, 2.3F, 0.3F, 0.3F, static_cast<float>(std::cos(options.max_turn_rad))};
   std::vector<Polyline> lines;
-  for (const auto& chain : chains_of(best_facing_ends(ends, index, rule))) {
+  for (const auto& chain : chains_of(best_facing_ends(ridgels, size, rule))) {
     if (chain.size() < 3) continue;
     Polyline line;
-    for (const int e : chain)
-      line.push_back({ends[static_cast<std::size_t>(e)].position,
-                      ridgels[static_cast<std::size_t>(e / 2)].width_px});
+    line.reserve(chain.size());
+    for (const int e : chain) {
+      const Ridgel& r = ridgels[static_cast<std::size_t>(e / 2)];
+      line.push_back({{r.x, r.y}, r.width_px});
+    }
     lines.push_back(std::move(line));
   }
   return lines;
 }
+
+/// The end of a line.
+struct End {
+  Vector2f position;
+  Vector2f outward;  ///< unit
+};
 
 Vector2f outward_at_end(const Polyline& line, bool front) {
   constexpr std::size_t kReach = 5;

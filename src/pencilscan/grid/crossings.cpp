@@ -13,50 +13,66 @@ struct Segment {
   int index = 0;
 };
 
-constexpr int kCell = 4;
+constexpr int kCell = 2;  ///< px
 
 float cross(const Vector2f& a, const Vector2f& b) { return a.x() * b.y() - a.y() * b.x(); }
 
-/// Buckets of curve segments by the cells that their end points touch.
+/// Curve segments by the cells that their bounding boxes touch: segments that intersect have a cell
+/// in common.
 class SegmentGrid {
  public:
   SegmentGrid(std::span<const Curve> curves, cv::Size size)
-      : columns_(size.width / kCell + 2), rows_(size.height / kCell + 2) {
-    cells_.resize(static_cast<std::size_t>(columns_ * rows_));
-    for (std::size_t c = 0; c < curves.size(); ++c) {
-      const auto& points = curves[c].points;
-      for (std::size_t i = 0; i + 1 < points.size(); ++i) {
-        const int first = cell_of(points[i].position);
-        const int second = cell_of(points[i + 1].position);
-        const Segment segment{static_cast<int>(c), static_cast<int>(i)};
-        cells_[static_cast<std::size_t>(first)].push_back(segment);
-        if (second != first) cells_[static_cast<std::size_t>(second)].push_back(segment);
-      }
-    }
+      : columns_(size.width / kCell + 2),
+        rows_(size.height / kCell + 2),
+        first_(static_cast<std::size_t>(columns_ * rows_) + 1, 0) {
+    for_each_place(curves,
+                   [&](int cell, const Segment&) { ++first_[static_cast<std::size_t>(cell) + 1]; });
+    for (std::size_t c = 1; c < first_.size(); ++c) first_[c] += first_[c - 1];
+    segments_.resize(static_cast<std::size_t>(first_.back()));
+    std::vector<int> next(first_.begin(), first_.end() - 1);
+    for_each_place(curves, [&](int cell, const Segment& segment) {
+      segments_[static_cast<std::size_t>(next[static_cast<std::size_t>(cell)]++)] = segment;
+    });
   }
 
+  /// Visits the segments near one from p to q, some more than once.
   template <class Visit>
-  void around(const Vector2f& p, Visit visit) const {
-    const int cell = cell_of(p);
-    const int cx = cell % columns_;
-    const int cy = cell / columns_;
-    for (int y = std::max(0, cy - 1); y <= std::min(rows_ - 1, cy + 1); ++y) {
-      for (int x = std::max(0, cx - 1); x <= std::min(columns_ - 1, cx + 1); ++x) {
-        for (const Segment& s : cells_[static_cast<std::size_t>(y * columns_ + x)]) visit(s);
-      }
-    }
+  void around(const Vector2f& p, const Vector2f& q, Visit visit) const {
+    for_each_cell(p, q, [&](int cell) {
+      const int end = first_[static_cast<std::size_t>(cell) + 1];
+      for (int i = first_[static_cast<std::size_t>(cell)]; i < end; ++i)
+        visit(segments_[static_cast<std::size_t>(i)]);
+    });
   }
 
  private:
-  [[nodiscard]] int cell_of(const Vector2f& p) const {
-    const int x = std::clamp(static_cast<int>(p.x()) / kCell, 0, columns_ - 1);
-    const int y = std::clamp(static_cast<int>(p.y()) / kCell, 0, rows_ - 1);
-    return y * columns_ + x;
+  [[nodiscard]] static int cell(float v, int count) {
+    return std::clamp(static_cast<int>(v) / kCell, 0, count - 1);
+  }
+  template <class Visit>
+  void for_each_cell(const Vector2f& p, const Vector2f& q, Visit visit) const {
+    const int right = cell(std::max(p.x(), q.x()), columns_);
+    const int bottom = cell(std::max(p.y(), q.y()), rows_);
+    for (int y = cell(std::min(p.y(), q.y()), rows_); y <= bottom; ++y) {
+      for (int x = cell(std::min(p.x(), q.x()), columns_); x <= right; ++x) visit(y * columns_ + x);
+    }
+  }
+  template <class Visit>
+  void for_each_place(std::span<const Curve> curves, Visit visit) const {
+    for (std::size_t c = 0; c < curves.size(); ++c) {
+      const auto& points = curves[c].points;
+      for (std::size_t i = 0; i + 1 < points.size(); ++i) {
+        const Segment segment{static_cast<int>(c), static_cast<int>(i)};
+        for_each_cell(points[i].position, points[i + 1].position,
+                      [&](int at) { visit(at, segment); });
+      }
+    }
   }
 
   int columns_;
   int rows_;
-  std::vector<std::vector<Segment>> cells_;
+  std::vector<int> first_;  ///< of each cell's segments; cells + 1 entries
+  std::vector<Segment> segments_;
 };
 
 /// Mean direction of a curve around a segment: three points to either side.
@@ -83,7 +99,7 @@ std::vector<Crossing> find_crossings(std::span<const Curve> curves, cv::Size ima
       const Vector2f p = points[i].position;
       const Vector2f r = points[i + 1].position - p;
       seen.clear();
-      grid.around(p, [&](const Segment& s) {
+      grid.around(p, points[i + 1].position, [&](const Segment& s) {
         if (s.curve <= static_cast<int>(a)) return;
         const Curve& other = curves[static_cast<std::size_t>(s.curve)];
         const auto j = static_cast<std::size_t>(s.index);
@@ -99,7 +115,7 @@ std::vector<Crossing> find_crossings(std::span<const Curve> curves, cv::Size ima
         const float sine = std::abs(cross(ta, tb));
         if (sine < min_sine) return;
         for (const Segment& known : seen) {
-          if (known.curve == s.curve && known.index == s.index) return;  // in two cells
+          if (known.curve == s.curve && known.index == s.index) return;  // in several cells
         }
         seen.push_back(s);
         const float sigma_a = points[i].sigma_px;
