@@ -20,12 +20,14 @@ constexpr float kSameLineReward = 2.F;  ///< of consecutive pieces of one curve
 template <class Cost>
 void add_edge(PairwiseEnergy& energy, int a, int b, const std::vector<PieceLabel>& labels_a,
               const std::vector<PieceLabel>& labels_b, Cost cost) {
-  energy.edges.push_back({a, b, energy.tables.size()});
+  const std::size_t table = energy.tables.size();
+  energy.edges.push_back({a, b, table});
+  energy.tables.resize(table + (labels_a.size() + 1) * (labels_b.size() + 1), 0.F);
+  float* entry = energy.tables.data() + table;
   for (const PieceLabel& la : labels_a) {
-    for (const PieceLabel& lb : labels_b) energy.tables.push_back(cost(la, lb));
-    energy.tables.push_back(0.F);
+    for (const PieceLabel& lb : labels_b) *entry++ = cost(la, lb);
+    ++entry;
   }
-  energy.tables.insert(energy.tables.end(), labels_b.size() + 1, 0.F);
 }
 
 void add(const std::vector<std::vector<float>>& costs, std::vector<std::vector<float>>& sum) {
@@ -49,6 +51,13 @@ PairwiseEnergy pairwise_energy(const LabelledPieces& pieces, const JointOptions&
   energy.first.push_back(0);
   for (const auto& labels : pieces.labels)
     energy.first.push_back(energy.first.back() + static_cast<int>(labels.size()) + 1);
+  std::size_t size = 0;
+  const auto add_size = [&](int a, int b) {
+    size += static_cast<std::size_t>(energy.labels(a)) * static_cast<std::size_t>(energy.labels(b));
+  };
+  for (const PieceCrossing& x : pieces.graph.crossings) add_size(x.a, x.b);
+  for (const auto& [a, b] : pieces.graph.continuations) add_size(a, b);
+  energy.tables.reserve(size);
   const CrossingCost crossing_cost(pieces.inverse_depth_range, options);
   for (const PieceCrossing& x : pieces.graph.crossings) {
     add_edge(energy, x.a, x.b, pieces.labels[static_cast<std::size_t>(x.a)],

@@ -3,6 +3,8 @@
 #include <Eigen/Geometry>
 #include <cmath>
 
+#include "pencilscan/core/lanes.h"
+
 namespace pencilscan {
 namespace {
 
@@ -15,6 +17,29 @@ Vec3 plane_normal(const Projector& projector, Axis axis, double across, double a
   const Vec3 a = projector.normalized_from_pixel(pixel(along_a)).homogeneous();
   const Vec3 b = projector.normalized_from_pixel(pixel(along_b)).homogeneous();
   return a.cross(b).normalized();
+}
+
+/// Writes the indices of the lines whose inverse depth lies in [low, high]; how many.
+PENCILSCAN_CLONES
+int lines_between(const std::array<std::array<float, kLanes>, 3>* q, std::size_t blocks, float x,
+                  float y, float low, float high, int* lines) {
+  int count = 0;
+  for (std::size_t b = 0; b < blocks; ++b) {
+    Lanes qx;
+    Lanes qy;
+    Lanes qz;
+    load(q[b][0].data(), qx);
+    load(q[b][1].data(), qy);
+    load(q[b][2].data(), qz);
+    const Lanes w = qx * x + (qy * y + qz);
+    const IntLanes is_inside = (w >= low) & (w <= high);
+    if (!any(is_inside)) continue;
+    for (int k = 0; k < kLanes; ++k) {
+      lines[count] = static_cast<int>(b) * kLanes + k;
+      count -= is_inside[k];
+    }
+  }
+  return count;
 }
 
 }  // namespace
@@ -50,11 +75,30 @@ LineSheets::LineSheets(const Rig& rig, const Camera& camera, PatternRef ref) {
       q_slope_.push_back((q_at(across + 0.5) - q_at(across - 0.5)));
     }
   }
+  middle_.resize(static_cast<std::size_t>((line_count_ + kLanes - 1) / kLanes));
+  for (int line = 0; line < line_count_; ++line) {
+    const auto block = static_cast<std::size_t>(line / kLanes);
+    const auto lane = static_cast<std::size_t>(line % kLanes);
+    for (std::size_t i = 0; i < 3; ++i)
+      middle_[block][i][lane] = q_[index(line, parts_ / 2)][static_cast<Eigen::Index>(i)];
+  }
   Eigen::Matrix<double, 3, 4> P;
   P.leftCols<3>() = projector.K * projector_from_camera.rotation;
   P.col(3) = projector.K * t;
   along_ = P.row(pattern.axis == Axis::kColumn ? 1 : 0).transpose().cast<float>();
   along_scale_ = P.row(2).transpose().cast<float>();
+}
+
+void LineSheets::candidates(const Eigen::Vector2f& normalized, float w_low, float w_high,
+                            std::vector<int>& lines) const {
+  // Other parts of a bent line lie a little off its middle.
+  constexpr float kSlack = 0.15F;
+  const float slack = parts_ > 1 ? kSlack * (w_high - w_low) : 0;
+  lines.resize(middle_.size() * kLanes);
+  const int count = lines_between(middle_.data(), middle_.size(), normalized.x(), normalized.y(),
+                                  w_low - slack, w_high + slack, lines.data());
+  lines.resize(static_cast<std::size_t>(count));
+  while (!lines.empty() && lines.back() >= line_count_) lines.pop_back();
 }
 
 bool LineSheets::find(int line, const Eigen::Vector2f& normalized, float w_low, float w_high,

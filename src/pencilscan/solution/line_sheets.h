@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <vector>
 
 #include "pencilscan/detection/color_family.h"
@@ -23,6 +24,9 @@ class LineSheets {
   };
 
   [[nodiscard]] int line_count() const { return line_count_; }
+  /// Lines that find() may find, among them all it does; ascending.
+  void candidates(const Eigen::Vector2f& normalized, float w_low, float w_high,
+                  std::vector<int>& lines) const;
   /// The sheet of `line` where the ray through (x, y) meets it, if inside the panel and in
   /// [w_low, w_high].
   [[nodiscard]] bool find(int line, const Eigen::Vector2f& normalized, float w_low, float w_high,
@@ -38,6 +42,8 @@ class LineSheets {
   float part_size_px_ = 1;
   float extent_px_ = 0;  ///< panel size along the lines
   std::vector<Eigen::Vector3f> q_;
+  /// The middle parts' q by component, eight lines together.
+  std::vector<std::array<std::array<float, 8>, 3>> middle_;
   std::vector<Eigen::Vector3f> q_slope_;  ///< d q / d(projector px across)
   /// Rows of the pinhole matrix that give the position along a line: numerator and denominator on
   /// (x, y, 1) + w (0, 0, 0, 1).

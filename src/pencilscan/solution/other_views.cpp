@@ -95,8 +95,9 @@ std::vector<OtherViews::Sighting> OtherViews::look_from_others(std::size_t g,
       for (const std::size_t o : others) {
         const Camera& other = rig_.cameras[static_cast<std::size_t>(graphs_[o].camera)];
         const auto a = other.project(here);
+        if (!a || !other.contains(*a)) continue;
         const auto b = other.project(next);
-        if (!a || !b || !other.contains(*a)) continue;
+        if (!b) continue;
         const Eigen::Vector2f tangent = (*b - *a).cast<float>().normalized();
         Sighting sighting{static_cast<int>(p), static_cast<int>(k), static_cast<int>(o), -1, -1};
         if (static_cast<std::size_t>(family) < views[o].size()) {

@@ -71,9 +71,9 @@ std::vector<std::vector<float>> crossing_support(const LabelledPieces& pieces,
     best_a.assign(a.size(), 0.F);
     best_b.assign(b.size(), 0.F);
     const auto projection = kReach * static_cast<float>(options.projection_sigma_px);
+    const float window = projection * std::hypot(order_a.largest_per_px, order_b.largest_per_px);
     std::size_t first = 0;
     for (const auto& [w, i] : order_a.entries) {
-      const float window = projection * std::hypot(order_a.largest_per_px, order_b.largest_per_px);
       while (first < order_b.entries.size() && order_b.entries[first].first < w - window) ++first;
       for (std::size_t k = first;
            k < order_b.entries.size() && order_b.entries[k].first <= w + window; ++k) {
@@ -146,6 +146,7 @@ void keep_supported(LabelledPieces& pieces, const JointOptions& options) {
     order.resize(count);
     std::sort(order.begin(), order.end());
     std::vector<PieceLabel> kept;
+    kept.reserve(count);
     for (const std::size_t i : order) kept.push_back(labels[i]);
     labels = std::move(kept);
   }
@@ -158,19 +159,6 @@ CrossingCost::CrossingCost(float inverse_depth_range, const JointOptions& option
       disagreement_(options.disagreement_cost()),
       projection2_(static_cast<float>(options.projection_sigma_px * options.projection_sigma_px)),
       density_((1 - wrong_) * inverse_depth_range / std::sqrt(2 * std::numbers::pi_v<float>)) {}
-
-float CrossingCost::operator()(const PieceLabel& a, const PieceLabel& b,
-                               const PieceCrossing& crossing) const {
-  constexpr float kFarthest2 = 36;  // squared standard deviations; beyond, nothing is left
-  if (a.pattern == b.pattern) return disagreement_;  // lines of one pattern do not cross
-  const Eigen::Vector3f q = a.q - b.q;
-  const float r = q.dot(crossing.position.homogeneous());
-  const float s2 = projection2_ * (a.inverse_depth_per_px * a.inverse_depth_per_px +
-                                   b.inverse_depth_per_px * b.inverse_depth_per_px) +
-                   crossing.sigma * crossing.sigma * q.head<2>().squaredNorm();
-  if (r * r > kFarthest2 * s2) return disagreement_;
-  return -std::log(wrong_ + density_ / std::sqrt(s2) * std::exp(-0.5F * r * r / s2));
-}
 
 LabelledPieces possible_labels(const Rig& rig, const std::vector<ColorFamily>& families,
                                const GridGraph& graph, const JointOptions& options) {
@@ -188,8 +176,12 @@ LabelledPieces possible_labels(const Rig& rig, const std::vector<ColorFamily>& f
   const double distance = (camera.device_from_world * volume.center).z();
   result.inverse_depth_range = static_cast<float>(
       1 / std::max(1e-3 * distance, distance - volume.radius) - 1 / (distance + volume.radius));
-  for (const CurvePiece& piece : result.graph.pieces) {
-    auto& labels = result.labels.emplace_back();
+  std::vector<int> lines;
+  std::vector<PieceLabel> labels;
+  result.labels.resize(result.graph.pieces.size());
+  for (std::size_t p = 0; p < result.graph.pieces.size(); ++p) {
+    const CurvePiece& piece = result.graph.pieces[p];
+    labels.clear();
     const Curve& curve = graph.curves[static_cast<std::size_t>(piece.curve)];
     const auto middle = static_cast<std::size_t>((piece.begin + piece.end) / 2);
     const auto range = depth_range(camera, volume, curve.points[middle].position.cast<double>());
@@ -204,7 +196,8 @@ LabelledPieces possible_labels(const Rig& rig, const std::vector<ColorFamily>& f
       const LinePattern& pattern = rig.projectors[static_cast<std::size_t>(ref.projector)]
                                        .patterns[static_cast<std::size_t>(ref.pattern)];
       const std::vector<int> color_of = family.color_of_symbol(pattern);
-      for (int line = 0; line < it->second.line_count(); ++line) {
+      it->second.candidates(piece.middle, w_low, w_high, lines);
+      for (const int line : lines) {
         LineSheets::Sheet sheet;
         if (!it->second.find(line, piece.middle, w_low, w_high, sheet)) continue;
         PieceLabel label{ref, line, sheet.q, sheet.inverse_depth_per_px, 0};
@@ -215,6 +208,7 @@ LabelledPieces possible_labels(const Rig& rig, const std::vector<ColorFamily>& f
         labels.push_back(label);
       }
     }
+    result.labels[p] = labels;
   }
   keep_supported(result, options);
   return result;

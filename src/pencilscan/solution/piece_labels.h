@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <span>
 #include <vector>
 
@@ -42,7 +43,17 @@ class CrossingCost {
   CrossingCost(float inverse_depth_range, const JointOptions& options);
 
   [[nodiscard]] float operator()(const PieceLabel& a, const PieceLabel& b,
-                                 const PieceCrossing& crossing) const;
+                                 const PieceCrossing& crossing) const {
+    constexpr float kFarthest2 = 36;  // squared standard deviations; beyond, nothing is left
+    if (a.pattern == b.pattern) return disagreement_;  // lines of one pattern do not cross
+    const Eigen::Vector3f q = a.q - b.q;
+    const float r = q.dot(crossing.position.homogeneous());
+    const float s2 = projection2_ * (a.inverse_depth_per_px * a.inverse_depth_per_px +
+                                     b.inverse_depth_per_px * b.inverse_depth_per_px) +
+                     crossing.sigma * crossing.sigma * q.head<2>().squaredNorm();
+    if (r * r > kFarthest2 * s2) return disagreement_;
+    return -std::log(wrong_ + density_ / std::sqrt(s2) * std::exp(-0.5F * r * r / s2));
+  }
 
  private:
   float wrong_;
