@@ -13,9 +13,14 @@ struct Segment {
   int index = 0;
 };
 
-constexpr int kCell = 2;  ///< px
+constexpr int kCell = 2;         ///< px
+constexpr float kMaxLength = 4;  ///< px; points farther apart have a gap between them
 
 float cross(const Vector2f& a, const Vector2f& b) { return a.x() * b.y() - a.y() * b.x(); }
+
+bool is_gap(const Vector2f& p, const Vector2f& q) {
+  return (q - p).squaredNorm() > kMaxLength * kMaxLength;
+}
 
 /// Curve segments by the cells that their bounding boxes touch: segments that intersect have a cell
 /// in common.
@@ -62,6 +67,7 @@ class SegmentGrid {
     for (std::size_t c = 0; c < curves.size(); ++c) {
       const auto& points = curves[c].points;
       for (std::size_t i = 0; i + 1 < points.size(); ++i) {
+        if (is_gap(points[i].position, points[i + 1].position)) continue;
         const Segment segment{static_cast<int>(c), static_cast<int>(i)};
         for_each_cell(points[i].position, points[i + 1].position,
                       [&](int at) { visit(at, segment); });
@@ -98,6 +104,7 @@ std::vector<Crossing> find_crossings(std::span<const Curve> curves, cv::Size ima
     for (std::size_t i = 0; i + 1 < points.size(); ++i) {
       const Vector2f p = points[i].position;
       const Vector2f r = points[i + 1].position - p;
+      if (is_gap(p, points[i + 1].position)) continue;
       seen.clear();
       grid.around(p, points[i + 1].position, [&](const Segment& s) {
         if (s.curve <= static_cast<int>(a)) return;
