@@ -38,8 +38,9 @@ PENCILSCAN_INLINE void store(const Lanes& lanes, float* to) {
 PENCILSCAN_INLINE void fill(float value, Lanes& lanes) { lanes = value - Lanes{}; }
 
 PENCILSCAN_INLINE void gather(const float* values, const IntLanes& at, Lanes& lanes) {
-  lanes = Lanes{values[at[0]], values[at[1]], values[at[2]], values[at[3]],
-                values[at[4]], values[at[5]], values[at[6]], values[at[7]]};
+  const Lanes gathered = {values[at[0]], values[at[1]], values[at[2]], values[at[3]],
+                          values[at[4]], values[at[5]], values[at[6]], values[at[7]]};
+  lanes = gathered;
 }
 
 PENCILSCAN_INLINE void clamp(float low, float high, Lanes& x) {

@@ -1,11 +1,10 @@
 #include "pencilscan/detection/code_evidence.h"
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cmath>
 
-#include "pencilscan/detection/nearest.h"
+#include "pencilscan/core/lanes.h"
 #include "pencilscan/detection/refine.h"
 
 namespace pencilscan {
@@ -14,55 +13,161 @@ namespace {
 constexpr int kHalf = 4;      ///< profile half-length, px
 constexpr int kUnknowns = 4;  ///< own line, other families, background level and slope
 
-using Normal = Eigen::Matrix<float, kUnknowns, kUnknowns>;
-using Right = Eigen::Matrix<float, kUnknowns, 3>;
+constexpr int kRightSides = 3;  ///< red, green, blue
 
-struct Sums {
-  Normal normal = Normal::Zero();
-  Right right = Right::Zero();
+/// Normal equations of each point of a curve, number by number: the upper triangle of the matrix by
+/// rows, then the right sides of each unknown; zeros before the first and after the last point.
+class PointSums {
+ public:
+  static constexpr std::size_t kMatrix = kUnknowns * (kUnknowns + 1) / 2;
+  static constexpr std::size_t kNumbers = kMatrix + kUnknowns * kRightSides;
+
+  PointSums(int points, int margin)
+      : margin_(margin), row_(static_cast<std::size_t>(points + 2 * margin + kLanes)) {
+    numbers_.assign(kNumbers * row_, 0.F);
+  }
+  [[nodiscard]] float* at(std::size_t number, int point) {
+    return numbers_.data() + number * row_ + static_cast<std::size_t>(point + margin_);
+  }
+  [[nodiscard]] const float* at(std::size_t number, int point) const {
+    return numbers_.data() + number * row_ + static_cast<std::size_t>(point + margin_);
+  }
+
+ private:
+  int margin_;
+  std::size_t row_;
+  std::vector<float> numbers_;
 };
 
-Sums point_sums(const cv::Mat& image, const cv::Mat& others, const CurvePoint& p) {
-  Sums sums;
+/// The images that are read along a curve.
+struct Images {
+  const cv::Mat& color;   ///< CV_32FC3
+  const cv::Mat& others;  ///< CV_32FC1, light of the other families
+};
+
+struct EightPoints {
+  Lanes x;
+  Lanes y;
+  Lanes nx;
+  Lanes ny;
+  Lanes width;
+};
+
+/// Sums over the profiles of eight points.
+PENCILSCAN_CLONES
+void sum_profiles(const Images& images, const EightPoints& points,
+                  std::array<Lanes, PointSums::kNumbers>& sums) {
+  sums = {};
+  const auto* color = images.color.ptr<float>();
+  const auto* others = images.others.ptr<float>();
+  const auto color_row = static_cast<int>(images.color.step1());
+  const auto others_row = static_cast<int>(images.others.step1());
+  const Lanes zero{};
   for (int o = -kHalf; o <= kHalf; ++o) {
+    // Nearest pixels; the shift makes truncation round.
+    constexpr int kShift = 4096;
     const auto fo = static_cast<float>(o);
-    const int x = nearest(p.position.x() + fo * p.normal.x());
-    const int y = nearest(p.position.y() + fo * p.normal.y());
-    if (x < 0 || y < 0 || x >= image.cols || y >= image.rows) continue;
-    const float d = (static_cast<float>(x) - p.position.x()) * p.normal.x() +
-                    (static_cast<float>(y) - p.position.y()) * p.normal.y();
-    Eigen::Matrix<float, kUnknowns, 1> row;
-    row << std::exp(-0.5F * d * d / (p.width_px * p.width_px)), others.at<float>(y, x), 1,
-        d / static_cast<float>(kHalf);
-    const auto& pixel = image.at<cv::Vec3f>(y, x);
-    sums.normal.noalias() += row * row.transpose();
-    sums.right.noalias() += row * Eigen::RowVector3f(pixel[0], pixel[1], pixel[2]);
+    const Lanes fx = points.x + fo * points.nx + (kShift + 0.5F);
+    const Lanes fy = points.y + fo * points.ny + (kShift + 0.5F);
+    IntLanes x = __builtin_convertvector(fx, IntLanes) - kShift;
+    IntLanes y = __builtin_convertvector(fy, IntLanes) - kShift;
+    const IntLanes is_inside =
+        (x >= 0) & (y >= 0) & (x < images.color.cols) & (y < images.color.rows);
+    x &= is_inside;
+    y &= is_inside;
+    const Lanes d = (__builtin_convertvector(x, Lanes) - points.x) * points.nx +
+                    (__builtin_convertvector(y, Lanes) - points.y) * points.ny;
+    std::array<Lanes, kUnknowns> unknown;
+    exponential(-0.5F * d * d / (points.width * points.width), unknown[0]);
+    gather(others, y * others_row + x, unknown[1]);
+    unknown[2] = zero + 1;
+    unknown[3] = d * (1 / static_cast<float>(kHalf));
+    for (Lanes& u : unknown) u = is_inside ? u : zero;
+    std::size_t number = 0;
+    for (std::size_t i = 0; i < kUnknowns; ++i) {
+      for (std::size_t j = i; j < kUnknowns; ++j) sums[number++] += unknown[i] * unknown[j];
+    }
+    const IntLanes at = y * color_row + 3 * x;
+    for (std::size_t c = 0; c < kRightSides; ++c) {
+      Lanes value{};
+      gather(color + c, at, value);
+      for (std::size_t i = 0; i < kUnknowns; ++i)
+        sums[PointSums::kMatrix + i * kRightSides + c] += unknown[i] * value;
+    }
   }
-  return sums;
 }
 
-/// Colour amplitude of each point of a curve and the variance gain of its estimate.
+/// Solves for the amplitudes of eight lines from `first` on, over +-half_arc points.
+PENCILSCAN_CLONES
+void solve_amplitudes(const PointSums& sums, int first, int half_arc,
+                      std::array<Lanes, kRightSides>& rgb) {
+  std::array<Lanes, PointSums::kNumbers> total{};
+  for (std::size_t number = 0; number < total.size(); ++number) {
+    const float* from = sums.at(number, first);
+    for (int j = -half_arc; j <= half_arc; ++j) {
+      Lanes value;
+      load(from + j, value);
+      total[number] += value;
+    }
+  }
+  // The line itself last: elimination then ends with its amplitude.
+  constexpr std::array<std::size_t, kUnknowns> kOrder = {3, 2, 1, 0};
+  std::array<std::array<Lanes, kUnknowns>, kUnknowns> matrix{};
+  std::array<std::array<Lanes, kRightSides>, kUnknowns> right{};
+  std::size_t number = 0;
+  for (std::size_t i = 0; i < kUnknowns; ++i) {
+    for (std::size_t j = i; j < kUnknowns; ++j) matrix[kOrder[j]][kOrder[i]] = total[number++];
+  }
+  for (std::size_t i = 0; i < kUnknowns; ++i) {
+    for (std::size_t c = 0; c < kRightSides; ++c) right[kOrder[i]][c] = total[number++];
+  }
+  for (std::size_t i = 0; i < kUnknowns; ++i) matrix[i][i] += 1e-4F;
+  // The others' coefficient lies between 0 and about 1: a ridge keeps it there when unobserved.
+  matrix[kOrder[1]][kOrder[1]] += 1e-3F;
+  for (std::size_t i = 0; i + 1 < kUnknowns; ++i) {
+    const Lanes inverse = 1 / matrix[i][i];
+    for (std::size_t j = i + 1; j < kUnknowns; ++j) {
+      const Lanes factor = matrix[i][j] * inverse;
+      for (std::size_t k = j; k < kUnknowns; ++k) matrix[j][k] -= factor * matrix[i][k];
+      for (std::size_t c = 0; c < kRightSides; ++c) right[j][c] -= factor * right[i][c];
+    }
+  }
+  for (std::size_t c = 0; c < kRightSides; ++c)
+    rgb[c] = right[kUnknowns - 1][c] / matrix[kUnknowns - 1][kUnknowns - 1];
+}
+
+/// Colour amplitude of each point of a curve.
 struct ColorAmplitude {
   Eigen::Vector3f rgb = Eigen::Vector3f::Zero();
 };
 
-std::vector<ColorAmplitude> color_amplitudes(const cv::Mat& image, const cv::Mat& others,
-                                             const Curve& curve, int half_arc) {
-  std::vector<Sums> sums;
-  sums.reserve(curve.points.size());
-  for (const CurvePoint& p : curve.points) sums.push_back(point_sums(image, others, p));
-  const int n = static_cast<int>(sums.size());
-  std::vector<ColorAmplitude> result(sums.size());
-  for (int i = 0; i < n; ++i) {
-    Normal normal = 1e-4F * Normal::Identity();
-    Right right = Right::Zero();
-    for (int j = std::max(0, i - half_arc); j <= std::min(n - 1, i + half_arc); ++j) {
-      normal += sums[static_cast<std::size_t>(j)].normal;
-      right += sums[static_cast<std::size_t>(j)].right;
+std::vector<ColorAmplitude> color_amplitudes(const Images& images, const Curve& curve,
+                                             int half_arc) {
+  const int n = static_cast<int>(curve.points.size());
+  PointSums sums(n, half_arc);
+  for (int first = 0; first < n; first += kLanes) {
+    EightPoints points;
+    for (int k = 0; k < kLanes; ++k) {
+      const CurvePoint& p = curve.points[static_cast<std::size_t>(std::min(first + k, n - 1))];
+      points.x[k] = p.position.x();
+      points.y[k] = p.position.y();
+      points.nx[k] = p.normal.x();
+      points.ny[k] = p.normal.y();
+      points.width[k] = p.width_px;
     }
-    // The others' coefficient lies between 0 and about 1: a ridge keeps it there when unobserved.
-    normal(1, 1) += 1e-3F;
-    result[static_cast<std::size_t>(i)].rgb = right.transpose() * normal.inverse().col(0);
+    std::array<Lanes, PointSums::kNumbers> eight;
+    sum_profiles(images, points, eight);
+    for (std::size_t number = 0; number < eight.size(); ++number) {
+      for (int k = 0; k < std::min(kLanes, n - first); ++k)
+        *sums.at(number, first + k) = eight[number][k];
+    }
+  }
+  std::vector<ColorAmplitude> result(curve.points.size());
+  for (int first = 0; first < n; first += kLanes) {
+    std::array<Lanes, kRightSides> rgb;
+    solve_amplitudes(sums, first, half_arc, rgb);
+    for (int k = 0; k < std::min(kLanes, n - first); ++k)
+      result[static_cast<std::size_t>(first + k)].rgb = {rgb[0][k], rgb[1][k], rgb[2][k]};
   }
   return result;
 }
@@ -117,9 +222,11 @@ void measure_code(const cv::Mat& unmixed_image, const std::vector<ColorFamily>& 
     for (const Curve& c : curves) {
       if (c.family != static_cast<int>(f)) continue;
       own.push_back(&c);
-      amplitudes.push_back(color_amplitudes(unmixed_image, others, c, options.half_arc));
+      amplitudes.push_back(color_amplitudes({unmixed_image, others}, c, options.half_arc));
     }
     const Eigen::Vector3f gains = channel_gains(amplitudes, own, family.presence);
+    std::vector<Eigen::Vector3f> colors;
+    for (const std::string& name : family.colors) colors.push_back(color_vector(name));
     std::size_t k = 0;
     for (Curve& curve : curves) {
       if (curve.family != static_cast<int>(f)) continue;
@@ -132,7 +239,7 @@ void measure_code(const cv::Mat& unmixed_image, const std::vector<ColorFamily>& 
         float* row = curve.code.data() + i * family.colors.size();
         float best = -1e9F;
         for (std::size_t j = 0; j < family.colors.size(); ++j) {
-          const Eigen::Vector3f c = color_vector(family.colors[j]);
+          const Eigen::Vector3f& c = colors[j];
           const float scale = std::max(0.F, rgb.dot(c) / c.squaredNorm());
           row[j] = -0.5F * (rgb - scale * c).squaredNorm() / (noise * noise);
           best = std::max(best, row[j]);
