@@ -1,9 +1,12 @@
 #include "pencilscan/detection/detect.h"
 
 #include <algorithm>
+#include <iterator>
 #include <opencv2/imgproc.hpp>
+#include <utility>
 
 #include "pencilscan/core/check.h"
+#include "pencilscan/core/parallel.h"
 
 namespace pencilscan {
 namespace {
@@ -57,13 +60,16 @@ CameraDetection detect_curves(const Camera& camera, const Rig& rig,
   result.unmixing = estimate_unmixing(camera, rig, families, linear);
   const cv::Mat rgb = unmixed(linear, result.unmixing);
   // Find and trace the curves of each family, then fit them together.
-  for (std::size_t f = 0; f < families.size(); ++f) {
+  std::vector<std::vector<Curve>> curves_of(families.size());
+  parallel_for(families.size(), [&](std::size_t f) {
     const cv::Mat presence = presence_image(rgb, families[f]);
     const std::vector<Ridgel> ridgels = find_ridgels(presence, options.ridge);
     std::vector<Curve> curves = trace_curves(ridgels, presence.size(), options.trace);
     for (Curve& curve : curves) curve.family = static_cast<int>(f);
-    curves = refine_curves(presence, std::move(curves), options.refine);
-    result.curves.insert(result.curves.end(), curves.begin(), curves.end());
+    curves_of[f] = refine_curves(presence, std::move(curves), options.refine);
+  });
+  for (std::vector<Curve>& curves : curves_of) {
+    std::move(curves.begin(), curves.end(), std::back_inserter(result.curves));
   }
   // Read the colour code along each curve.
   measure_code(rgb, families, result.curves, options.code);

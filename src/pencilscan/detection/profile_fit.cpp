@@ -17,37 +17,53 @@ PENCILSCAN_INLINE void select(const IntLanes& mask, const Lanes& value, Lanes& r
   result = mask ? value : result;
 }
 
-/// Line profiles of eight widths.
+/// Line profile of one width, or of eight.
+template <class Value>
 struct LineShape {
-  Lanes rate;            ///< 1 / edge
-  Lanes half;            ///< px
-  Lanes tail;            ///< exp(-half / edge)
-  Lanes scale;           ///< makes the height 1
-  Lanes half_per_width;  ///< d half / d width
-  IntLanes is_blunt;     ///< edge in proportion to the width
+  Value rate;   ///< 1 / edge
+  Value half;   ///< px
+  Value tail;   ///< exp(-half / edge)
+  Value scale;  ///< makes the height 1
 };
 
-PENCILSCAN_INLINE void make_shape(const Lanes& width, LineShape& shape) {
+PENCILSCAN_INLINE void make_shape(const Lanes& width, LineShape<Lanes>& shape, IntLanes& is_blunt) {
   Lanes edge = width * kBluntest;
-  shape.is_blunt = edge < kEdge;
-  edge = shape.is_blunt ? edge : edge - edge + kEdge;
+  is_blunt = edge < kEdge;
+  edge = is_blunt ? edge : edge - edge + kEdge;
   const Lanes square = 3 * width * width - kPi2 * edge * edge;
   for (int k = 0; k < kLanes; ++k) shape.half[k] = std::sqrt(square[k]);
   shape.rate = 1 / edge;
   exponential(-shape.rate * shape.half, shape.tail);
   shape.scale = (1 + shape.tail) / (1 - shape.tail);
-  shape.half_per_width = 3 * width / shape.half;
+}
+
+LineShape<float> make_shape(float width) {
+  const float edge = std::min(kEdge, kBluntest * width);
+  const float half = std::sqrt(3 * width * width - kPi2 * edge * edge);
+  const float tail = std::exp(-half / edge);
+  return {1 / edge, half, tail, (1 + tail) / (1 - tail)};
 }
 
 /// The two steps of the profile at d, given e = exp(-rate d): 1 / (1 + tail e) and
 /// tail / (tail + e), written so that nothing overflows within reach.
-PENCILSCAN_INLINE void steps_at(const LineShape& shape, const Lanes& e, Lanes& rising,
+template <class Value>
+PENCILSCAN_INLINE void steps_at(const LineShape<Value>& shape, const Lanes& e, Lanes& rising,
                                 Lanes& falling) {
   const Lanes one_plus = 1 + shape.tail * e;
   const Lanes tail_plus = shape.tail + e;
   const Lanes inverse = 1 / (one_plus * tail_plus);
   rising = tail_plus * inverse;
   falling = shape.tail * one_plus * inverse;
+}
+
+/// Height of the profile at d.
+PENCILSCAN_INLINE void height_at(const LineShape<float>& shape, const Lanes& d, Lanes& height) {
+  Lanes e;
+  exponential(-shape.rate * d, e);
+  Lanes rising;
+  Lanes falling;
+  steps_at(shape, e, rising, falling);
+  height = shape.scale * (rising - falling);
 }
 
 struct Parameters {
@@ -131,8 +147,10 @@ PENCILSCAN_INLINE void linearize(const std::array<Lanes, kProfileSize>& measured
                                  const Background& background, const Parameters& at,
                                  std::array<Lanes, kProfileSize>& model, Lanes& model_slope,
                                  NormalEquations& n) {
-  LineShape shape;
-  make_shape(at.width, shape);
+  LineShape<Lanes> shape;
+  IntLanes is_blunt;
+  make_shape(at.width, shape, is_blunt);
+  const Lanes half_per_width = 3 * at.width / shape.half;
   // exp(-rate (o - center)) from one offset to the next is a product.
   Lanes e;
   Lanes ratio;
@@ -158,8 +176,8 @@ PENCILSCAN_INLINE void linearize(const std::array<Lanes, kProfileSize>& measured
     const Lanes fall = steep * falling * (1 - falling);
     const Lanes f_d = rise - fall;
     // A blunt profile is stretched, the others become wider between the same edges.
-    const Lanes f_width = shape.is_blunt ? -d * inverse_width * f_d
-                                         : (rise + fall + scale_change * f) * shape.half_per_width;
+    const Lanes f_width =
+        is_blunt ? -d * inverse_width * f_d : (rise + fall + scale_change * f) * half_per_width;
     const Lanes light = (1 + at.tilt * d) * background.inside[s];
     std::array<Lanes, kUnknowns> J;
     J[kHeight] = light * f;
@@ -204,42 +222,34 @@ PENCILSCAN_INLINE void odd_variance(const std::array<Lanes, kProfileSize>& measu
 
 PENCILSCAN_CLONES
 void line_profile(float width, std::array<float, 2 * kLanes>& values) {
-  Lanes widths;
-  fill(width, widths);
-  LineShape shape;
-  make_shape(widths, shape);
-  for (int block = 0; block < 2; ++block) {
-    Lanes d;
-    for (int k = 0; k < kLanes; ++k) d[k] = static_cast<float>(block * kLanes + k - kMaxHalf);
-    Lanes e;
-    exponential(-shape.rate * d, e);
-    Lanes rising;
-    Lanes falling;
-    steps_at(shape, e, rising, falling);
-    Lanes f = shape.scale * (rising - falling);
-    f = d * d <= (kModelReach * width) * (kModelReach * width) ? f : f - f;
-    for (int k = 0; k < kLanes; ++k) values[static_cast<std::size_t>(block * kLanes + k)] = f[k];
+  const LineShape<float> shape = make_shape(width);
+  const float reach2 = (kModelReach * width) * (kModelReach * width);
+  Lanes d;
+  for (int k = 0; k < kLanes; ++k) d[k] = static_cast<float>(k - kMaxHalf);
+  for (std::size_t block = 0; block < 2; ++block, d += static_cast<float>(kLanes)) {
+    Lanes height;
+    height_at(shape, d, height);
+    store(d * d <= reach2 ? height : height - height, values.data() + block * kLanes);
   }
 }
 
 PENCILSCAN_CLONES
 void add_line_profile(float amplitude, float width, float first, float step, int count,
                       float* image, std::ptrdiff_t stride) {
-  Lanes widths;
-  fill(width, widths);
-  LineShape shape;
-  make_shape(widths, shape);
-  Lanes place;
-  for (int k = 0; k < kLanes; ++k) place[k] = static_cast<float>(k);
-  for (int i = 0; i < count; i += kLanes) {
-    const Lanes d = first + step * (place + static_cast<float>(i));
-    Lanes e;
-    exponential(-shape.rate * d, e);
-    Lanes rising;
-    Lanes falling;
-    steps_at(shape, e, rising, falling);
-    const Lanes f = amplitude * shape.scale * (rising - falling);
-    for (int k = 0; k < std::min(kLanes, count - i); ++k) image[(i + k) * stride] += f[k];
+  const LineShape<float> shape = make_shape(width);
+  Lanes d;
+  for (int k = 0; k < kLanes; ++k) d[k] = first + step * static_cast<float>(k);
+  for (int i = 0; i < count; i += kLanes, d += step * static_cast<float>(kLanes)) {
+    Lanes height;
+    height_at(shape, d, height);
+    height *= amplitude;
+    if (stride == 1 && i + kLanes <= count) {
+      Lanes sum;
+      load(image + i, sum);
+      store(sum + height, image + i);
+    } else {
+      for (int k = 0; k < std::min(kLanes, count - i); ++k) image[(i + k) * stride] += height[k];
+    }
   }
 }
 
