@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "pencilscan/core/error.h"
+#include "pencilscan/core/lanes.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/core/random.h"
 
@@ -60,6 +61,19 @@ TEST(Random, StreamsOfOneSeedDiffer) {
 TEST(InputError, NamesFileFieldValueAndRule) {
   const InputError error("rig.json", "cameras[0].K", "nan", "must be finite");
   EXPECT_STREQ(error.what(), "rig.json: cameras[0].K = nan: must be finite");
+}
+
+// Where single precision holds x itself to 5e-6 of a unit.
+TEST(Lanes, ExponentialIsThatOfTheLibrary) {
+  constexpr double kTolerance = 1e-5;
+  for (float x = -78; x < 78; x += 0.37F) {
+    Lanes in{};
+    in += x;
+    Lanes out;
+    exponential(in, out);
+    const double expected = std::exp(static_cast<double>(x));
+    EXPECT_NEAR(out[kLanes - 1] / expected, 1, kTolerance) << "x = " << x;
+  }
 }
 
 }  // namespace
