@@ -25,7 +25,7 @@ std::vector<std::string> built_layers() {
 }
 
 LayeringRules project_rules() {
-  return {built_layers(), "simulation", {"detection", "grid", "solution", "surface"}};
+  return {built_layers(), "simulation", {"detection", "grid", "solution", "depth", "surface"}};
 }
 
 /// The layers as docs/architecture.md lists them: the first word of each line of the block after

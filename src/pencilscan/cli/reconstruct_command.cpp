@@ -18,6 +18,7 @@ struct ReconstructOptions {
   std::string method = "joint";
   std::string cost = "normalized";
   bool no_pictures = false;
+  bool no_depth = false;
   bool overwrite = false;
 };
 
@@ -27,10 +28,14 @@ void reconstruct(const ReconstructOptions& options) {
   sequence.points.solution.method = method_from_name(options.method).value();
   sequence.points.solution.cost =
       options.cost == "published" ? MultiviewCost::kPublished : MultiviewCost::kNormalized;
+  // The paper's two methods keep their own, continuous planes: their surface rests on the curves.
+  sequence.shape.depth.enabled =
+      !options.no_depth && sequence.points.solution.method == Method::kJoint;
   sequence.pictures = !options.no_pictures;
   sequence.overwrite = options.overwrite;
   sequence.description = "method=" + options.method + " multiview-cost=" + options.cost +
-                         " pictures=" + (options.no_pictures ? "no" : "yes");
+                         " pictures=" + (options.no_pictures ? "no" : "yes") +
+                         " depth=" + (sequence.shape.depth.enabled ? "yes" : "no");
   const auto outcomes =
       reconstruct_sequence(options.rig, options.frames, options.out, sequence, stderr_progress());
   nlohmann::ordered_json figures;
@@ -81,6 +86,8 @@ void add_reconstruct_command(CLI::App& app) {
                    "all reprojected points)")
       ->check(CLI::IsMember({"published", "normalized"}))
       ->capture_default_str();
+  command->add_flag("--no-depth", options->no_depth,
+                    "surface from the labelled curves alone, without depth between them");
   command->add_flag("--no-pictures", options->no_pictures, "leave overlays and views out");
   command->add_flag("--overwrite", options->overwrite, "replace output of other inputs or options");
   add_common_options(*command, options->common,

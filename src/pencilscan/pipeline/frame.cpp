@@ -78,4 +78,30 @@ PointResult measure_points(const Rig& rig, const Frame& frame, const PointOption
   return result;
 }
 
+ShapeResult measure_shape(const Rig& rig, const Frame& frame, const PointResult& points,
+                          const ShapeOptions& options) {
+  ShapeResult result;
+  if (options.depth.enabled) {
+    const Stopwatch depth_watch;
+    std::vector<Unmixing> unmixings;
+    for (const CameraDetection& detection : points.detections)
+      unmixings.push_back(detection.unmixing);
+    result.depth =
+        measure_depth(rig, points.families, frame.images, unmixings, points.points, options.depth);
+    result.times.push_back({"depth", depth_watch.seconds()});
+    const Stopwatch surface_watch;
+    result.surface = fuse_depth(rig, points.points, result.depth.maps, options.fusion);
+    result.times.push_back({"surface", surface_watch.seconds()});
+    if (result.surface.report.status != SurfaceStatus::kTooFewPoints) return result;
+  }
+  const Stopwatch surface_watch;
+  result.surface = reconstruct_surface(rig, points.points, options.surface);
+  result.times.push_back({"surface", surface_watch.seconds()});
+  if (options.depth.enabled) {
+    result.surface.report.warnings.push_back(
+        "dense depth found too little: the surface rests on the labelled curves alone");
+  }
+  return result;
+}
+
 }  // namespace pencilscan

@@ -4,11 +4,13 @@
 #include <vector>
 
 #include "pencilscan/core/progress.h"
+#include "pencilscan/depth/depth.h"
 #include "pencilscan/detection/detect.h"
 #include "pencilscan/grid/grid_graph.h"
 #include "pencilscan/io/point_file.h"
 #include "pencilscan/solution/labeling.h"
 #include "pencilscan/solution/triangulate.h"
+#include "pencilscan/surface/surface.h"
 
 namespace pencilscan {
 
@@ -23,6 +25,13 @@ struct PointOptions {
   GridOptions grid;
   SolutionOptions solution;
   TriangulationOptions triangulation;
+};
+
+/// How the labelled points become a surface.
+struct ShapeOptions {
+  DepthStageOptions depth;
+  FusionOptions fusion;    ///< of dense depth
+  SurfaceOptions surface;  ///< of the curves alone, where dense depth is off or finds nothing
 };
 
 /// Seconds of one stage, wall clock.
@@ -46,5 +55,18 @@ struct PointResult {
 /// triangulation.
 [[nodiscard]] PointResult measure_points(const Rig& rig, const Frame& frame,
                                          const PointOptions& options = {});
+
+/// Dense depth and surface of one frame.
+struct ShapeResult {
+  DepthResult depth;  ///< empty where it is off
+  SurfaceResult surface;
+  std::vector<StageTime> times;
+};
+
+/// Dense depth from the labelled points, checked between the views and fused into one closed
+/// surface.
+[[nodiscard]] ShapeResult measure_shape(const Rig& rig, const Frame& frame,
+                                        const PointResult& points,
+                                        const ShapeOptions& options = {});
 
 }  // namespace pencilscan

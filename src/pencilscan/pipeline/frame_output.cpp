@@ -91,6 +91,21 @@ ordered_json component_report(const Rig& rig, const ComponentReport& component) 
   return report;
 }
 
+ordered_json depth_report(const Rig& rig, const DepthReport& depth) {
+  ordered_json report;
+  report["nodes_contradicted"] = depth.consistency.contradicted;
+  report["nodes_in_small_islands"] = depth.consistency.islands;
+  report["cameras"] = ordered_json::array();
+  for (const CameraDepthReport& camera : depth.cameras) {
+    report["cameras"].push_back(
+        {{"name", rig.cameras[static_cast<std::size_t>(camera.camera)].name},
+         {"nodes_measured", camera.measured},
+         {"blur_px", number(camera.blur_px)},
+         {"sigma_median_mm", number(camera.sigma_median_mm)}});
+  }
+  return report;
+}
+
 /// Every detected curve of a camera, by what the grid graph found, or else in pieces by the labels;
 /// undecided ones have key -1.
 std::vector<OverlayCurve> overlay_curves(const Rig& rig, const GridGraph& graph,
@@ -134,7 +149,7 @@ std::vector<OverlayCurve> overlay_curves(const Rig& rig, const GridGraph& graph,
 }  // namespace
 
 nlohmann::ordered_json frame_report(const Rig& rig, const Frame& frame, const PointResult& points,
-                                    const SurfaceResult& surface) {
+                                    const ShapeResult& shape) {
   ordered_json report;
   report["frame"] = frame.name;
   report["points"] = points.points.size();
@@ -153,7 +168,8 @@ nlohmann::ordered_json frame_report(const Rig& rig, const Frame& frame, const Po
   for (const ComponentReport& component : points.labeling.components) {
     report["components"].push_back(component_report(rig, component));
   }
-  const SurfaceReport& s = surface.report;
+  if (!shape.depth.maps.empty()) report["depth"] = depth_report(rig, shape.depth.report);
+  const SurfaceReport& s = shape.surface.report;
   report["surface"] = {{"status", to_string(s.status)},
                        {"points_used", s.points_used},
                        {"spacing_mm", number(s.spacing_mm)},
@@ -169,7 +185,7 @@ nlohmann::ordered_json frame_report(const Rig& rig, const Frame& frame, const Po
 }
 
 void write_frame_pictures(const std::filesystem::path& folder, const Rig& rig, const Frame& frame,
-                          const PointResult& points, const SurfaceResult& surface) {
+                          const PointResult& points, const ShapeResult& shape) {
   std::vector<std::size_t> cameras;
   for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
     if (!frame.images[c].empty()) cameras.push_back(c);
@@ -188,8 +204,8 @@ void write_frame_pictures(const std::filesystem::path& folder, const Rig& rig, c
   write_pictures(folder, overlays);
   FrameResults results{.rig = rig};
   results.points = points.points;
-  results.used = surface.used;
-  if (!surface.mesh.faces.empty()) results.mesh = &surface.mesh;
+  results.used = shape.surface.used;
+  if (!shape.surface.mesh.faces.empty()) results.mesh = &shape.surface.mesh;
   write_pictures(folder, make_pictures(results));
 }
 

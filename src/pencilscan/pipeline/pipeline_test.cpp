@@ -99,7 +99,8 @@ class PipelineTest : public testing::Test {
   static SequenceOptions quick() {
     SequenceOptions options;
     options.pictures = false;
-    options.surface.max_depth = 5;
+    options.shape.surface.max_depth = 5;
+    options.shape.fusion.max_depth = 5;
     options.description = "quick";
     return options;
   }

@@ -104,15 +104,15 @@ void reconstruct_frame(const Rig& rig, const FrameFiles& files, const fs::path& 
   if (points.points.empty()) {
     throw StageError("no curve could be given its projector line");
   }
-  const Stopwatch surface_watch;
-  const SurfaceResult surface = reconstruct_surface(rig, points.points, options.surface);
-  points.times.push_back({"surface", surface_watch.seconds()});
+  const ShapeResult shape = measure_shape(rig, frame, points, options.shape);
+  const SurfaceResult& surface = shape.surface;
+  points.times.insert(points.times.end(), shape.times.begin(), shape.times.end());
   write_points(folder / "points.ply", points.points);
   write_mesh(folder / "mesh.ply", surface.mesh);
   write_mesh(folder / "mesh_measured.ply", surface.measured);
   if (options.pictures) {
     const Stopwatch picture_watch;
-    write_frame_pictures(folder / "pictures", rig, frame, points, surface);
+    write_frame_pictures(folder / "pictures", rig, frame, points, shape);
     points.times.push_back({"pictures", picture_watch.seconds()});
   }
   ordered_json timing;
@@ -121,7 +121,7 @@ void reconstruct_frame(const Rig& rig, const FrameFiles& files, const fs::path& 
   for (const StageTime& t : points.times) timing["seconds"][t.stage] = t.seconds;
   timing["seconds"]["total"] = total.seconds();
   write_json(folder / "timing.json", timing);
-  const ordered_json report = frame_report(rig, frame, points, surface);
+  const ordered_json report = frame_report(rig, frame, points, shape);
   write_json(folder / "report.json", report);  // last: its presence means that the frame is done
   outcome.points = points.points.size();
   outcome.warnings = report["warnings"].get<std::vector<std::string>>();

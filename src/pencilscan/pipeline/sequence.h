@@ -6,13 +6,12 @@
 
 #include "pencilscan/core/progress.h"
 #include "pencilscan/pipeline/frame.h"
-#include "pencilscan/surface/surface.h"
 
 namespace pencilscan {
 
 struct SequenceOptions {
   PointOptions points;
-  SurfaceOptions surface;
+  ShapeOptions shape;
   bool pictures = true;
   bool overwrite = false;   ///< replace the results of other inputs or options
   std::string description;  ///< of the options: output of another description is not resumed

@@ -75,13 +75,14 @@ std::vector<Vote> nearest_per_group(std::vector<Candidate>& candidates, std::siz
   return votes;
 }
 
-Votes collect_support(std::span<const CurveSample> samples, const PointGrid& grid, double spacing) {
+Votes collect_support(std::span<const SurfaceSample> samples, const PointGrid& grid,
+                      double spacing) {
   Votes support(samples.size());
   parallel_samples(samples.size(), [&](std::size_t i) {
-    const CurveSample& p = samples[i];
+    const SurfaceSample& p = samples[i];
     std::vector<Candidate> candidates;
     grid.for_each_within(p.position, kSupportRadius * spacing, [&](std::size_t j, double d2) {
-      const CurveSample& q = samples[j];
+      const SurfaceSample& q = samples[j];
       if (q.curve == p.curve || q.normal.dot(p.normal) < 0.3) return;
       // Bent surfaces and tilted normals leave the plane in proportion to the distance.
       const double tolerance = 0.05 * spacing + 0.12 * std::sqrt(d2) + p.sigma + q.sigma;
@@ -146,13 +147,13 @@ class ViewBuffer {
   std::unordered_map<std::uint64_t, std::vector<Entry>> entries_;
 };
 
-std::vector<ViewBuffer> make_views(const Rig& rig, std::span<const CurveSample> samples,
+std::vector<ViewBuffer> make_views(const Rig& rig, std::span<const SurfaceSample> samples,
                                    double spacing) {
   std::vector<const Device*> devices;
   for (const Camera& camera : rig.cameras) devices.push_back(&camera);
   for (const Projector& projector : rig.projectors) devices.push_back(&projector);
   Vec3 center = Vec3::Zero();
-  for (const CurveSample& s : samples) center += s.position;
+  for (const SurfaceSample& s : samples) center += s.position;
   center /= static_cast<double>(std::max<std::size_t>(samples.size(), 1));
   std::vector<ViewBuffer> views;
   for (const Device* device : devices) {
@@ -167,7 +168,8 @@ std::vector<ViewBuffer> make_views(const Rig& rig, std::span<const CurveSample> 
   return views;
 }
 
-Votes collect_contradictions(const Rig& rig, std::span<const CurveSample> samples, double spacing) {
+Votes collect_contradictions(const Rig& rig, std::span<const SurfaceSample> samples,
+                             double spacing) {
   const std::vector<ViewBuffer> views = make_views(rig, samples, spacing);
   const auto center = [&](std::size_t view) {
     return view < rig.cameras.size() ? rig.cameras[view].center()
@@ -175,7 +177,7 @@ Votes collect_contradictions(const Rig& rig, std::span<const CurveSample> sample
   };
   Votes contradictions(samples.size());
   parallel_samples(samples.size(), [&](std::size_t i) {
-    const CurveSample& p = samples[i];
+    const SurfaceSample& p = samples[i];
     std::vector<Candidate> candidates;
     for (std::size_t view = 0; view < views.size(); ++view) {
       // A sample seen edge-on stands beside the line, not in it.
@@ -207,7 +209,7 @@ Votes collect_contradictions(const Rig& rig, std::span<const CurveSample> sample
 }
 
 /// Samples of the same curve within kAlongRadius, the sample itself included.
-std::vector<std::vector<std::uint32_t>> collect_along(std::span<const CurveSample> samples,
+std::vector<std::vector<std::uint32_t>> collect_along(std::span<const SurfaceSample> samples,
                                                       const PointGrid& grid, double spacing) {
   std::vector<std::vector<std::uint32_t>> along(samples.size());
   parallel_samples(samples.size(), [&](std::size_t i) {
@@ -220,7 +222,7 @@ std::vector<std::vector<std::uint32_t>> collect_along(std::span<const CurveSampl
 
 }  // namespace
 
-std::vector<double> vote(const Rig& rig, std::span<const CurveSample> samples,
+std::vector<double> vote(const Rig& rig, std::span<const SurfaceSample> samples,
                          const PointGrid& grid, double spacing) {
   const Votes support = collect_support(samples, grid, spacing);
   const Votes contradictions = collect_contradictions(rig, samples, spacing);
@@ -248,7 +250,7 @@ std::vector<double> vote(const Rig& rig, std::span<const CurveSample> samples,
   return belief;
 }
 
-void drop_small_clusters(std::span<const CurveSample> samples, double gap_mm, double min_share,
+void drop_small_clusters(std::span<const SurfaceSample> samples, double gap_mm, double min_share,
                          std::vector<char>& keep) {
   std::vector<std::size_t> kept;
   std::vector<Vec3> positions;

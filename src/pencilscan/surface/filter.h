@@ -20,13 +20,13 @@ namespace pencilscan {
 /// C, contradiction: a sample's camera ray and light ray pass through empty space. Whoever lies on
 /// such a segment, more than a margin before its end, contradicts its owner and is contradicted.
 /// (Cf. the stability of Merrell et al., "Real-time visibility-based fusion of depth maps", 2007.)
-[[nodiscard]] std::vector<double> vote(const Rig& rig, std::span<const CurveSample> samples,
+[[nodiscard]] std::vector<double> vote(const Rig& rig, std::span<const SurfaceSample> samples,
                                        const PointGrid& grid, double spacing);
 
 /// Clears keep[i] of samples in small clusters: chains of kept samples with gaps up to `gap_mm`
 /// that have less than min_share of the largest cluster's samples. What floats far off would also
 /// stretch the octree and with it every cell.
-void drop_small_clusters(std::span<const CurveSample> samples, double gap_mm, double min_share,
+void drop_small_clusters(std::span<const SurfaceSample> samples, double gap_mm, double min_share,
                          std::vector<char>& keep);
 
 /// Samples believed less than this are wrong more often than right.

@@ -56,14 +56,14 @@ Vec3 normal_of_curve(const Vec3& tangent, const Vec3& to_camera) {
 }
 
 /// Uncertainty across the surface of a sample whose sigma runs along the camera ray.
-double sigma_across(const CurveSample& s, const Vec3& normal) {
+double sigma_across(const SurfaceSample& s, const Vec3& normal) {
   constexpr double kGrazing = 0.2;  // keeps grazing views from looking exact
   return s.sigma * std::max(std::abs(s.to_camera.dot(normal)), kGrazing);
 }
 
 /// Fits the quadric of one sample; returns false when too few neighbours define it.
-bool fit_quadric(std::span<const CurveSample> samples, const PointGrid& grid, double radius,
-                 CurveSample& sample) {
+bool fit_quadric(std::span<const SurfaceSample> samples, const PointGrid& grid, double radius,
+                 SurfaceSample& sample) {
   const Vec3 n = sample.normal;
   const Vec3 e1 = n.unitOrthogonal();
   const Vec3 e2 = n.cross(e1);
@@ -75,7 +75,7 @@ bool fit_quadric(std::span<const CurveSample> samples, const PointGrid& grid, do
   int count = 0;
   const double width2 = 0.25 * radius * radius;  // Gaussian of half the radius
   grid.for_each_within(sample.position, radius, [&](std::size_t j, double d2) {
-    const CurveSample& q = samples[j];
+    const SurfaceSample& q = samples[j];
     if (q.normal.dot(n) < 0.5) return;
     const Vec3 d = (q.position - sample.position) / radius;
     const double x = d.dot(e1);
@@ -105,11 +105,11 @@ bool fit_quadric(std::span<const CurveSample> samples, const PointGrid& grid, do
 
 }  // namespace
 
-std::vector<Vec3> initial_normals(std::span<const CurveSample> samples, const PointGrid& grid,
+std::vector<Vec3> initial_normals(std::span<const SurfaceSample> samples, const PointGrid& grid,
                                   double radius) {
   std::vector<Vec3> normals(samples.size());
   parallel_samples(samples.size(), [&](std::size_t i) {
-    const CurveSample& s = samples[i];
+    const SurfaceSample& s = samples[i];
     std::vector<Vec3> points;
     std::vector<double> base;
     grid.for_each_within(s.position, radius, [&](std::size_t j, double d2) {
@@ -135,13 +135,13 @@ std::vector<Vec3> initial_normals(std::span<const CurveSample> samples, const Po
   return normals;
 }
 
-void fit_local_surfaces(std::vector<CurveSample>& samples, double radius) {
+void fit_local_surfaces(std::vector<SurfaceSample>& samples, double radius) {
   constexpr int kRounds = 2;  // the second uses neighbours whose normals have settled
   for (int round = 0; round < kRounds; ++round) {
     std::vector<Vec3> positions(samples.size());
     for (std::size_t i = 0; i < samples.size(); ++i) positions[i] = samples[i].position;
     const PointGrid grid(positions, radius);
-    std::vector<CurveSample> fitted = samples;
+    std::vector<SurfaceSample> fitted = samples;
     parallel_samples(samples.size(),
                      [&](std::size_t i) { fit_quadric(samples, grid, radius, fitted[i]); });
     if (round + 1 < kRounds) {

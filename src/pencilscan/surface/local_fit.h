@@ -12,7 +12,7 @@ namespace pencilscan {
 /// (three rounds of Cauchy weights), oriented towards the camera. One camera sees one side only, so
 /// a thin part does not mix its two faces. A curve without neighbours takes the direction to the
 /// camera made perpendicular to the curve.
-[[nodiscard]] std::vector<Vec3> initial_normals(std::span<const CurveSample> samples,
+[[nodiscard]] std::vector<Vec3> initial_normals(std::span<const SurfaceSample> samples,
                                                 const PointGrid& grid, double radius);
 
 /// Moving least squares (Levin, "The approximation power of moving least-squares", 1998): a quadric
@@ -20,6 +20,6 @@ namespace pencilscan {
 /// by distance and 1 / sigma^2 across the surface, from the samples of all cameras whose normals
 /// lie within 60 degrees. Sets normal, residual and moves the sample along its normal onto the
 /// quadric, by no more than a quarter of the radius.
-void fit_local_surfaces(std::vector<CurveSample>& samples, double radius);
+void fit_local_surfaces(std::vector<SurfaceSample>& samples, double radius);
 
 }  // namespace pencilscan

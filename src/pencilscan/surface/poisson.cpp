@@ -10,12 +10,12 @@
 
 namespace pencilscan {
 
-TriangleMesh poisson_surface(std::span<const CurveSample> samples, int depth, double scale) {
+TriangleMesh poisson_surface(std::span<const SurfaceSample> samples, int depth, double scale) {
   const open3d::utility::VerbosityContextManager quiet(open3d::utility::VerbosityLevel::Error);
   open3d::geometry::PointCloud cloud;
   cloud.points_.reserve(samples.size());
   cloud.normals_.reserve(samples.size());
-  for (const CurveSample& sample : samples) {
+  for (const SurfaceSample& sample : samples) {
     cloud.points_.push_back(sample.position);
     cloud.normals_.push_back(sample.normal);
   }

@@ -11,7 +11,7 @@ namespace pencilscan {
 /// thread: with more, the bytes vary from run to run. depth in [1, 12], scale > 1 (1.5 or more, or
 /// the surface may leave the octree's cube where nothing was seen). Empty when it finds no surface.
 /// The only translation unit that includes Open3D.
-[[nodiscard]] TriangleMesh poisson_surface(std::span<const CurveSample> samples, int depth,
+[[nodiscard]] TriangleMesh poisson_surface(std::span<const SurfaceSample> samples, int depth,
                                            double scale);
 
 }  // namespace pencilscan

@@ -97,7 +97,7 @@ SampleSet sample_curves(const Rig& rig, std::span<const MeasuredPoint> points,
              std::get<2>(a) == std::get<2>(b) && std::get<3>(a) == std::get<3>(b);
     };
     if (begin > 0 && std::get<0>(keys[begin]) != std::get<0>(keys[begin - 1])) ++curve;
-    CurveSample sample;
+    SurfaceSample sample;
     double weight_sum = 0;
     std::size_t end = begin;
     for (; end < keys.size() && same_cell(keys[begin], keys[end]); ++end) {

@@ -11,7 +11,7 @@
 namespace pencilscan {
 
 /// A short piece of one measured curve.
-struct CurveSample {
+struct SurfaceSample {
   Vec3 position = Vec3::Zero();       ///< world, mm
   Vec3 to_camera = Vec3::UnitZ();     ///< unit, world
   Vec3 sheet_normal = Vec3::UnitX();  ///< unit normal of the light sheet, world
@@ -27,7 +27,7 @@ struct CurveSample {
 };
 
 struct SampleSet {
-  std::vector<CurveSample> samples;
+  std::vector<SurfaceSample> samples;
   std::vector<std::int32_t> sample_of_point;  ///< -1: coordinates not finite or beyond 10 km
   double spacing = 0;                         ///< median over the samples, mm
 };

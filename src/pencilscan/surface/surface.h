@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "pencilscan/core/progress.h"
+#include "pencilscan/depth/depth_map.h"
 #include "pencilscan/geometry/mesh.h"
 #include "pencilscan/io/point_file.h"
 #include "pencilscan/rig/rig.h"
@@ -72,6 +73,26 @@ struct SurfaceResult {
                                                 std::span<const MeasuredPoint> points,
                                                 const SurfaceOptions& options = {},
                                                 const Progress& progress = {});
+
+/// From dense depth to one closed surface.
+struct FusionOptions {
+  int max_depth = 8;                   ///< of the octree, in [5, 10]
+  double cell_spacings = 0.9;          ///< wished octree cell in node spacings, > 0
+  double fit_spacings = 1.5;           ///< radius of local quadrics in node spacings, > 0
+  int subdivisions = 1;                ///< of the octree's triangles, before they follow the depth
+  double reach_spacings = 1.5;         ///< a vertex farther from all nodes was not measured, > 0
+  double min_component_share = 0.05;   ///< of the largest component's measured area, in [0, 1]
+  double least_island_spacings2 = 16;  ///< area of a measured island that is kept, spacings^2
+};
+
+/// The nodes of all depth maps, each weighted by its variance, move onto local quadrics through the
+/// nodes of all cameras (local_fit.h); screened Poisson closes them; its triangles are cut finer
+/// and follow the quadrics where there is depth (vertex_fit.h). `points` only learn whether the
+/// surface bears them out.
+[[nodiscard]] SurfaceResult fuse_depth(const Rig& rig, std::span<const MeasuredPoint> points,
+                                       std::span<const DepthMap> maps,
+                                       const FusionOptions& options = {},
+                                       const Progress& progress = {});
 
 [[nodiscard]] std::string to_string(SurfaceStatus status);
 

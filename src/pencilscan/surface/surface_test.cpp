@@ -13,6 +13,7 @@
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/core/random.h"
 #include "pencilscan/surface/mesh_parts.h"
+#include "pencilscan/surface/vertex_fit.h"
 
 namespace pencilscan {
 namespace {
@@ -269,6 +270,84 @@ TEST(Surface, BadPointsAreLeftOutOrNamed) {
   EXPECT_EQ(reconstruct_surface(rig, points).report.points, 9u);
   points[4].camera = 77;
   EXPECT_THROW(static_cast<void>(reconstruct_surface(rig, points)), InputError);
+}
+
+/// What cameras would measure densely of the ball: tangent planes with noise, nodes 4 px apart.
+std::vector<DepthMap> ball_maps(const Rig& rig) {
+  std::vector<DepthMap> maps;
+  Random random(3);
+  for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
+    const Camera& camera = rig.cameras[c];
+    DepthMap map;
+    map.camera = static_cast<int>(c);
+    map.columns = map.rows = (camera.width - 1) / map.stride + 1;
+    map.nodes.resize(static_cast<std::size_t>(map.columns * map.rows));
+    for (std::size_t i = 0; i < map.nodes.size(); ++i) {
+      const Vec2 pixel = map.pixel(i);
+      const auto inverse_depth = [&](const Vec2& at) -> double {
+        const auto x = hit_ball(camera.ray(at));
+        return x ? 1 / (camera.device_from_world * *x).z() : 0;
+      };
+      const auto x = hit_ball(camera.ray(pixel));
+      if (!x || x->normalized().dot((camera.center() - *x).normalized()) < 0.3) continue;
+      const double z = 1 / inverse_depth(pixel) + kNoise * random.normal();
+      map.nodes[i].w = static_cast<float>(1 / z);
+      map.nodes[i].wx = static_cast<float>(inverse_depth(pixel + Vec2(0.5, 0)) -
+                                           inverse_depth(pixel - Vec2(0.5, 0)));
+      map.nodes[i].wy = static_cast<float>(inverse_depth(pixel + Vec2(0, 0.5)) -
+                                           inverse_depth(pixel - Vec2(0, 0.5)));
+      map.nodes[i].sigma = kSigma;
+      map.nodes[i].confidence = 1;
+      map.nodes[i].reason = HoleReason::kMeasured;
+    }
+    maps.push_back(map);
+  }
+  return maps;
+}
+
+TEST(FuseDepth, BallIsClosedAndAccurate) {
+  const Rig rig = ball_rig();
+  const std::vector<MeasuredPoint> points = ball_points(rig);
+  FusionOptions options;
+  options.cell_spacings = 2;  // the ball needs no finer cells
+  const SurfaceResult result = fuse_depth(rig, points, ball_maps(rig), options);
+  expect_watertight(result);
+  EXPECT_LT(worst_deviation(result.mesh), 0.3);  // three sigma of the noise
+  EXPECT_LT(share_beyond(result.mesh, 0.1), 0.1);
+  EXPECT_GT(result.report.measured_share, 0.97);
+  EXPECT_GT(result.report.points_used, points.size() * 9 / 10);
+}
+
+TEST(FuseDepth, TooFewDepthsIsAStatus) {
+  const Rig rig = ball_rig();
+  std::vector<DepthMap> maps = ball_maps(rig);
+  for (DepthMap& map : maps) map.nodes.assign(map.nodes.size(), DepthNode{});
+  const SurfaceResult result = fuse_depth(rig, ball_points(rig), maps);
+  EXPECT_EQ(result.report.status, SurfaceStatus::kTooFewPoints);
+}
+
+TEST(VertexFit, SubdivisionKeepsTheShape) {
+  const TriangleMesh ball = make_sphere(20, 12);
+  const TriangleMesh fine = subdivided(ball);
+  EXPECT_EQ(fine.faces.size(), 4 * ball.faces.size());
+  EXPECT_EQ(count_edges(fine).boundary, 0u);
+  EXPECT_NEAR(signed_volume(fine), signed_volume(ball), 1e-6 * signed_volume(ball));
+}
+
+TEST(VertexFit, VerticesFollowTheSamples) {
+  TriangleMesh mesh = make_sphere(20.2, 24);
+  std::vector<SurfaceSample> samples;
+  for (const Vec3& v : make_sphere(20, 64).vertices) {
+    SurfaceSample s;
+    s.position = v;
+    s.normal = s.to_camera = v.normalized();
+    s.sigma = 0.05;
+    samples.push_back(s);
+  }
+  fit_vertices(samples, 3, mesh);
+  // A quadric follows a sphere of 20 mm over 3 mm to 1e-3 mm; the last digits are the ridge on
+  // curvature.
+  for (const Vec3& v : mesh.vertices) EXPECT_NEAR(v.norm(), 20, 0.02);
 }
 
 TEST(MeshParts, ComponentsAndSubmeshOfTwoBoxes) {

@@ -1,0 +1,321 @@
+#include "pencilscan/depth/consistency.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "pencilscan/core/parallel.h"
+
+namespace pencilscan {
+namespace {
+
+/// A measured node of any map.
+struct Node {
+  Vec3 x;  ///< world
+  std::uint32_t map;
+  std::uint32_t index;  ///< in its map
+};
+
+/// Another node that agrees or disagrees, with the device through which that was found.
+struct Link {
+  std::uint32_t other;
+  std::uint16_t group;  ///< camera, or cameras + projector
+};
+
+struct Links {
+  std::vector<std::vector<Link>> support;
+  std::vector<std::vector<Link>> contradiction;
+};
+
+constexpr std::size_t kChunk = 256;
+
+template <typename Body>
+void parallel_chunks(std::size_t count, const Body& body) {
+  parallel_for((count + kChunk - 1) / kChunk, [&](std::size_t chunk) {
+    for (std::size_t i = chunk * kChunk; i < std::min(count, (chunk + 1) * kChunk); ++i) body(i);
+  });
+}
+
+/// The four nodes around a pixel, or fewer at the border.
+std::array<std::int64_t, 4> nodes_around(const DepthMap& map, const Vec2& pixel) {
+  const int c = static_cast<int>(std::floor(pixel[0] / map.stride));
+  const int r = static_cast<int>(std::floor(pixel[1] / map.stride));
+  std::array<std::int64_t, 4> around{-1, -1, -1, -1};
+  std::size_t k = 0;
+  for (int dr = 0; dr < 2; ++dr) {
+    for (int dc = 0; dc < 2; ++dc, ++k) {
+      if (r + dr < 0 || c + dc < 0 || r + dr >= map.rows || c + dc >= map.columns) continue;
+      around[k] = static_cast<std::int64_t>(map.index(r + dr, c + dc));
+    }
+  }
+  return around;
+}
+
+class Comparison {
+ public:
+  Comparison(const Rig& rig, std::span<const int> pattern_projector, std::span<const DepthMap> maps,
+             const ConsistencyOptions& options)
+      : rig_(rig), pattern_projector_(pattern_projector), maps_(maps), options_(options) {
+    id_of_.resize(maps.size());
+    for (std::size_t m = 0; m < maps.size(); ++m) {
+      id_of_[m].assign(maps[m].nodes.size(), -1);
+      for (std::size_t i = 0; i < maps[m].nodes.size(); ++i) {
+        if (!maps[m].nodes[i].measured()) continue;
+        id_of_[m][i] = static_cast<std::int32_t>(nodes_.size());
+        nodes_.push_back({node_point(rig, maps[m], i), static_cast<std::uint32_t>(m),
+                          static_cast<std::uint32_t>(i)});
+      }
+    }
+  }
+
+  [[nodiscard]] const std::vector<Node>& nodes() const { return nodes_; }
+  [[nodiscard]] std::int32_t id(std::size_t map, std::size_t node) const {
+    return id_of_[map][node];
+  }
+
+  [[nodiscard]] Links compare() const {
+    Links links;
+    links.support.resize(nodes_.size());
+    links.contradiction.resize(nodes_.size());
+    parallel_chunks(nodes_.size(), [&](std::size_t i) { compare_with_cameras(i, links); });
+    for (std::size_t p = 0; p < rig_.projectors.size(); ++p) compare_with_projector(p, links);
+    // Whoever contradicts is contradicted.
+    std::vector<std::vector<Link>> heard(nodes_.size());
+    for (std::size_t i = 0; i < nodes_.size(); ++i) {
+      for (const Link& link : links.contradiction[i]) {
+        heard[link.other].push_back(
+            {static_cast<std::uint32_t>(i), static_cast<std::uint16_t>(1000 + nodes_[i].map)});
+      }
+    }
+    for (std::size_t i = 0; i < nodes_.size(); ++i) {
+      auto& mine = links.contradiction[i];
+      mine.insert(mine.end(), heard[i].begin(), heard[i].end());
+      std::stable_sort(mine.begin(), mine.end(),
+                       [](const Link& a, const Link& b) { return a.group < b.group; });
+    }
+    return links;
+  }
+
+ private:
+  [[nodiscard]] const DepthNode& node(std::size_t i) const {
+    return maps_[nodes_[i].map].nodes[nodes_[i].index];
+  }
+
+  void compare_with_cameras(std::size_t i, Links& links) const {
+    for (std::size_t m = 0; m < maps_.size(); ++m) {
+      if (m == nodes_[i].map) continue;
+      const Camera& camera = rig_.cameras[static_cast<std::size_t>(maps_[m].camera)];
+      const auto pixel = camera.project(nodes_[i].x);
+      if (!pixel || !camera.contains(*pixel)) continue;
+      const double z = (camera.device_from_world * nodes_[i].x).z();
+      double nearest = 1e9;  // signed: what the camera sees, beyond the node
+      std::int32_t other = -1;
+      int count = 0;
+      for (const std::int64_t j : nodes_around(maps_[m], *pixel)) {
+        if (j < 0) continue;
+        const DepthNode& n = maps_[m].nodes[static_cast<std::size_t>(j)];
+        if (!n.measured()) continue;
+        ++count;
+        const Vec2 d = *pixel - maps_[m].pixel(static_cast<std::size_t>(j));
+        const double w = n.w + n.wx * d[0] + n.wy * d[1];
+        if (!(w > 0)) continue;
+        const double beyond = 1 / w - z;
+        if (std::abs(beyond) < std::abs(nearest)) {
+          nearest = beyond;
+          other = id_of_[m][static_cast<std::size_t>(j)];
+        }
+      }
+      if (other < 0) continue;
+      const double sigma =
+          static_cast<double>(node(i).sigma + node(static_cast<std::size_t>(other)).sigma);
+      const Link link{static_cast<std::uint32_t>(other), static_cast<std::uint16_t>(m)};
+      if (std::abs(nearest) < 0.5 * options_.margin_mm + 3 * sigma) {
+        links.support[i].push_back(link);
+      } else if (nearest > options_.margin_mm + 4 * sigma && count >= 3) {
+        links.contradiction[i].push_back(link);
+      }
+    }
+  }
+
+  /// Nodes that stand in the light of others.
+  void compare_with_projector(std::size_t p, Links& links) const {
+    const Projector& projector = rig_.projectors[p];
+    constexpr int kCell = 3;  // projector px
+    const int columns = projector.width / kCell + 1;
+    const int rows = projector.height / kCell + 1;
+    std::uint64_t bits = 0;
+    for (std::size_t k = 0; k < pattern_projector_.size() && k < 64; ++k) {
+      if (pattern_projector_[k] == static_cast<int>(p)) bits |= std::uint64_t{1} << k;
+    }
+    // The farthest two lit nodes per cell and camera would do; the farthest one is kept.
+    struct Lit {
+      float z = 0;
+      std::int32_t node = -1;
+    };
+    std::vector<Lit> farthest(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows));
+    std::vector<std::int32_t> cell_of(nodes_.size(), -1);
+    std::vector<float> z_of(nodes_.size());
+    parallel_chunks(nodes_.size(), [&](std::size_t i) {
+      const auto pixel = projector.project(nodes_[i].x);
+      if (!pixel || !projector.contains(*pixel)) return;
+      cell_of[i] = static_cast<std::int32_t>(((*pixel)[1] + 0.5) / kCell) * columns +
+                   static_cast<std::int32_t>(((*pixel)[0] + 0.5) / kCell);
+      z_of[i] = static_cast<float>((projector.device_from_world * nodes_[i].x).z());
+    });
+    for (std::size_t i = 0; i < nodes_.size(); ++i) {
+      if (cell_of[i] < 0 || (node(i).lit & bits) == 0) continue;
+      Lit& lit = farthest[static_cast<std::size_t>(cell_of[i])];
+      if (z_of[i] > lit.z) lit = {z_of[i], static_cast<std::int32_t>(i)};
+    }
+    parallel_chunks(nodes_.size(), [&](std::size_t i) {
+      if (cell_of[i] < 0) return;
+      const Lit& lit = farthest[static_cast<std::size_t>(cell_of[i])];
+      if (lit.node < 0 || lit.node == static_cast<std::int32_t>(i)) return;
+      const double sigma =
+          static_cast<double>(node(i).sigma + node(static_cast<std::size_t>(lit.node)).sigma);
+      if (static_cast<double>(lit.z - z_of[i]) < 2 * options_.margin_mm + 4 * sigma) return;
+      links.contradiction[i].push_back(
+          {static_cast<std::uint32_t>(lit.node), static_cast<std::uint16_t>(maps_.size() + p)});
+    });
+  }
+
+  const Rig& rig_;
+  std::span<const int> pattern_projector_;
+  std::span<const DepthMap> maps_;
+  ConsistencyOptions options_;
+  std::vector<Node> nodes_;
+  std::vector<std::vector<std::int32_t>> id_of_;
+};
+
+/// Sum over the groups of the most believed link of each.
+float tally(const std::vector<Link>& links, const std::vector<float>& belief) {
+  float total = 0;
+  float best = 0;
+  for (std::size_t k = 0; k < links.size(); ++k) {
+    if (k > 0 && links[k].group != links[k - 1].group) {
+      total += best;
+      best = 0;
+    }
+    best = std::max(best, belief[links[k].other]);
+  }
+  return total + best;
+}
+
+/// Measured nodes next to node i of one map that continue its surface.
+template <typename Visit>
+void for_each_neighbor(const DepthMap& map, std::size_t i, int reach, Visit&& visit) {
+  const int row = static_cast<int>(i) / map.columns;
+  const int column = static_cast<int>(i) % map.columns;
+  const DepthNode& n = map.nodes[i];
+  for (int dr = -reach; dr <= reach; ++dr) {
+    for (int dc = -reach; dc <= reach; ++dc) {
+      const int r = row + dr;
+      const int c = column + dc;
+      if ((dr == 0 && dc == 0) || r < 0 || c < 0 || r >= map.rows || c >= map.columns) continue;
+      const std::size_t j = map.index(r, c);
+      const DepthNode& m = map.nodes[j];
+      if (!m.measured()) continue;
+      const float dx = static_cast<float>(dc * map.stride);
+      const float dy = static_cast<float>(dr * map.stride);
+      // Both tangent planes predict the middle.
+      const float step =
+          (m.w - 0.5F * (m.wx * dx + m.wy * dy)) - (n.w + 0.5F * (n.wx * dx + n.wy * dy));
+      const float limit = (0.5F + 3 * (n.sigma + m.sigma)) * n.w * n.w;
+      if (std::abs(step) < limit) visit(j);
+    }
+  }
+}
+
+std::size_t drop_islands(const ConsistencyOptions& options, std::span<const char> supported,
+                         const Comparison& comparison, std::size_t map_index, DepthMap& map) {
+  std::size_t dropped = 0;
+  std::vector<char> seen(map.nodes.size(), 0);
+  std::vector<std::size_t> component;
+  for (std::size_t i = 0; i < map.nodes.size(); ++i) {
+    if (seen[i] || !map.nodes[i].measured()) continue;
+    component.assign(1, i);
+    seen[i] = 1;
+    std::size_t supports = 0;
+    for (std::size_t k = 0; k < component.size(); ++k) {
+      const std::int32_t id = comparison.id(map_index, component[k]);
+      supports += supported[static_cast<std::size_t>(id)] ? 1 : 0;
+      for_each_neighbor(map, component[k], 1, [&](std::size_t j) {
+        if (!seen[j]) component.push_back(j);
+        seen[j] = 1;
+      });
+    }
+    if (component.size() >= static_cast<std::size_t>(options.min_component)) continue;
+    if (2 * supports >= component.size()) continue;
+    dropped += component.size();
+    for (const std::size_t k : component) {
+      map.nodes[k].w = 0;
+      map.nodes[k].reason = HoleReason::kContradicted;
+    }
+  }
+  return dropped;
+}
+
+}  // namespace
+
+Vec3 node_point(const Rig& rig, const DepthMap& map, std::size_t node) {
+  return rig.cameras[static_cast<std::size_t>(map.camera)].point_at_depth(
+      map.pixel(node), 1 / static_cast<double>(map.nodes[node].w));
+}
+
+Vec3 node_normal(const Rig& rig, const DepthMap& map, std::size_t node) {
+  const Camera& camera = rig.cameras[static_cast<std::size_t>(map.camera)];
+  const DepthNode& n = map.nodes[node];
+  const Vec2 m = camera.normalized_from_pixel(map.pixel(node));
+  // w = omega . (x, y, 1); the lens changes slopes by no more than it bends lines.
+  const Vec2 slope(static_cast<double>(n.wx) * camera.K(0, 0),
+                   static_cast<double>(n.wy) * camera.K(1, 1));
+  const Vec3 omega(slope[0], slope[1], static_cast<double>(n.w) - slope.dot(m));
+  return -(camera.device_from_world.rotation.transpose() * omega.normalized());
+}
+
+ConsistencyReport check_consistency(const Rig& rig, std::span<const int> pattern_projector,
+                                    std::span<DepthMap> maps, const ConsistencyOptions& options) {
+  ConsistencyReport report;
+  const Comparison comparison(rig, pattern_projector, maps, options);
+  const Links links = comparison.compare();
+  const std::size_t count = comparison.nodes().size();
+  std::vector<float> belief(count, 1.F);
+  std::vector<float> support(count);
+  std::vector<float> contradiction(count);
+  const auto weight = static_cast<float>(options.contradiction_weight);
+  for (int round = 0; round < options.rounds; ++round) {
+    parallel_chunks(count, [&](std::size_t i) {
+      support[i] = tally(links.support[i], belief);
+      contradiction[i] = tally(links.contradiction[i], belief);
+    });
+    parallel_chunks(count, [&](std::size_t i) {
+      const Node& node = comparison.nodes()[i];
+      float s = support[i];
+      float c = contradiction[i];
+      float n = 1;
+      for_each_neighbor(maps[node.map], node.index, 2, [&](std::size_t j) {
+        const auto k = static_cast<std::size_t>(comparison.id(node.map, j));
+        s += support[k];
+        c += contradiction[k];
+        n += 1;
+      });
+      belief[i] = (1 + s / n) / (1 + s / n + weight * c / n);
+    });
+  }
+  std::vector<char> supported(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    const Node& node = comparison.nodes()[i];
+    DepthNode& n = maps[node.map].nodes[node.index];
+    supported[i] = support[i] > 0.5F;
+    n.confidence = belief[i];
+    if (belief[i] >= static_cast<float>(options.min_confidence)) continue;
+    n.w = 0;
+    n.reason = HoleReason::kContradicted;
+    ++report.contradicted;
+  }
+  for (std::size_t m = 0; m < maps.size(); ++m)
+    report.islands += drop_islands(options, supported, comparison, m, maps[m]);
+  return report;
+}
+
+}  // namespace pencilscan

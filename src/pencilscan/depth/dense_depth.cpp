@@ -1,0 +1,230 @@
+#include "pencilscan/depth/dense_depth.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "pencilscan/depth/seeds.h"
+
+namespace pencilscan {
+namespace {
+
+struct Quality {
+  bool good = false;
+  double cosine = 0;
+};
+
+/// Cosine of the incidence to the camera.
+double incidence(const CameraLight& light, const Vec2& pixel, const Quadric& q, int half) {
+  const Camera& camera = *light.camera;
+  const Vec2 m = camera.normalized_from_pixel(pixel);
+  const Vec2 slope(q[1] / half * camera.K(0, 0), q[2] / half * camera.K(1, 1));
+  const Vec3 normal = -Vec3(slope[0], slope[1], q[0] - slope.dot(m)).normalized();
+  return -normal.dot(m.homogeneous().normalized());
+}
+
+bool acceptable(const CameraLight& light, const Vec2& pixel, const WindowFit& fit,
+                const Sphere& volume, int half, const DepthOptions& options) {
+  if (fit.misfit > options.max_misfit) return false;
+  if (fit.relative_residual > options.max_relative_residual) return false;
+  if (fit.significance < 5) return false;
+  if (std::sqrt(fit.variance) * static_cast<double>(fit.lines_per_w) > options.max_sigma_lines)
+    return false;
+  if (incidence(light, pixel, fit.q, half) < options.min_cosine) return false;
+  const Vec3 x = light.camera->point_at_depth(pixel, 1 / fit.q[0]);
+  return (x - volume.center).norm() <= 1.1 * volume.radius;
+}
+
+DepthNode node_of(const WindowFit& fit, int half) {
+  DepthNode node;
+  const double h = half;
+  node.w = static_cast<float>(fit.q[0]);
+  node.wx = static_cast<float>(fit.q[1] / h);
+  node.wy = static_cast<float>(fit.q[2] / h);
+  node.wxx = static_cast<float>(2 * fit.q[3] / (h * h));
+  node.wxy = static_cast<float>(fit.q[4] / (h * h));
+  node.wyy = static_cast<float>(2 * fit.q[5] / (h * h));
+  node.sigma = static_cast<float>(std::sqrt(fit.variance) / (fit.q[0] * fit.q[0]));
+  node.misfit = fit.misfit;
+  node.lit = fit.lit;
+  node.reason = HoleReason::kMeasured;
+  return node;
+}
+
+/// The quadric of a node as seen from a neighbour (dx, dy) px away.
+Quadric shifted(const DepthNode& n, double dx, double dy, int half) {
+  Quadric q;
+  const double wx = n.wx, wy = n.wy, wxx = n.wxx, wxy = n.wxy, wyy = n.wyy, h = half;
+  q[0] = n.w + wx * dx + wy * dy + 0.5 * (wxx * dx * dx + 2 * wxy * dx * dy + wyy * dy * dy);
+  q[1] = h * (wx + wxx * dx + wxy * dy);
+  q[2] = h * (wy + wxy * dx + wyy * dy);
+  q[3] = 0.5 * h * h * wxx;
+  q[4] = h * h * wxy;
+  q[5] = 0.5 * h * h * wyy;
+  return q;
+}
+
+double cost(const WindowFit& fit) { return static_cast<double>(fit.misfit); }
+
+}  // namespace
+
+CameraLight measure_light(const Rig& rig, int camera, const std::vector<ColorFamily>& families,
+                          std::vector<cv::Mat> presence, cv::Mat valid,
+                          std::span<const MeasuredPoint> points, const DepthOptions& options) {
+  CameraLight light;
+  light.camera = &rig.cameras[static_cast<std::size_t>(camera)];
+  for (std::size_t f = 0; f < families.size(); ++f) {
+    for (const PatternRef& ref : families[f].patterns) {
+      light.patterns.emplace_back(rig, *light.camera, ref.projector, ref.pattern);
+      light.patterns.back().set_family(static_cast<int>(f));
+    }
+  }
+  light.families = std::move(presence);
+  light.valid = std::move(valid);
+  light.noise.assign(families.size(), NoiseModel{});
+  // Pilot windows at evenly picked curve points.
+  constexpr std::size_t kPilots = 300;
+  const CurveSeeds seeds(*light.camera, camera, points);
+  std::vector<Vec2> pixels;
+  std::size_t own = 0;
+  for (const MeasuredPoint& p : points) own += p.camera == camera ? 1 : 0;
+  const std::size_t step = std::max<std::size_t>(1, own / kPilots);
+  std::size_t i = 0;
+  for (const MeasuredPoint& p : points) {
+    if (p.camera != camera) continue;
+    if (i++ % step == 0) pixels.emplace_back(std::round(p.u), std::round(p.v));
+  }
+  const auto run = [&](float blur) {
+    light.blur_px = blur;
+    WindowFitter fitter(light, options.half);
+    std::vector<std::optional<WindowFit>> fits;
+    for (const Vec2& pixel : pixels) {
+      const auto planes = seeds.planes(pixel, options.seed_radius_px, options.half);
+      fits.push_back(planes.empty() ? std::nullopt : fitter.fit(pixel, planes[0], 5));
+    }
+    return fits;
+  };
+  const auto median_misfit = [&](float blur) {
+    std::vector<float> values;
+    for (const auto& fit : run(blur)) {
+      if (fit) values.push_back(fit->misfit);
+    }
+    if (values.empty()) return 1e9F;
+    std::nth_element(values.begin(),
+                     values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
+    return values[values.size() / 2];
+  };
+  // Golden section for the blur.
+  float low = 0.3F, high = 2.5F;
+  constexpr float kGolden = 0.618034F;
+  float a = high - kGolden * (high - low), b = low + kGolden * (high - low);
+  float fa = median_misfit(a), fb = median_misfit(b);
+  for (int round = 0; round < 7; ++round) {
+    if (fa < fb) {
+      high = b;
+      b = a;
+      fb = fa;
+      a = high - kGolden * (high - low);
+      fa = median_misfit(a);
+    } else {
+      low = a;
+      a = b;
+      fa = fb;
+      b = low + kGolden * (high - low);
+      fb = median_misfit(b);
+    }
+  }
+  const auto fits = run(0.5F * (low + high));
+  // Noise per family: a line through the medians of the darker and the brighter half.
+  for (std::size_t f = 0; f < std::min<std::size_t>(families.size(), 4); ++f) {
+    std::vector<std::pair<float, float>> samples;
+    for (const auto& fit : fits) {
+      if (fit) samples.emplace_back(fit->family_mean[f], fit->family_variance[f]);
+    }
+    if (samples.size() < 20) continue;
+    std::sort(samples.begin(), samples.end());
+    const auto half_median = [&](std::size_t from, std::size_t to) {
+      std::vector<float> v;
+      for (std::size_t k = from; k < to; ++k) v.push_back(samples[k].second);
+      std::nth_element(v.begin(), v.begin() + static_cast<std::ptrdiff_t>(v.size() / 2), v.end());
+      return std::pair(samples[(from + to) / 2].first, v[v.size() / 2]);
+    };
+    const auto dark = half_median(0, samples.size() / 2);
+    const auto bright = half_median(samples.size() / 2, samples.size());
+    NoiseModel noise;
+    noise.slope = bright.first > dark.first + 1e-4F
+                      ? std::max(0.F, (bright.second - dark.second) / (bright.first - dark.first))
+                      : 0.F;
+    noise.offset = std::max({dark.second - noise.slope * dark.first, 0.2F * dark.second, 1e-7F});
+    light.noise[f] = noise;
+  }
+  return light;
+}
+
+DepthMap dense_depth(const CameraLight& light, int camera, std::span<const MeasuredPoint> points,
+                     const Sphere& volume, const DepthOptions& options) {
+  DepthMap map;
+  map.camera = camera;
+  map.stride = options.stride;
+  map.columns = (light.camera->width - 1) / options.stride + 1;
+  map.rows = (light.camera->height - 1) / options.stride + 1;
+  map.nodes.resize(static_cast<std::size_t>(map.columns) * static_cast<std::size_t>(map.rows));
+  const CurveSeeds seeds(*light.camera, camera, points);
+  WindowFitter fitter(light, options.half);
+  // Nodes near labelled curves.
+  for (std::size_t i = 0; i < map.nodes.size(); ++i) {
+    const Vec2 pixel = map.pixel(i);
+    std::optional<WindowFit> best;
+    for (const Quadric& start : seeds.planes(pixel, options.seed_radius_px, options.half)) {
+      const auto fit = fitter.fit(pixel, start, 5);
+      if (fit && acceptable(light, pixel, *fit, volume, options.half, options) &&
+          (!best || cost(*fit) < cost(*best))) {
+        best = fit;
+      }
+    }
+    if (best) map.nodes[i] = node_of(*best, options.half);
+  }
+  // Outwards from solved nodes, in rounds.
+  std::vector<std::size_t> front;
+  for (std::size_t i = 0; i < map.nodes.size(); ++i)
+    if (map.nodes[i].measured()) front.push_back(i);
+  constexpr int kRounds = 8;
+  std::vector<char> tried(map.nodes.size(), 0);
+  for (int round = 0; round < kRounds && !front.empty(); ++round) {
+    std::vector<std::pair<std::size_t, std::size_t>> next;  // node, from
+    for (const std::size_t i : front) {
+      const int row = static_cast<int>(i) / map.columns;
+      const int column = static_cast<int>(i) % map.columns;
+      for (const auto& [dr, dc] : {std::pair(-1, 0), {1, 0}, {0, -1}, {0, 1}}) {
+        const int r = row + dr, c = column + dc;
+        if (r < 0 || c < 0 || r >= map.rows || c >= map.columns) continue;
+        const std::size_t j = map.index(r, c);
+        if (map.nodes[j].measured()) continue;
+        next.emplace_back(j, i);
+      }
+    }
+    std::sort(next.begin(), next.end());
+    front.clear();
+    std::vector<std::pair<std::size_t, DepthNode>> found;
+    for (std::size_t k = 0; k < next.size();) {
+      const std::size_t j = next[k].first;
+      std::optional<WindowFit> best;
+      for (; k < next.size() && next[k].first == j; ++k) {
+        const Vec2 d = map.pixel(j) - map.pixel(next[k].second);
+        const Quadric start = shifted(map.nodes[next[k].second], d[0], d[1], options.half);
+        const auto fit = fitter.fit(map.pixel(j), start, 5);
+        if (fit && acceptable(light, map.pixel(j), *fit, volume, options.half, options) &&
+            (!best || cost(*fit) < cost(*best))) {
+          best = fit;
+        }
+      }
+      if (best) found.emplace_back(j, node_of(*best, options.half));
+    }
+    for (const auto& [j, node] : found) {
+      map.nodes[j] = node;
+      front.push_back(j);
+    }
+  }
+  return map;
+}
+
+}  // namespace pencilscan

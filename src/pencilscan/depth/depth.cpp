@@ -1,0 +1,81 @@
+#include "pencilscan/depth/depth.h"
+
+#include <algorithm>
+
+#include "pencilscan/core/check.h"
+#include "pencilscan/core/parallel.h"
+#include "pencilscan/core/stopwatch.h"
+
+namespace pencilscan {
+namespace {
+
+/// 1 where no channel is overexposed.
+cv::Mat unsaturated(const cv::Mat& image) {
+  constexpr float kFull = 0.998F;
+  cv::Mat valid(image.rows, image.cols, CV_8U);
+  for (int y = 0; y < image.rows; ++y) {
+    const auto* row = image.ptr<cv::Vec3f>(y);
+    auto* out = valid.ptr<std::uint8_t>(y);
+    for (int x = 0; x < image.cols; ++x)
+      out[x] = row[x][0] < kFull && row[x][1] < kFull && row[x][2] < kFull ? 1 : 0;
+  }
+  return valid;
+}
+
+CameraDepthReport camera_report(const DepthMap& map, double blur_px) {
+  CameraDepthReport report;
+  report.camera = map.camera;
+  report.blur_px = blur_px;
+  std::vector<float> sigmas;
+  for (const DepthNode& node : map.nodes) {
+    if (node.measured()) sigmas.push_back(node.sigma);
+  }
+  report.measured = sigmas.size();
+  if (sigmas.empty()) return report;
+  const auto middle = sigmas.begin() + static_cast<std::ptrdiff_t>(sigmas.size() / 2);
+  std::nth_element(sigmas.begin(), middle, sigmas.end());
+  report.sigma_median_mm = static_cast<double>(*middle);
+  return report;
+}
+
+}  // namespace
+
+DepthResult measure_depth(const Rig& rig, const std::vector<ColorFamily>& families,
+                          std::span<const cv::Mat> images, std::span<const Unmixing> unmixings,
+                          std::span<const MeasuredPoint> points, const DepthStageOptions& options) {
+  PENCILSCAN_CHECK(images.size() == rig.cameras.size() && unmixings.size() == images.size());
+  const Stopwatch watch;
+  DepthResult result;
+  std::vector<std::size_t> cameras;
+  for (std::size_t c = 0; c < images.size(); ++c) {
+    if (!images[c].empty() && !rig.cameras[c].sees_texture_only) cameras.push_back(c);
+  }
+  const Sphere volume = working_volume(rig);
+  result.maps.resize(cameras.size());
+  std::vector<double> blur(cameras.size());
+  parallel_for(cameras.size(), [&](std::size_t i) {
+    const std::size_t c = cameras[i];
+    const cv::Mat rgb = unmixed(linearized(images[c], rig.cameras[c].gamma), unmixings[c]);
+    std::vector<cv::Mat> presence;
+    for (const ColorFamily& family : families) presence.push_back(presence_image(rgb, family));
+    const CameraLight light = measure_light(rig, static_cast<int>(c), families, std::move(presence),
+                                            unsaturated(images[c]), points, options.depth);
+    blur[i] = static_cast<double>(light.blur_px);
+    result.maps[i] = dense_depth(light, static_cast<int>(c), points, volume, options.depth);
+  });
+  result.report.seconds_depth = watch.seconds();
+
+  const Stopwatch consistency_watch;
+  std::vector<int> pattern_projector;
+  for (const ColorFamily& family : families) {
+    for (const PatternRef& ref : family.patterns) pattern_projector.push_back(ref.projector);
+  }
+  result.report.consistency =
+      check_consistency(rig, pattern_projector, result.maps, options.consistency);
+  for (std::size_t i = 0; i < cameras.size(); ++i)
+    result.report.cameras.push_back(camera_report(result.maps[i], blur[i]));
+  result.report.seconds_consistency = consistency_watch.seconds();
+  return result;
+}
+
+}  // namespace pencilscan

@@ -1,0 +1,51 @@
+#pragma once
+
+#include <array>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "pencilscan/depth/consistency.h"
+#include "pencilscan/depth/dense_depth.h"
+#include "pencilscan/detection/unmix.h"
+
+namespace pencilscan {
+
+struct DepthStageOptions {
+  bool enabled = true;  ///< off: the surface rests on the labelled curves alone
+  DepthOptions depth;
+  ConsistencyOptions consistency;
+};
+
+/// What the depth stage found in one camera.
+struct CameraDepthReport {
+  int camera = 0;
+  std::size_t measured = 0;  ///< nodes
+  double blur_px = 0;        ///< of projector, surface and camera together
+  double sigma_median_mm = 0;
+};
+
+struct DepthReport {
+  std::vector<CameraDepthReport> cameras;
+  ConsistencyReport consistency;
+  double seconds_depth = 0;
+  double seconds_consistency = 0;
+  std::vector<std::string> warnings;
+};
+
+struct DepthResult {
+  std::vector<DepthMap> maps;  ///< one per camera with an image, in the rig's order
+  DepthReport report;
+};
+
+/// Dense depth of one frame. Around each node of a pixel grid, inverse depth is a quadric that is
+/// fitted to the image of all lit projectors at once (window_fit.h), started from labelled curve
+/// points or from solved neighbours; then the cameras check each other (consistency.h). `images` as
+/// read, one per camera of the rig (empty: missing); `unmixings` likewise.
+[[nodiscard]] DepthResult measure_depth(const Rig& rig, const std::vector<ColorFamily>& families,
+                                        std::span<const cv::Mat> images,
+                                        std::span<const Unmixing> unmixings,
+                                        std::span<const MeasuredPoint> points,
+                                        const DepthStageOptions& options = {});
+
+}  // namespace pencilscan

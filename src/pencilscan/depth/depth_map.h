@@ -1,0 +1,57 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "pencilscan/geometry/types.h"
+
+namespace pencilscan {
+
+/// Why a node of a depth map has no depth, or kMeasured.
+enum class HoleReason : std::uint8_t {
+  kBackground,     ///< off the object: nothing is missing here
+  kMeasured,       ///< depth is there
+  kNoProjector,    ///< no projector's lines are to be seen
+  kOneProjector,   ///< one projector only, and its lines do not fix the depth well enough
+  kTooCompressed,  ///< lines closer together than the camera resolves
+  kAmbiguous,      ///< lines are seen, but which ones they are was not decided
+  kContradicted,   ///< a depth was found that other views prove wrong
+  kSaturated,      ///< too many pixels are overexposed
+  kNotSeen,        ///< of mesh vertices: no camera looks there
+};
+inline constexpr std::size_t kHoleReasons = 9;
+
+/// One measured pixel: inverse depth and its first derivatives, w(u + dx, v + dy) =
+/// w + wx dx + wy dy + (wxx dx^2 + 2 wxy dx dy + wyy dy^2) / 2.
+struct DepthNode {
+  float w = 0;  ///< 1 / camera z, 1/mm; 0: no depth
+  float wx = 0, wy = 0, wxx = 0, wxy = 0, wyy = 0;
+  float sigma = 0;        ///< mm of camera z, one standard deviation
+  float misfit = 0;       ///< residual over what noise explains (1 = only noise)
+  std::uint64_t lit = 0;  ///< bit per pattern (flat index) whose light was found
+  float confidence = 0;   ///< 0..1: what the other views say
+  HoleReason reason = HoleReason::kBackground;
+
+  [[nodiscard]] bool measured() const { return w > 0; }
+};
+
+/// Depth of one camera on a regular grid of pixels (column * stride, row * stride).
+struct DepthMap {
+  int camera = 0;
+  int stride = 4;
+  int columns = 0;
+  int rows = 0;
+  std::vector<DepthNode> nodes;  ///< rows x columns
+
+  [[nodiscard]] std::size_t index(int row, int column) const {
+    return static_cast<std::size_t>(row) * static_cast<std::size_t>(columns) +
+           static_cast<std::size_t>(column);
+  }
+  [[nodiscard]] Vec2 pixel(std::size_t node) const {
+    const auto width = static_cast<std::size_t>(columns);
+    return {static_cast<double>(node % width) * stride, static_cast<double>(node / width) * stride};
+  }
+};
+
+}  // namespace pencilscan

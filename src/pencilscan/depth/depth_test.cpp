@@ -1,0 +1,295 @@
+#include "pencilscan/depth/depth.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "pencilscan/core/parallel.h"
+#include "pencilscan/core/random.h"
+#include "pencilscan/depth/seeds.h"
+#include "pencilscan/simulation/panel_light.h"
+#include "pencilscan/simulation/render.h"
+#include "pencilscan/simulation/sensor.h"
+#include "pencilscan/simulation/simulated_object.h"
+#include "pencilscan/simulation/truth.h"
+
+namespace pencilscan {
+namespace {
+
+/// Two cameras and two projectors before a ball, small images.
+Rig small_rig() {
+  Rig rig;
+  for (int c = 0; c < 2; ++c) {
+    Camera camera;
+    camera.name = "cam" + std::to_string(c);
+    camera.width = 240;
+    camera.height = 200;
+    camera.K << 900, 0, 120, 0, 900, 100, 0, 0, 1;
+    camera.device_from_world = look_at({560, c == 0 ? -110.0 : 110.0, 80}, {0, 0, 0});
+    rig.cameras.push_back(camera);
+  }
+  for (int p = 0; p < 2; ++p) {
+    Projector projector;
+    projector.name = "proj" + std::to_string(p);
+    projector.width = 640;
+    projector.height = 512;
+    projector.K << 1000, 0, 320, 0, 1000, 256, 0, 0, 1;
+    projector.device_from_world =
+        p == 0 ? look_at({450, 225, 45}, {0, 0, 0}) : look_at({386, -140, 277}, {0, 0, 0});
+    LinePattern pattern;
+    pattern.axis = p == 0 ? Axis::kColumn : Axis::kRow;
+    if (p == 1) pattern.colors = {"red", "yellow"};
+    projector.patterns = {pattern};
+    rig.projectors.push_back(projector);
+  }
+  rig.volume = Sphere{{0, 0, 0}, 70};
+  return rig;
+}
+
+/// Images of a ball with noise, true depth, and points on it as labelled curves would give them.
+struct BallScene {
+  BallScene() : rig(small_rig()), families(color_families(rig)) {
+    const SimulatedObject object(make_sphere(42, 96));
+    const auto lights = line_lights(rig);
+    SensorOptions sensor;
+    sensor.blur_px = 0.6;
+    sensor.full_well = 6000;
+    sensor.read_noise = 1.5;
+    sensor.bit_depth = 16;
+    Random random(5);
+    for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
+      const cv::Mat raw = apply_sensor(render_camera(rig, c, object, lights), sensor, 1,
+                                       static_cast<std::uint32_t>(c));
+      cv::Mat image;
+      raw.convertTo(image, CV_32FC3, 1.0 / 65535);
+      images.push_back(image);
+      truth.push_back(camera_truth(rig, c, object));
+      add_points(c, random);
+    }
+    unmixings.resize(rig.cameras.size());
+  }
+
+  /// Every pixel within half a pixel of a line.
+  void add_points(std::size_t c, Random& random) {
+    const Camera& camera = rig.cameras[c];
+    for (int v = 1; v + 1 < camera.height; ++v) {
+      for (int u = 1; u + 1 < camera.width; ++u) {
+        const double z = truth[c].depth.at<double>(v, u);
+        if (!std::isfinite(z) || truth[c].cosine.at<float>(v, u) < 0.3F) continue;
+        for (std::size_t p = 0; p < 2; ++p) {
+          const ProjectorTruth& light = truth[c].projectors[p];
+          if (light.lit.at<std::uint8_t>(v, u) == 0) continue;
+          const double line = light.line[0].at<double>(v, u);
+          const double dx = light.line[0].at<double>(v, u + 1) - line;
+          const double dy = light.line[0].at<double>(v + 1, u) - line;
+          if (!(std::abs(line - std::round(line)) < 0.5 * std::hypot(dx, dy))) continue;
+          MeasuredPoint point;
+          const Vec3 x = camera.point_at_depth(Vec2(u, v), z + random.normal(0, 0.1));
+          point.x = static_cast<float>(x.x());
+          point.y = static_cast<float>(x.y());
+          point.z = static_cast<float>(x.z());
+          point.u = static_cast<float>(u);
+          point.v = static_cast<float>(v);
+          point.camera = static_cast<std::uint8_t>(c);
+          point.projector = static_cast<std::uint8_t>(p);
+          point.line = static_cast<std::uint16_t>(std::lround(line));
+          point.sigma = 0.1F;
+          point.confidence = 1;
+          points.push_back(point);
+        }
+      }
+    }
+  }
+
+  [[nodiscard]] DepthResult measure(const DepthStageOptions& options = {}) const {
+    return measure_depth(rig, families, images, unmixings, points, options);
+  }
+
+  /// Signed depth error of every measured node whose pixel sees the ball.
+  [[nodiscard]] std::vector<double> errors(const DepthMap& map) const {
+    std::vector<double> errors;
+    for (std::size_t i = 0; i < map.nodes.size(); ++i) {
+      if (!map.nodes[i].measured()) continue;
+      const Vec2 pixel = map.pixel(i);
+      const double z = truth[static_cast<std::size_t>(map.camera)].depth.at<double>(
+          static_cast<int>(pixel[1]), static_cast<int>(pixel[0]));
+      if (std::isfinite(z)) errors.push_back(1 / static_cast<double>(map.nodes[i].w) - z);
+    }
+    return errors;
+  }
+
+  Rig rig;
+  std::vector<ColorFamily> families;
+  std::vector<cv::Mat> images;
+  std::vector<CameraTruth> truth;
+  std::vector<MeasuredPoint> points;
+  std::vector<Unmixing> unmixings;
+};
+
+const BallScene& ball_scene() {
+  static const BallScene scene;
+  return scene;
+}
+
+double median_size(std::vector<double> values) {
+  for (double& v : values) v = std::abs(v);
+  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2),
+                   values.end());
+  return values[values.size() / 2];
+}
+
+TEST(PatternView, LineCoordinateIsThatOfTheRayInTheProjector) {
+  Rig rig = small_rig();
+  rig.cameras[0].distortion = {-0.1, 0.02, 0.001, -0.001, 0};
+  rig.projectors[0].distortion = {-0.08, 0.01, 0.0005, 0.001, 0};
+  const Camera& camera = rig.cameras[0];
+  const PatternView view(rig, camera, 0, 0);
+  const Vec2 pixel(130, 90);
+  constexpr double kDepth = 540;
+  const Vec2 m = camera.normalized_from_pixel(pixel);
+  Eigen::Matrix2d jacobian;
+  jacobian.col(0) = camera.normalized_from_pixel(pixel + Vec2(0.5, 0)) -
+                    camera.normalized_from_pixel(pixel - Vec2(0.5, 0));
+  jacobian.col(1) = camera.normalized_from_pixel(pixel + Vec2(0, 0.5)) -
+                    camera.normalized_from_pixel(pixel - Vec2(0, 0.5));
+  bool ok = false;
+  const WindowLines lines = view.lines(m, jacobian, 1 / kDepth, ok);
+  ASSERT_TRUE(ok);
+  const LinePattern& pattern = rig.projectors[0].patterns[0];
+  // Lenses are linearised over the window: what is left is of second order, here below 1e-3 lines.
+  for (const double depth : {538.0, 540.0, 542.0}) {
+    for (const double d : {-5.0, 0.0, 5.0}) {
+      const auto exact =
+          RayInProjector(camera, rig.projectors[0], pixel + Vec2(d, -d)).pixel(depth);
+      const auto f = static_cast<float>(d);
+      EXPECT_NEAR(lines.line(f, -f, static_cast<float>(1 / depth)), pattern.coordinate((*exact)[0]),
+                  1e-3);
+    }
+  }
+}
+
+TEST(Seeds, TwoSurfacesGiveTwoPlanes) {
+  const Rig rig = small_rig();
+  const Camera& camera = rig.cameras[0];
+  std::vector<MeasuredPoint> points;
+  for (int i = -8; i <= 8; ++i) {
+    for (const int column : {-4, 4}) {
+      const Vec2 pixel(100 + column, 100 + i);
+      const Vec3 x = camera.point_at_depth(pixel, column < 0 ? 500 : 530);
+      MeasuredPoint p;
+      p.x = static_cast<float>(x.x());
+      p.y = static_cast<float>(x.y());
+      p.z = static_cast<float>(x.z());
+      p.u = static_cast<float>(pixel.x());
+      p.v = static_cast<float>(pixel.y());
+      p.sigma = 0.1F;
+      points.push_back(p);
+    }
+  }
+  const CurveSeeds seeds(camera, 0, points);
+  const auto planes = seeds.planes(Vec2(98, 100), 9, 5);
+  ASSERT_EQ(planes.size(), 2u);
+  EXPECT_NEAR(1 / planes[0][0], 500, 0.5);  // the nearer one in the image first
+  EXPECT_NEAR(1 / planes[1][0], 530, 3);
+  EXPECT_TRUE(seeds.planes(Vec2(20, 20), 9, 5).empty());
+}
+
+TEST(DenseDepth, BallIsDenseAndAccurate) {
+  const BallScene& scene = ball_scene();
+  const DepthResult result = scene.measure();
+  ASSERT_EQ(result.maps.size(), 2u);
+  for (const DepthMap& map : result.maps) {
+    std::size_t visible = 0;
+    for (std::size_t i = 0; i < map.nodes.size(); ++i) {
+      const Vec2 pixel = map.pixel(i);
+      const CameraTruth& truth = scene.truth[static_cast<std::size_t>(map.camera)];
+      const int u = static_cast<int>(pixel[0]);
+      const int v = static_cast<int>(pixel[1]);
+      if (!(truth.cosine.at<float>(v, u) > 0.3F)) continue;
+      for (const ProjectorTruth& p : truth.projectors) {
+        if (p.lit.at<std::uint8_t>(v, u) == 0 || p.cosine.at<float>(v, u) < 0.3F) continue;
+        ++visible;
+        break;
+      }
+    }
+    const std::vector<double> errors = scene.errors(map);
+    EXPECT_GT(errors.size(), visible * 9 / 10);
+    // A pixel is 0.6 mm wide here: a tenth of it, against points with 0.1 mm of noise.
+    EXPECT_LT(median_size(errors), 0.06);
+    const auto gross =
+        std::count_if(errors.begin(), errors.end(), [](double e) { return std::abs(e) > 1; });
+    // At the rim of so small an image, where windows look past the ball.
+    EXPECT_LT(static_cast<double>(gross), 0.02 * static_cast<double>(errors.size()));
+  }
+}
+
+TEST(DenseDepth, BlurIsFound) {
+  const DepthResult result = ball_scene().measure();
+  // Sensor 0.6 px and the pixel's own box, 0.29 px.
+  for (const CameraDepthReport& camera : result.report.cameras)
+    EXPECT_NEAR(camera.blur_px, std::hypot(0.6, 0.29), 0.12);
+}
+
+TEST(DenseDepth, SameBytesForAnyThreadCount) {
+  const BallScene& scene = ball_scene();
+  std::vector<DepthResult> results;
+  for (const int threads : {1, 3}) {
+    const ThreadLimit limit(threads);
+    results.push_back(scene.measure());
+  }
+  for (std::size_t m = 0; m < results[0].maps.size(); ++m) {
+    for (std::size_t i = 0; i < results[0].maps[m].nodes.size(); ++i) {
+      const DepthNode& a = results[0].maps[m].nodes[i];
+      const DepthNode& b = results[1].maps[m].nodes[i];
+      ASSERT_EQ(a.w, b.w);
+      ASSERT_EQ(a.sigma, b.sigma);
+      ASSERT_EQ(a.confidence, b.confidence);
+    }
+  }
+}
+
+TEST(DenseDepth, NoPointsAndNoImagesGiveNoDepth) {
+  const BallScene& scene = ball_scene();
+  const DepthResult none =
+      measure_depth(scene.rig, scene.families, scene.images, scene.unmixings, {});
+  for (const DepthMap& map : none.maps) {
+    for (const DepthNode& node : map.nodes) EXPECT_FALSE(node.measured());
+  }
+  const std::vector<cv::Mat> missing(2);
+  EXPECT_TRUE(measure_depth(scene.rig, scene.families, missing, scene.unmixings, scene.points)
+                  .maps.empty());
+}
+
+TEST(Consistency, FloatingPatchIsRemovedAndUnconfirmedDepthStays) {
+  const BallScene& scene = ball_scene();
+  DepthResult result = scene.measure();
+  DepthMap& first = result.maps[0];
+  // A patch of the first camera, 6 mm nearer than the ball: the second camera looks through it.
+  std::vector<std::size_t> patch;
+  std::size_t before = 0;
+  for (std::size_t i = 0; i < first.nodes.size(); ++i) {
+    DepthNode& node = first.nodes[i];
+    before += node.measured() ? 1 : 0;
+    if (!node.measured() || (first.pixel(i) - Vec2(125, 100)).norm() > 20) continue;
+    node.w = static_cast<float>(1 / (1 / static_cast<double>(node.w) - 6));
+    patch.push_back(i);
+  }
+  ASSERT_GT(patch.size(), 30u);
+  const std::vector<int> projectors = {0, 1};
+  const ConsistencyReport report = check_consistency(scene.rig, projectors, result.maps);
+  EXPECT_GE(report.contradicted + report.islands, patch.size() * 9 / 10);
+  std::size_t left = 0;
+  for (const std::size_t i : patch) left += first.nodes[i].measured() ? 1 : 0;
+  EXPECT_LE(left, patch.size() / 10);
+  std::size_t after = 0;
+  for (const DepthNode& node : first.nodes) after += node.measured() ? 1 : 0;
+  EXPECT_GE(after, (before - patch.size()) * 95 / 100);
+  // One camera alone: nobody confirms it, all of it stays.
+  std::vector<DepthMap> alone = {ball_scene().measure().maps[1]};
+  EXPECT_LT(check_consistency(scene.rig, projectors, alone).contradicted, 5u);
+}
+
+}  // namespace
+}  // namespace pencilscan

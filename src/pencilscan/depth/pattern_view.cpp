@@ -1,0 +1,64 @@
+#include "pencilscan/depth/pattern_view.h"
+
+#include <cmath>
+
+namespace pencilscan {
+
+PatternView::PatternView(const Rig& rig, const Camera& camera, int projector, int pattern)
+    : projector_(&rig.projectors[static_cast<std::size_t>(projector)]),
+      pattern_(&projector_->patterns[static_cast<std::size_t>(pattern)]),
+      projector_index_(projector),
+      line_count_(projector_->line_count(*pattern_)),
+      half_width_(static_cast<float>(0.5 * pattern_->line_width_px / pattern_->pitch_px)),
+      projector_from_camera_(projector_->device_from_world * camera.device_from_world.inverse()),
+      center_(camera.device_from_world * projector_->center()) {}
+
+WindowLines PatternView::lines(const Vec2& m, const Eigen::Matrix2d& jacobian, double w,
+                               bool& ok) const {
+  WindowLines lines;
+  // Rows of R m + t w over (1, dx, dy, w).
+  Eigen::Matrix<double, 3, 4> rows;
+  const Mat3& R = projector_from_camera_.rotation;
+  rows.col(0) = R * m.homogeneous();
+  rows.col(1) = R.leftCols<2>() * jacobian.col(0);
+  rows.col(2) = R.leftCols<2>() * jacobian.col(1);
+  rows.col(3) = projector_from_camera_.translation;
+  const Vec3 x = rows.col(0) + w * rows.col(3);
+  ok = x.z() > 0;
+  if (!ok) return lines;
+  const Vec2 ideal(x.x() / x.z(), x.y() / x.z());
+  const auto axis = static_cast<Eigen::Index>(pattern_->axis);
+  // Pixel = c + J . (ideal - ideal0), J along the pattern's axis.
+  double c = 0;
+  Vec2 J;
+  if (projector_->has_distortion()) {
+    const auto at = [&](const Vec2& p) {
+      return (projector_->K * distort(projector_->distortion, p).homogeneous())[axis];
+    };
+    constexpr double kStep = 1e-5;
+    c = at(ideal);
+    J[0] = (at(ideal + Vec2(kStep, 0)) - at(ideal - Vec2(kStep, 0))) / (2 * kStep);
+    J[1] = (at(ideal + Vec2(0, kStep)) - at(ideal - Vec2(0, kStep))) / (2 * kStep);
+  } else {
+    J = projector_->K.row(axis).head<2>().transpose();
+    c = J.dot(ideal) + projector_->K(axis, 2);
+  }
+  const double line = pattern_->coordinate(c);
+  ok = line > -0.5 && line < line_count_ - 0.5;
+  J /= pattern_->pitch_px;
+  const Eigen::RowVector4d numerator =
+      J[0] * rows.row(0) + J[1] * rows.row(1) + (line - J.dot(ideal)) * rows.row(2);
+  const double scale = 1 / x.z();
+  lines.n = (scale * numerator.transpose()).cast<float>();
+  lines.d = (scale * rows.row(2).transpose()).cast<float>();
+  // The other panel axis bounds the light too.
+  const auto other = 1 - axis;
+  const double along = (projector_->has_distortion()
+                            ? (projector_->K * distort(projector_->distortion, ideal).homogeneous())
+                            : Vec3(projector_->K * ideal.homogeneous()))[other];
+  const int extent = other == 0 ? projector_->width : projector_->height;
+  ok = ok && along > -0.5 && along < extent - 0.5;
+  return lines;
+}
+
+}  // namespace pencilscan

@@ -1,0 +1,97 @@
+#include "pencilscan/depth/seeds.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+namespace pencilscan {
+namespace {
+
+constexpr std::size_t kLeastPoints = 4;
+constexpr double kSteepest = 3.5;  // mm of depth per mm across: an incidence of 74 degrees
+
+struct Offset {
+  double x, y;  ///< dx / half
+  double w, sigma_w, distance;
+};
+
+/// Plane through `points`, reweighted against outliers; clears those of another surface.
+std::optional<Quadric> robust_plane(std::vector<Offset>& points, double mm_per_half) {
+  const auto nearest =
+      std::min_element(points.begin(), points.end(),
+                       [](const Offset& a, const Offset& b) { return a.distance < b.distance; });
+  const double w0 = nearest->w;
+  // Slopes are pulled to zero weakly: a single curve leaves one of them open.
+  const double steep = mm_per_half * w0 * w0;
+  Vec3 c(w0, 0, 0);
+  const double scale = 0.4 * w0 * w0;  // 0.4 mm
+  for (int round = 0; round < 4; ++round) {
+    Mat3 A = Mat3::Zero();
+    Vec3 b = Vec3::Zero();
+    for (const Offset& p : points) {
+      const Vec3 row(1, p.x, p.y);
+      const double r = p.w - c.dot(row);
+      // At first a point may be as far off as a steep surface takes it, and no farther.
+      const double s2 = p.sigma_w * p.sigma_w + 1e-2 * scale * scale;
+      if (std::abs(r) > kSteepest * steep * p.distance + 4 * scale + 4 * p.sigma_w) continue;
+      const double wide = round == 0 ? steep * p.distance + scale : scale;
+      const double outlying = 1 + r * r / (wide * wide + 9 * s2);
+      const double weight = 1 / s2 / (outlying * outlying) / (0.1 + p.distance * p.distance);
+      A += weight * row * row.transpose();
+      b += weight * p.w * row;
+    }
+    const double ridge = 1 / (steep * steep);
+    A(1, 1) += ridge;
+    A(2, 2) += ridge;
+    c = A.ldlt().solve(b);
+  }
+  if (!c.allFinite() || !(c[0] > 0)) return std::nullopt;
+  if (std::hypot(c[1], c[2]) > kSteepest * steep) return std::nullopt;
+  std::erase_if(points, [&](const Offset& p) {
+    return std::abs(p.w - c.dot(Vec3(1, p.x, p.y))) < 4 * scale + 4 * p.sigma_w;
+  });
+  Quadric q = Quadric::Zero();
+  q.head<3>() = c;
+  return q;
+}
+
+}  // namespace
+
+CurveSeeds::CurveSeeds(const Camera& camera, int camera_index,
+                       std::span<const MeasuredPoint> points) {
+  mm_per_px_ = 1 / camera.K(0, 0);
+  columns_ = cell(camera.width) + 1;
+  rows_ = cell(camera.height) + 1;
+  cells_.resize(static_cast<std::size_t>(columns_ * rows_));
+  for (const MeasuredPoint& p : points) {
+    if (p.camera != camera_index) continue;
+    const double z = (camera.device_from_world * Vec3(p.x, p.y, p.z)).z();
+    const int x = cell(p.u);
+    const int y = cell(p.v);
+    if (!(z > 0) || x < 0 || y < 0 || x >= columns_ || y >= rows_) continue;
+    cells_[static_cast<std::size_t>(y * columns_ + x)].push_back(
+        {Vec2(p.u, p.v), 1 / z, static_cast<double>(p.sigma)});
+  }
+}
+
+std::vector<Quadric> CurveSeeds::planes(const Vec2& pixel, double radius_px, int half) const {
+  std::vector<Offset> points;
+  double depth = 0;
+  for_each_near(pixel, radius_px, [&](const Point& p) {
+    const Vec2 d = (p.pixel - pixel) / half;
+    points.push_back({d[0], d[1], p.w, p.sigma * p.w * p.w, d.norm()});
+    depth += 1 / p.w;
+  });
+  std::vector<Quadric> planes;
+  if (points.size() < kLeastPoints) return planes;
+  depth /= static_cast<double>(points.size());
+  const double mm_per_half = half * mm_per_px_ * depth;
+  while (planes.size() < 2 && points.size() >= kLeastPoints) {
+    const auto q = robust_plane(points, mm_per_half);
+    if (!q) break;
+    planes.push_back(*q);
+  }
+  return planes;
+}
+
+}  // namespace pencilscan

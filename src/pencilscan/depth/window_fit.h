@@ -1,0 +1,98 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+#include <opencv2/core.hpp>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "pencilscan/depth/pattern_view.h"
+
+namespace pencilscan {
+
+/// Variance of an image value: offset + slope * value.
+struct NoiseModel {
+  float offset = 1e-5F;
+  float slope = 0;
+  [[nodiscard]] float variance(float value) const { return offset + slope * std::max(0.F, value); }
+};
+
+/// What one camera sees, as the photometric fit needs it.
+struct CameraLight {
+  const Camera* camera = nullptr;
+  std::vector<PatternView> patterns;  ///< of all families; at most 64 are used
+  std::vector<cv::Mat> families;      ///< per family: presence channel, CV_32FC1, linear
+  cv::Mat valid;                      ///< CV_8U, 0 where saturated
+  float blur_px = 0.8F;               ///< standard deviation of camera and projector blur together
+  std::vector<NoiseModel> noise;      ///< per family
+};
+
+/// Inverse depth over a window: w = q . (1, x, y, x^2, x y, y^2), x = dx / half, y = dy / half.
+using Quadric = Eigen::Matrix<double, 6, 1>;
+
+struct WindowFit {
+  Quadric q = Quadric::Zero();
+  double variance = 0;                                   ///< of q[0], 1/mm^2, misfit included
+  Eigen::Matrix3f covariance = Eigen::Matrix3f::Zero();  ///< of q[0..2], misfit included
+  float misfit = 0;                        ///< chi^2 per degree of freedom against the noise model
+  float relative_residual = 0;             ///< root mean square over the largest amplitude
+  std::uint64_t lit = 0;                   ///< patterns found
+  bool cut = false;                        ///< a side of the window does not belong to the surface
+  float amplitude = 0;                     ///< largest, image value
+  float significance = 0;                  ///< largest amplitude / its standard deviation
+  float lines_per_w = 0;                   ///< largest |dl / dw| of a lit pattern
+  std::array<float, 4> family_variance{};  ///< residual variance per family (first four)
+  std::array<float, 4> family_mean{};      ///< mean image value
+};
+
+/// Fits inverse depth to the image of a circular window by Gauss-Newton. The image of family f is
+///   I_f = o_f + (1 + e_f . (dx, dy)) * sum over its lit patterns k of A_k P(l_k(dx, dy, w)),
+/// P: box of the line's width blurred by a bell of standard deviation s_k (lines), to which camera
+/// blur contributes blur_px * |grad l_k|. The bell is the triweight kernel (1 - u^2)^3, whose
+/// integral is a polynomial. e_f takes the slope of albedo and shading.
+class WindowFitter {
+ public:
+  /// half: radius, px, in [2, 10].
+  WindowFitter(const CameraLight& light, int half);
+
+  /// Nothing where the window leaves the image, is saturated or shows no line that fits.
+  [[nodiscard]] std::optional<WindowFit> fit(const Vec2& pixel, const Quadric& start, int rounds);
+  [[nodiscard]] int half() const { return half_; }
+
+ private:
+  struct Lit {
+    int pattern = 0;
+    int family = 0;
+    WindowLines lines;
+    float inverse_reach = 0;  ///< 1 / reach of the bell, 1/lines
+    float amplitude = 0;
+    float amplitude_variance = 0;
+    bool on = true;
+  };
+  using Column = Eigen::ArrayXf;
+
+  [[nodiscard]] bool gather(int u, int v);
+  void choose_patterns(const Vec2& m, const Eigen::Matrix2d& jacobian, const Quadric& q);
+  void render(const Quadric& q);
+  void solve_amplitudes();
+  double step(Quadric& q, bool last, WindowFit& fit);
+  [[nodiscard]] bool iterate(Quadric& q, int rounds, WindowFit& fit);
+  [[nodiscard]] std::optional<Vec2> dark_side();
+  [[nodiscard]] float light_share(const Column& mask, float& energy);
+
+  const CameraLight* light_;
+  int half_;
+  int count_ = 0;   ///< pixels in the window
+  int padded_ = 0;  ///< rounded up to a multiple of eight; weight 0 beyond count_
+  std::vector<int> du_, dv_;
+  Column x_, y_, xx_, xy_, yy_, taper_, weight_, w_;
+  std::vector<Column> image_;  ///< per family
+  std::vector<Lit> lit_;
+  std::vector<Column> profile_, slope_;  ///< per lit: P, dP/dw
+  std::vector<float> offset_, ex_, ey_, inverse_variance_, mean_;
+  Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic> J_;
+};
+
+}  // namespace pencilscan

@@ -1,0 +1,136 @@
+#include "pencilscan/surface/attributes.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "pencilscan/core/parallel.h"
+#include "pencilscan/surface/mesh_parts.h"
+#include "pencilscan/surface/point_grid.h"
+
+namespace pencilscan {
+namespace {
+
+constexpr std::size_t kChunk = 256;
+
+/// Declares invented those fringe vertices that connect to an invented one through the fringe. Gaps
+/// between lines have a fringe too, but nothing invented inside: they stay measured.
+void cut_fringe(std::span<const char> fringe, TriangleMesh& mesh) {
+  std::vector<std::vector<int>> neighbors(mesh.vertices.size());
+  for (const auto& face : mesh.faces) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      neighbors[static_cast<std::size_t>(face[k])].push_back(face[(k + 1) % 3]);
+    }
+  }
+  std::vector<std::size_t> open;
+  for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
+    if (!(mesh.confidence[v] > 0)) open.push_back(v);
+  }
+  while (!open.empty()) {
+    const std::size_t v = open.back();
+    open.pop_back();
+    for (const int next : neighbors[v]) {
+      const auto n = static_cast<std::size_t>(next);
+      if (!fringe[n] || !(mesh.confidence[n] > 0)) continue;
+      mesh.confidence[n] = 0;
+      open.push_back(n);
+    }
+  }
+}
+
+}  // namespace
+
+void attribute_vertices(std::span<const SurfaceSample> samples, double reach_spacings,
+                        double spacing, TriangleMesh& mesh) {
+  constexpr double kMaxStretch = 2.5;      // of the spacing on a grazed surface
+  constexpr double kInterpolation = 0.02;  // mm of error per mm away from the nearest sample
+  constexpr double kOutsideReach = 0.4;    // of the reach, beyond the last line
+  const double radius = reach_spacings * kMaxStretch * spacing;
+  std::vector<Vec3> positions;
+  positions.reserve(samples.size());
+  for (const SurfaceSample& s : samples) positions.push_back(s.position);
+  const PointGrid grid(positions, radius);
+  const std::vector<Vec3> normals = vertex_normals(mesh);
+  std::vector<char> fringe(mesh.vertices.size(), 0);
+  mesh.sigma.assign(mesh.vertices.size(), 0.0F);
+  mesh.confidence.assign(mesh.vertices.size(), 0.0F);
+  const std::size_t chunks = (mesh.vertices.size() + kChunk - 1) / kChunk;
+  parallel_for(chunks, [&](std::size_t chunk) {
+    const std::size_t end = std::min(mesh.vertices.size(), (chunk + 1) * kChunk);
+    for (std::size_t v = chunk * kChunk; v < end; ++v) {
+      double nearest = radius;  // mm, to any sample of this side
+      double best = 1;          // distance / reach of the best sample
+      double weight_sum = 0;
+      double variance_sum = 0;
+      double confidence_sum = 0;
+      Vec3 pull =
+          Vec3::Zero();  // sum of the offsets: cancels out where samples surround the vertex
+      double pull_length = 0;
+      std::array<bool, 256> seen{};
+      int cameras = 0;
+      grid.for_each_within(mesh.vertices[v], radius, [&](std::size_t i, double d2) {
+        const SurfaceSample& s = samples[i];
+        const Vec3 d = s.position - mesh.vertices[v];
+        if (s.normal.dot(normals[v]) < 0.5) return;
+        if (std::abs(d.dot(normals[v])) > 0.5 * spacing) return;
+        const double distance = std::sqrt(d2);
+        nearest = std::min(nearest, distance);
+        const double tilt = s.sheet_normal.dot(s.normal);
+        const double stretch = 1 / std::sqrt(std::max(1 - tilt * tilt, 1e-6));
+        const double reach = reach_spacings * s.spacing * std::min(stretch, kMaxStretch);
+        if (distance > reach) return;
+        best = std::min(best, distance / reach);
+        pull += d;
+        pull_length += distance;
+        const double across = s.sigma * std::max(std::abs(s.to_camera.dot(s.normal)), 0.2);
+        const double w = std::exp(-2 * d2 / (spacing * spacing));
+        weight_sum += w;
+        variance_sum += w * (across * across + s.residual * s.residual);
+        confidence_sum += w * s.confidence;
+        if (!seen[s.camera]) ++cameras;
+        seen[s.camera] = true;
+      });
+      double variance = kInterpolation * kInterpolation * nearest * nearest;
+      // Samples that fill a half plane pull with 2 / pi of their summed distance.
+      fringe[v] = pull.norm() > 0.55 * pull_length && best > kOutsideReach;
+      if (weight_sum > 0) {
+        // Samples of one camera share their errors; cameras are independent.
+        variance += variance_sum / weight_sum / std::max(cameras, 1);
+        const double certainty = confidence_sum / weight_sum * (1 - 0.5 * best * best);
+        mesh.confidence[v] = static_cast<float>(std::clamp(certainty, 0.01, 1.0));
+      } else {
+        variance = nearest * nearest;  // a guess: at least as far off as the nearest sample is away
+      }
+      mesh.sigma[v] = static_cast<float>(std::sqrt(variance));
+    }
+  });
+  cut_fringe(fringe, mesh);
+}
+
+std::vector<char> measured_faces(const TriangleMesh& mesh) {
+  std::vector<char> keep(mesh.faces.size(), 1);
+  for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
+    for (const int v : mesh.faces[f]) {
+      if (!(mesh.confidence[static_cast<std::size_t>(v)] > 0)) keep[f] = 0;
+    }
+  }
+  return keep;
+}
+
+TriangleMesh measured_part(const TriangleMesh& mesh, double min_area_mm2) {
+  TriangleMesh part = submesh(mesh, measured_faces(mesh));
+  const std::vector<int> component = face_components(part);
+  std::vector<double> area;
+  for (std::size_t f = 0; f < part.faces.size(); ++f) {
+    const auto c = static_cast<std::size_t>(component[f]);
+    if (c >= area.size()) area.resize(c + 1, 0.0);
+    area[c] += face_area(part, f);
+  }
+  std::vector<char> keep(part.faces.size());
+  for (std::size_t f = 0; f < keep.size(); ++f) {
+    keep[f] = area[static_cast<std::size_t>(component[f])] >= min_area_mm2;
+  }
+  return submesh(part, keep);
+}
+
+}  // namespace pencilscan

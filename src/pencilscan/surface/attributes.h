@@ -1,0 +1,23 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "pencilscan/geometry/mesh.h"
+#include "pencilscan/surface/sample.h"
+
+namespace pencilscan {
+
+/// Sets sigma and confidence of every vertex from the samples near it. A vertex is measured when a
+/// sample of its own side lies within the reach, which grows where the sheets graze the surface,
+/// and samples surround it; beyond the last line only a part of the reach counts.
+void attribute_vertices(std::span<const SurfaceSample> samples, double reach_spacings,
+                        double spacing, TriangleMesh& mesh);
+
+/// Per face: 1 when all its vertices were measured.
+[[nodiscard]] std::vector<char> measured_faces(const TriangleMesh& mesh);
+
+/// The measured faces without islands smaller than min_area_mm2.
+[[nodiscard]] TriangleMesh measured_part(const TriangleMesh& mesh, double min_area_mm2);
+
+}  // namespace pencilscan
