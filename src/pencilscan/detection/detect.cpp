@@ -61,12 +61,16 @@ CameraDetection detect_curves(const Camera& camera, const Rig& rig,
   const cv::Mat rgb = unmixed(linear, result.unmixing);
   // Find and trace the curves of each family, then fit them together.
   std::vector<std::vector<Curve>> curves_of(families.size());
+  result.presence.resize(families.size());
   parallel_for(families.size(), [&](std::size_t f) {
     const cv::Mat presence = presence_image(rgb, families[f]);
     const std::vector<Ridgel> ridgels = find_ridgels(presence, options.ridge);
     std::vector<Curve> curves = trace_curves(ridgels, presence.size(), options.trace);
     for (Curve& curve : curves) curve.family = static_cast<int>(f);
     curves_of[f] = refine_curves(presence, std::move(curves), options.refine);
+    // Dark outside the lit area.
+    result.presence[f] = cv::Mat(image.size(), CV_32F, cv::Scalar(0));
+    presence.copyTo(result.presence[f](area));
   });
   for (std::vector<Curve>& curves : curves_of) {
     std::move(curves.begin(), curves.end(), std::back_inserter(result.curves));

@@ -24,6 +24,7 @@ struct DetectionOptions {
 struct CameraDetection {
   std::vector<Curve> curves;  ///< of all families
   Unmixing unmixing;
+  std::vector<cv::Mat> presence;  ///< per family: how bright its lines are, CV_32FC1
   std::size_t saturated_pixels = 0;
 };
 

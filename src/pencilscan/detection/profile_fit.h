@@ -17,6 +17,10 @@ constexpr float kMinLineWidth = 0.6F;  ///< px
 constexpr float kMaxLineWidth = 4.5F;
 constexpr float kModelReach = 3.0F;  ///< line profiles are rendered to this many widths
 
+/// Width (root of the second moment, px) of the profile of a line that is `line_px` wide in the
+/// image before blur.
+[[nodiscard]] float line_profile_width(float line_px);
+
 /// Height of the line profile of `width` at -7..8 px from its middle, 0 beyond its reach.
 void line_profile(float width, std::array<float, 2 * kLanes>& values);
 

@@ -179,28 +179,24 @@ std::span<const CurvePoint> trimmed(std::span<const CurvePoint> points, double r
   return points.subspan(first, last - first);
 }
 
-std::vector<Curve> cut_and_trim(const std::vector<Curve>& curves, const RefineOptions& options) {
-  std::vector<Curve> result;
-  for (const Curve& curve : curves) {
-    const std::span<const CurvePoint> points(curve.points);
-    std::size_t begin = 0;
-    const auto finish = [&](std::size_t end) {
-      const auto piece = trimmed(points.subspan(begin, end - begin), options.end_amplitude_ratio);
-      if (static_cast<int>(piece.size()) >= options.min_points)
-        result.push_back({curve.family, {piece.begin(), piece.end()}, {}});
-    };
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      if (!sound(points[i], options)) {
-        finish(i);
-        begin = i + 1;
-      } else if (i > begin && jumps(points[i - 1], points[i])) {
-        finish(i);
-        begin = i;
-      }
+void cut_and_trim(const Curve& curve, const RefineOptions& options, std::vector<Curve>& result) {
+  const std::span<const CurvePoint> points(curve.points);
+  std::size_t begin = 0;
+  const auto finish = [&](std::size_t end) {
+    const auto piece = trimmed(points.subspan(begin, end - begin), options.end_amplitude_ratio);
+    if (static_cast<int>(piece.size()) >= options.min_points)
+      result.push_back({curve.family, {piece.begin(), piece.end()}, {}});
+  };
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (!sound(points[i], options)) {
+      finish(i);
+      begin = i + 1;
+    } else if (i > begin && jumps(points[i - 1], points[i])) {
+      finish(i);
+      begin = i;
     }
-    finish(points.size());
   }
-  return result;
+  finish(points.size());
 }
 
 /// Adds the profile between two points. Every image row (column for flat pieces) that the segment
@@ -279,9 +275,26 @@ std::vector<Curve> refine_curves(const cv::Mat& presence, std::vector<Curve> cur
       fit_curve(residual, round == 0, options.half_arc, curve);
       smooth_widths(curve.points);
     }
-    curves = cut_and_trim(curves, options);
+    std::vector<Curve> sound_curves;
+    for (const Curve& curve : curves) cut_and_trim(curve, options, sound_curves);
+    curves = std::move(sound_curves);
   }
   return curves;
+}
+
+std::vector<GuidedCurve> fit_guesses(const cv::Mat& presence, const std::vector<Curve>& known,
+                                     std::vector<Curve> guesses, const RefineOptions& options) {
+  const cv::Mat unexplained = presence - render_curves(known, presence.size());
+  std::vector<GuidedCurve> found;
+  for (std::size_t i = 0; i < guesses.size(); ++i) {
+    // Once only: between lines this dense, a second fit to the others' residual moves away.
+    fit_curve(unexplained, true, options.half_arc, guesses[i]);
+    smooth_widths(guesses[i].points);
+    std::vector<Curve> pieces;
+    cut_and_trim(guesses[i], options, pieces);
+    for (Curve& piece : pieces) found.push_back({static_cast<int>(i), std::move(piece)});
+  }
+  return found;
 }
 
 }  // namespace pencilscan

@@ -24,6 +24,19 @@ struct RefineOptions {
 [[nodiscard]] std::vector<Curve> refine_curves(const cv::Mat& presence, std::vector<Curve> curves,
                                                const RefineOptions& options = {});
 
+/// A curve that was looked for.
+struct GuidedCurve {
+  int guess = 0;  ///< which of the guesses it comes from
+  Curve curve;
+};
+
+/// Fits curves whose place, direction and width are roughly known (amplitude 0) to what the `known`
+/// curves leave of the image. A guess may give several pieces or none.
+[[nodiscard]] std::vector<GuidedCurve> fit_guesses(const cv::Mat& presence,
+                                                   const std::vector<Curve>& known,
+                                                   std::vector<Curve> guesses,
+                                                   const RefineOptions& options = {});
+
 /// Sum of the profiles of all curves, CV_32FC1.
 [[nodiscard]] cv::Mat render_curves(const std::vector<Curve>& curves, cv::Size size);
 

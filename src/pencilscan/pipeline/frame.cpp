@@ -72,8 +72,20 @@ PointResult measure_points(const Rig& rig, const Frame& frame, const PointOption
   result.labeling = solve(rig, result.families, result.graphs, options.solution);
   result.times.push_back({"solution", solution_watch.seconds()});
 
+  if (options.solution.method == Method::kJoint) {
+    Stopwatch second_look_watch;
+    std::vector<std::vector<cv::Mat>> presence;
+    for (CameraDetection& detection : result.detections)
+      presence.push_back(std::move(detection.presence));
+    second_look(rig, result.families, presence, result.graphs, result.labeling,
+                options.second_look);
+    result.times.push_back({"second look", second_look_watch.seconds()});
+  }
+
   Stopwatch triangulation_watch;
   result.points = triangulate(rig, result.graphs, result.labeling, options.triangulation);
+  if (options.solution.method == Method::kJoint)
+    result.points = settle_points(rig, result.points, options.settle);
   result.times.push_back({"triangulation", triangulation_watch.seconds()});
   return result;
 }

@@ -9,6 +9,8 @@
 #include "pencilscan/grid/grid_graph.h"
 #include "pencilscan/io/point_file.h"
 #include "pencilscan/solution/labeling.h"
+#include "pencilscan/solution/second_look.h"
+#include "pencilscan/solution/settle.h"
 #include "pencilscan/solution/triangulate.h"
 #include "pencilscan/surface/surface.h"
 
@@ -24,7 +26,9 @@ struct PointOptions {
   DetectionOptions detection;
   GridOptions grid;
   SolutionOptions solution;
+  SecondLookOptions second_look;  ///< joint only
   TriangulationOptions triangulation;
+  SettleOptions settle;  ///< joint only: the paper's methods are triangulated as they are
 };
 
 /// How the labelled points become a surface.

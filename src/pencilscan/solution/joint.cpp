@@ -130,7 +130,7 @@ float confidence_of(float margin) { return 1 / (1 + std::exp(0.13F - 0.52F * mar
 /// Runs of the decided pieces of one camera, and why the others are not.
 void write_decisions(const LabelledPieces& pieces, const std::vector<Decision>& decisions,
                      const JointOptions& options, std::vector<LabeledRun>& runs,
-                     UndecidedPoints& undecided) {
+                     std::vector<LabeledRun>& tentative, UndecidedPoints& undecided) {
   std::vector<char> is_crossed(decisions.size(), 0);
   for (const PieceCrossing& x : pieces.graph.crossings) {
     is_crossed[static_cast<std::size_t>(x.a)] = is_crossed[static_cast<std::size_t>(x.b)] = 1;
@@ -141,13 +141,18 @@ void write_decisions(const LabelledPieces& pieces, const std::vector<Decision>& 
     const float confidence = confidence_of(decisions[p].margin);
     if (pieces.labels[p].empty()) {
       undecided.outside_volume += points;
-    } else if (decisions[p].label >= 0 &&
-               confidence >= static_cast<float>(options.min_confidence)) {
+      continue;
+    }
+    const bool is_sure = confidence >= static_cast<float>(options.min_confidence);
+    if (decisions[p].label >= 0) {
       const PieceLabel& label = pieces.labels[p][static_cast<std::size_t>(decisions[p].label)];
-      runs.push_back(
-          {piece.curve, piece.begin, piece.end,
-           CurveLabel{label.pattern, label.line, static_cast<double>(label.line), confidence}});
-    } else if (is_crossed[p] == 0) {
+      (is_sure ? runs : tentative)
+          .push_back(
+              {piece.curve, piece.begin, piece.end,
+               CurveLabel{label.pattern, label.line, static_cast<double>(label.line), confidence}});
+      if (is_sure) continue;
+    }
+    if (is_crossed[p] == 0) {
       undecided.no_crossing += points;
     } else {
       (decisions[p].label < 0 ? undecided.contradicted : undecided.ambiguous) += points;
@@ -188,11 +193,12 @@ Labeling solve_joint(const Rig& rig, const std::vector<ColorFamily>& families,
   }
   Labeling labeling;
   labeling.runs.resize(rig.cameras.size());
+  labeling.tentative.resize(rig.cameras.size());
   labeling.undecided.resize(rig.cameras.size());
   for (std::size_t g = 0; g < graphs.size(); ++g) {
     const auto camera = static_cast<std::size_t>(graphs[g].camera);
     write_decisions(pieces[g], decisions[g], options, labeling.runs[camera],
-                    labeling.undecided[camera]);
+                    labeling.tentative[camera], labeling.undecided[camera]);
   }
   return labeling;
 }

@@ -55,6 +55,8 @@ struct UndecidedPoints {
 /// Result of a solution over all cameras; curve points in no run are undecided.
 struct Labeling {
   std::vector<std::vector<LabeledRun>> runs;  ///< per camera, ordered by (curve, begin), disjoint
+  /// Per camera, the likeliest labels of undecided stretches; joint only.
+  std::vector<std::vector<LabeledRun>> tentative;
   std::vector<ComponentReport> components;    ///< linear and multi-view only
   std::vector<UndecidedPoints> undecided;     ///< per camera; joint only
 };
@@ -77,7 +79,7 @@ struct JointOptions {
   int passes = 2;                    ///< message passing, then what the cameras say of each other
   int rounds = 4;                    ///< of messages in a pass
   double damping = 0.3;              ///< share of the old message kept, [0, 1)
-  double min_confidence = 0.95;      ///< pieces below stay undecided
+  double min_confidence = 0.96;      ///< pieces below stay undecided
 
   /// Cost of a crossing whose planes do not meet.
   [[nodiscard]] float disagreement_cost() const;

@@ -1,0 +1,75 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "pencilscan/io/point_file.h"
+#include "pencilscan/rig/rig.h"
+
+namespace pencilscan {
+
+struct LocalSurfaceOptions {
+  double reach_px = 6;  ///< standard deviation of the weight of points around; > 0
+  int step_px = 6;      ///< between patches; >= 1
+  double floor_px = 0.1;      ///< error that every point has: depth in pixel footprints
+  double curvature = 4e-3;    ///< prior deviation of quadratic terms, relative depth per reach^2
+  double alike_points = 6;    ///< neighbours on a curve that share one error
+  int min_points = 8;         ///< that agree
+  double min_agreement = 0.6; ///< weighted share of points that agree
+};
+
+/// Inverse depth around a pixel of a camera as a quadratic function of the pixel. A plane gives
+/// inverse depth that is linear in the pixel.
+struct SurfacePatch {
+  Eigen::Vector2f pixel = Eigen::Vector2f::Zero();
+  float scale_px = 1;   ///< unit of the terms
+  float reference = 0;  ///< inverse depth that the coefficients are relative to, 1/mm; 0: no patch
+  Eigen::Matrix<float, 6, 1> coefficients = Eigen::Matrix<float, 6, 1>::Zero();
+  float sigma = 0;   ///< standard deviation of inverse depth at `pixel`, relative
+  float spread = 0;  ///< RMS deviation of the points, in their own standard deviations
+
+  [[nodiscard]] bool exists() const { return reference > 0; }
+  [[nodiscard]] float inverse_depth(const Eigen::Vector2f& at) const;
+  /// d(inverse depth) / d(pixel).
+  [[nodiscard]] Eigen::Vector2f gradient(const Eigen::Vector2f& at) const;
+};
+
+/// The surface that the labelled points of one camera show: patches on a lattice of its pixels,
+/// each fitted robustly to the points of all projectors around it. There is no patch where too few
+/// points agree on one surface.
+class LocalSurface {
+ public:
+  /// `points` of this camera only.
+  LocalSurface(const Camera& camera, std::span<const MeasuredPoint> points,
+               const LocalSurfaceOptions& options = {});
+
+  /// The patch nearest to a pixel; nullptr: none.
+  [[nodiscard]] const SurfacePatch* nearest(const Eigen::Vector2f& pixel) const;
+  [[nodiscard]] std::span<const SurfacePatch> patches() const { return patches_; }
+  [[nodiscard]] int step_px() const { return options_.step_px; }
+
+ private:
+  struct Sample {
+    Eigen::Vector2f pixel;
+    float w;      ///< inverse depth
+    float sigma;  ///< relative
+  };
+  struct Neighborhood;
+  static constexpr int kCell = 8;
+
+  void gather(const Eigen::Vector2f& pixel, float scale_px, Neighborhood& around) const;
+  [[nodiscard]] SurfacePatch fit(const Eigen::Vector2f& pixel, float scale_px,
+                                 Neighborhood& around) const;
+
+  LocalSurfaceOptions options_;
+  int columns_ = 0;
+  int rows_ = 0;
+  int cell_columns_ = 0;
+  int cell_rows_ = 0;
+  std::vector<std::vector<Sample>> cells_;
+  std::vector<SurfacePatch> patches_;  ///< row by row
+};
+
+}  // namespace pencilscan

@@ -1,0 +1,78 @@
+#include "pencilscan/solution/settle.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "pencilscan/core/parallel.h"
+
+namespace pencilscan {
+namespace {
+
+/// What the surface around a point says of it.
+struct Opinion {
+  double depth = 0;  ///< camera z, mm
+  double sigma = 0;  ///< mm along the ray
+};
+
+Opinion opinion_of(const SurfacePatch& patch, const Camera& camera, const Eigen::Vector2f& pixel,
+                   double ray_length, const SettleOptions& options) {
+  const double w = patch.inverse_depth(pixel);
+  const double footprint = 1 / (w * camera.K(0, 0));
+  const double depth_per_footprint = patch.gradient(pixel).norm() / w * camera.K(0, 0);
+  const double model = options.model_px * footprint * (1 + depth_per_footprint) *
+                       std::max(1.0, static_cast<double>(patch.spread));
+  return {1 / w, std::hypot(patch.sigma / w, model) * ray_length};
+}
+
+/// The point settled; nothing if it contradicts its surroundings.
+std::optional<MeasuredPoint> settled(const MeasuredPoint& point, const LocalSurface& surface,
+                                     const Camera& camera, const Vec3& center, const Vec3& forward,
+                                     const SettleOptions& options) {
+  const Eigen::Vector2f pixel(point.u, point.v);
+  const SurfacePatch* patch = surface.nearest(pixel);
+  if (patch == nullptr) return point;
+  const Vec3 way = Vec3(point.x, point.y, point.z) - center;
+  const double depth = way.dot(forward);
+  const double ray_length = way.norm() / depth;
+  const Opinion others = opinion_of(*patch, camera, pixel, ray_length, options);
+  const double own2 = static_cast<double>(point.sigma) * point.sigma;
+  const double others2 = others.sigma * others.sigma;
+  const double apart = (others.depth - depth) * ray_length;
+  if (std::abs(apart) > options.max_deviations * std::sqrt(own2 + others2)) return std::nullopt;
+  const double own_share = others2 / (own2 + others2);
+  // Inverse depth is what varies linearly over the image.
+  const double w = 1 / others.depth + own_share * (1 / depth - 1 / others.depth);
+  const Vec3 x = center + way / (depth * w);
+  MeasuredPoint result = point;
+  result.x = static_cast<float>(x.x());
+  result.y = static_cast<float>(x.y());
+  result.z = static_cast<float>(x.z());
+  result.sigma = static_cast<float>(std::sqrt(own_share * own2));
+  return result;
+}
+
+}  // namespace
+
+std::vector<MeasuredPoint> settle_points(const Rig& rig, std::span<const MeasuredPoint> points,
+                                         const SettleOptions& options) {
+  std::vector<std::vector<MeasuredPoint>> by_camera(rig.cameras.size());
+  for (const MeasuredPoint& p : points) by_camera[p.camera].push_back(p);
+  parallel_for(by_camera.size(), [&](std::size_t c) {
+    const Camera& camera = rig.cameras[c];
+    const LocalSurface surface(camera, by_camera[c], options.surface);
+    const Vec3 center = camera.center();
+    const Vec3 forward = camera.forward();
+    std::vector<MeasuredPoint> kept;
+    for (const MeasuredPoint& p : by_camera[c]) {
+      if (const auto point = settled(p, surface, camera, center, forward, options))
+        kept.push_back(*point);
+    }
+    by_camera[c] = std::move(kept);
+  });
+  std::vector<MeasuredPoint> result;
+  for (const auto& part : by_camera) result.insert(result.end(), part.begin(), part.end());
+  return result;
+}
+
+}  // namespace pencilscan

@@ -1,0 +1,25 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "pencilscan/io/point_file.h"
+#include "pencilscan/solution/local_surface.h"
+
+namespace pencilscan {
+
+struct SettleOptions {
+  LocalSurfaceOptions surface;
+  double model_px = 0.05;  ///< what a quadratic patch misses: depth in pixel footprints, at tilt 0
+  double max_deviations = 6;  ///< from the surface around, in standard deviations; > 0
+};
+
+/// Each point together with those around it: its depth becomes the mean, by variance, of its own
+/// and that of the surface which all points around show (LocalSurface), so that a plane seen nearly
+/// edge-on takes its depth from the others. Points that contradict the surface are left out.
+/// Positions stay on their camera rays. Keeps the order.
+[[nodiscard]] std::vector<MeasuredPoint> settle_points(const Rig& rig,
+                                                       std::span<const MeasuredPoint> points,
+                                                       const SettleOptions& options = {});
+
+}  // namespace pencilscan
