@@ -57,8 +57,8 @@ struct Labeling {
   std::vector<std::vector<LabeledRun>> runs;  ///< per camera, ordered by (curve, begin), disjoint
   /// Per camera, the likeliest labels of undecided stretches; joint only.
   std::vector<std::vector<LabeledRun>> tentative;
-  std::vector<ComponentReport> components;    ///< linear and multi-view only
-  std::vector<UndecidedPoints> undecided;     ///< per camera; joint only
+  std::vector<ComponentReport> components;  ///< linear and multi-view only
+  std::vector<UndecidedPoints> undecided;   ///< per camera; joint only
 };
 
 enum class Method { kLinear, kMultiview, kJoint };

@@ -65,11 +65,11 @@ void accumulate(const float* x, const float* y, const float* z, const float* w, 
   std::array<float, 15> s;
   for (std::size_t k = 0; k < s.size(); ++k) s[k] = m[k].sum();
   for (std::size_t k = 0; k < r.size(); ++k) b[static_cast<Eigen::Index>(k)] = r[k].sum();
-  N << s[0], s[1], s[2], s[3], s[4], s[5],     //
-      s[1], s[3], s[4], s[6], s[7], s[8],      //
-      s[2], s[4], s[5], s[7], s[8], s[9],      //
-      s[3], s[6], s[7], s[10], s[11], s[12],   //
-      s[4], s[7], s[8], s[11], s[12], s[13],   //
+  N << s[0], s[1], s[2], s[3], s[4], s[5],    //
+      s[1], s[3], s[4], s[6], s[7], s[8],     //
+      s[2], s[4], s[5], s[7], s[8], s[9],     //
+      s[3], s[6], s[7], s[10], s[11], s[12],  //
+      s[4], s[7], s[8], s[11], s[12], s[13],  //
       s[5], s[8], s[9], s[12], s[13], s[14];
 }
 
@@ -186,8 +186,8 @@ void LocalSurface::gather(const Vector2f& pixel, float scale, Neighborhood& arou
 }
 
 SurfacePatch LocalSurface::fit(const Vector2f& pixel, float scale_px, Neighborhood& around) const {
-  constexpr int kIterations = 4;
-  constexpr float kTuning = 2;     // deviations beyond so many scales count little
+  constexpr int kIterations = 5;
+  constexpr float kTuning = 2;       // deviations beyond so many scales count little
   constexpr float kMaxScale = 1.5F;  // points that agree deviate by their sigma
   SurfacePatch patch;
   const std::size_t n = around.count;
@@ -205,13 +205,14 @@ SurfacePatch LocalSurface::fit(const Vector2f& pixel, float scale_px, Neighborho
     for (std::size_t i = 0; i < around.x.size(); ++i) {
       const float e = around.deviation[i] / (kTuning * scale);
       const float robust = 1 / (1 + e * e);
-      around.weight[i] =
-          around.near[i] * robust * robust / (alike * around.sigma[i] * around.sigma[i]);
+      // First a plane and all points alike, so that one wrong line does not bend it alone.
+      const float near = iteration == 0 ? 1.F : around.near[i];
+      around.weight[i] = near * robust * robust / (alike * around.sigma[i] * around.sigma[i]);
     }
     accumulate(around.x.data(), around.y.data(), around.z.data(), around.weight.data(),
                around.x.size(), N, b);
     N.diagonal().head<3>().array() += 1e-2F;
-    N.diagonal().tail<3>().array() += 1 / (curvature * curvature);
+    N.diagonal().tail<3>().array() += iteration == 0 ? 1e12F : 1 / (curvature * curvature);
     patch.coefficients = N.selfadjointView<Eigen::Lower>().ldlt().solve(b);
     const Vector6f& c = patch.coefficients;
     for (std::size_t i = 0; i < n; ++i) {
@@ -224,17 +225,17 @@ SurfacePatch LocalSurface::fit(const Vector2f& pixel, float scale_px, Neighborho
     scale = std::max(1.F, 1.5F * around.median(around.deviation));
   }
   float agreeing = 0;
-  float all = 0;
   float chi2 = 0;
   int count = 0;
   for (std::size_t i = 0; i < n; ++i) {
-    all += around.near[i];
     if (std::abs(around.deviation[i]) > 3 * std::min(scale, kMaxScale)) continue;
     agreeing += around.near[i];
     chi2 += around.near[i] * around.deviation[i] * around.deviation[i];
     ++count;
   }
-  if (count < options_.min_points || agreeing < static_cast<float>(options_.min_agreement) * all)
+  if (count < options_.min_points ||
+      static_cast<float>(count) <
+          static_cast<float>(options_.min_agreement) * static_cast<float>(n))
     return {};
   patch.reference = reference;
   patch.spread = std::sqrt(chi2 / agreeing);

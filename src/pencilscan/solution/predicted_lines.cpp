@@ -34,12 +34,11 @@ class PatternOnSurface {
     if (!(x.z() > 0)) return std::nanf("");
     Eigen::Vector3f n = x / x.z();
     if (bends_) {
-      n.head<2>() =
-          distort(projector_.distortion, n.head<2>().cast<double>().eval()).cast<float>();
+      n.head<2>() = distort(projector_.distortion, n.head<2>().cast<double>().eval()).cast<float>();
     }
     const float along = other_row_.dot(n);
-    const float extent = static_cast<float>(pattern_.axis == Axis::kColumn ? projector_.height
-                                                                           : projector_.width);
+    const float extent =
+        static_cast<float>(pattern_.axis == Axis::kColumn ? projector_.height : projector_.width);
     if (!(along > -0.5F && along < extent - 0.5F)) return std::nanf("");
     return static_cast<float>(pattern_.coordinate(static_cast<double>(row_.dot(n))));
   }

@@ -235,8 +235,7 @@ void CameraLook::confirm_tentative() {
     const LineName name{run.label.pattern, run.label.line};
     const auto agrees = [&](int i) {
       const auto k = static_cast<std::size_t>(i);
-      return decided[static_cast<std::size_t>(run.curve)][k] == 0 &&
-             lies_on(curve.points[k], name);
+      return decided[static_cast<std::size_t>(run.curve)][k] == 0 && lies_on(curve.points[k], name);
     };
     for (int begin = run.begin; begin < run.end; ++begin) {
       int end = begin;
@@ -396,7 +395,8 @@ void CameraLook::find_missing(const std::vector<cv::Mat>& presence) {
       bool any = false;
       for (int begin = 0; begin < n;) {
         int end = begin + 1;
-        while (end < n && good[static_cast<std::size_t>(end)] == good[static_cast<std::size_t>(begin)])
+        while (end < n &&
+               good[static_cast<std::size_t>(end)] == good[static_cast<std::size_t>(begin)])
           ++end;
         if (good[static_cast<std::size_t>(begin)] != 0 && end - begin >= options_.min_points) {
           runs_.push_back({index, begin, end,
