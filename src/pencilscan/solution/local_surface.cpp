@@ -226,11 +226,13 @@ SurfacePatch LocalSurface::fit(const Vector2f& pixel, float scale_px, Neighborho
   }
   float agreeing = 0;
   float chi2 = 0;
+  Vector2f mean = Vector2f::Zero();
   int count = 0;
   for (std::size_t i = 0; i < n; ++i) {
     if (std::abs(around.deviation[i]) > 3 * std::min(scale, kMaxScale)) continue;
     agreeing += around.near[i];
     chi2 += around.near[i] * around.deviation[i] * around.deviation[i];
+    mean += around.near[i] * Vector2f(around.x[i], around.y[i]);
     ++count;
   }
   if (count < options_.min_points ||
@@ -239,6 +241,7 @@ SurfacePatch LocalSurface::fit(const Vector2f& pixel, float scale_px, Neighborho
     return {};
   patch.reference = reference;
   patch.spread = std::sqrt(chi2 / agreeing);
+  patch.one_sidedness = mean.norm() / agreeing;
   const Vector6f center = Vector6f::Unit(0);
   const float variance = N.selfadjointView<Eigen::Lower>().ldlt().solve(center)[0];
   patch.sigma = std::sqrt(std::max(0.F, variance)) * std::max(1.F, patch.spread);

@@ -27,8 +27,9 @@ struct SurfacePatch {
   float scale_px = 1;   ///< unit of the terms
   float reference = 0;  ///< inverse depth that the coefficients are relative to, 1/mm; 0: no patch
   Eigen::Matrix<float, 6, 1> coefficients = Eigen::Matrix<float, 6, 1>::Zero();
-  float sigma = 0;   ///< standard deviation of inverse depth at `pixel`, relative
-  float spread = 0;  ///< RMS deviation of the points, in their own standard deviations
+  float sigma = 0;          ///< standard deviation of inverse depth at `pixel`, relative
+  float spread = 0;         ///< RMS deviation of the points, in their own standard deviations
+  float one_sidedness = 0;  ///< distance of the points' mean from `pixel`, in scale_px
 
   [[nodiscard]] bool exists() const { return reference > 0; }
   [[nodiscard]] float inverse_depth(const Eigen::Vector2f& at) const;
