@@ -19,6 +19,8 @@ struct ReconstructOptions {
   std::string cost = "normalized";
   bool no_pictures = false;
   bool no_depth = false;
+  bool depth_maps = false;
+  std::vector<std::string> mesh_formats;
   bool overwrite = false;
 };
 
@@ -32,10 +34,14 @@ void reconstruct(const ReconstructOptions& options) {
   sequence.shape.depth.enabled =
       !options.no_depth && sequence.points.solution.method == Method::kJoint;
   sequence.pictures = !options.no_pictures;
+  sequence.depth_maps = options.depth_maps;
+  sequence.mesh_formats = options.mesh_formats;
   sequence.overwrite = options.overwrite;
   sequence.description = "method=" + options.method + " multiview-cost=" + options.cost +
                          " pictures=" + (options.no_pictures ? "no" : "yes") +
-                         " depth=" + (sequence.shape.depth.enabled ? "yes" : "no");
+                         " depth=" + (sequence.shape.depth.enabled ? "yes" : "no") +
+                         " depth-maps=" + (options.depth_maps ? "yes" : "no");
+  for (const std::string& format : options.mesh_formats) sequence.description += " " + format;
   const auto outcomes =
       reconstruct_sequence(options.rig, options.frames, options.out, sequence, stderr_progress());
   nlohmann::ordered_json figures;
@@ -88,6 +94,13 @@ void add_reconstruct_command(CLI::App& app) {
       ->capture_default_str();
   command->add_flag("--no-depth", options->no_depth,
                     "surface from the labelled curves alone, without depth between them");
+  command->add_flag("--depth-maps", options->depth_maps,
+                    "depth and its deviation per camera: float TIFF and 16-bit PNG");
+  command
+      ->add_option("--mesh-formats", options->mesh_formats,
+                   "the closed mesh also as obj, stl or glb (several with commas)")
+      ->delimiter(',')
+      ->check(CLI::IsMember({"obj", "stl", "glb"}));
   command->add_flag("--no-pictures", options->no_pictures, "leave overlays and views out");
   command->add_flag("--overwrite", options->overwrite, "replace output of other inputs or options");
   add_common_options(*command, options->common,

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 
 #include "pencilscan/core/parallel.h"
@@ -19,7 +20,8 @@ struct Node {
 /// Another node that agrees or disagrees, with the device through which that was found.
 struct Link {
   std::uint32_t other;
-  std::uint16_t group;  ///< camera, or cameras + projector
+  std::uint16_t group;      ///< camera, or cameras + projector
+  float disagreement = -1;  ///< of a support: distance across the surface over its deviation
 };
 
 struct Links {
@@ -101,6 +103,20 @@ class Comparison {
     return maps_[nodes_[i].map].nodes[nodes_[i].index];
   }
 
+  /// Distance of node i from the surface at `other`, seen `beyond` it by the other's camera, over
+  /// the standard deviation that the two of them state.
+  [[nodiscard]] float disagreement(std::size_t i, std::size_t other, double beyond) const {
+    const auto cosine = [&](std::size_t k) {
+      const DepthMap& map = maps_[nodes_[k].map];
+      const Vec3& eye = rig_.cameras[static_cast<std::size_t>(map.camera)].center();
+      return (eye - nodes_[k].x).normalized().dot(node_normal(rig_, map, nodes_[k].index));
+    };
+    const double c = cosine(other);
+    const double sigma = std::hypot(c * static_cast<double>(node(other).sigma),
+                                    cosine(i) * static_cast<double>(node(i).sigma));
+    return static_cast<float>(std::abs(c * beyond) / std::max(sigma, 1e-9));
+  }
+
   void compare_with_cameras(std::size_t i, Links& links) const {
     for (std::size_t m = 0; m < maps_.size(); ++m) {
       if (m == nodes_[i].map) continue;
@@ -111,15 +127,24 @@ class Comparison {
       double nearest = 1e9;  // signed: what the camera sees, beyond the node
       std::int32_t other = -1;
       int count = 0;
+      double least_px2 = 1e9;  // of the node next to the pixel
+      double there = 0;
+      std::int32_t next = -1;
       for (const std::int64_t j : nodes_around(maps_[m], *pixel)) {
         if (j < 0) continue;
         const DepthNode& n = maps_[m].nodes[static_cast<std::size_t>(j)];
         if (!n.measured()) continue;
         ++count;
         const Vec2 d = *pixel - maps_[m].pixel(static_cast<std::size_t>(j));
-        const double w = n.w + n.wx * d[0] + n.wy * d[1];
+        const double w = n.w + n.wx * d[0] + n.wy * d[1] +
+                         0.5 * (n.wxx * d[0] * d[0] + n.wyy * d[1] * d[1]) + n.wxy * d[0] * d[1];
         if (!(w > 0)) continue;
         const double beyond = 1 / w - z;
+        if (d.squaredNorm() < least_px2) {
+          least_px2 = d.squaredNorm();
+          there = beyond;
+          next = id_of_[m][static_cast<std::size_t>(j)];
+        }
         if (std::abs(beyond) < std::abs(nearest)) {
           nearest = beyond;
           other = id_of_[m][static_cast<std::size_t>(j)];
@@ -130,7 +155,8 @@ class Comparison {
           static_cast<double>(node(i).sigma + node(static_cast<std::size_t>(other)).sigma);
       const Link link{static_cast<std::uint32_t>(other), static_cast<std::uint16_t>(m)};
       if (std::abs(nearest) < 0.5 * options_.margin_mm + 3 * sigma) {
-        links.support[i].push_back(link);
+        links.support[i].push_back(
+            {link.other, link.group, disagreement(i, static_cast<std::size_t>(next), there)});
       } else if (nearest > options_.margin_mm + 4 * sigma && count >= 3) {
         links.contradiction[i].push_back(link);
       }
@@ -147,10 +173,13 @@ class Comparison {
     for (std::size_t k = 0; k < pattern_projector_.size() && k < 64; ++k) {
       if (pattern_projector_[k] == static_cast<int>(p)) bits |= std::uint64_t{1} << k;
     }
-    // The farthest two lit nodes per cell and camera would do; the farthest one is kept.
+    // The second farthest lit node of each cell: a single wrong one shall not cast doubt on all
+    // that stands before it.
     struct Lit {
       float z = 0;
       std::int32_t node = -1;
+      float farthest = 0;
+      std::int32_t farthest_node = -1;
     };
     std::vector<Lit> farthest(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows));
     std::vector<std::int32_t> cell_of(nodes_.size(), -1);
@@ -165,7 +194,12 @@ class Comparison {
     for (std::size_t i = 0; i < nodes_.size(); ++i) {
       if (cell_of[i] < 0 || (node(i).lit & bits) == 0) continue;
       Lit& lit = farthest[static_cast<std::size_t>(cell_of[i])];
-      if (z_of[i] > lit.z) lit = {z_of[i], static_cast<std::int32_t>(i)};
+      if (z_of[i] > lit.farthest) {
+        lit = {lit.farthest, lit.farthest_node, z_of[i], static_cast<std::int32_t>(i)};
+      } else if (z_of[i] > lit.z) {
+        lit.z = z_of[i];
+        lit.node = static_cast<std::int32_t>(i);
+      }
     }
     parallel_chunks(nodes_.size(), [&](std::size_t i) {
       if (cell_of[i] < 0) return;
@@ -201,6 +235,29 @@ float tally(const std::vector<Link>& links, const std::vector<float>& belief) {
   return total + best;
 }
 
+/// What the stated deviations must be multiplied with so that cameras disagree as they should: 1.48
+/// times the median of the absolute normalised differences is 1 for normal errors.
+double sigma_scale(const Links& links) {
+  constexpr double kUsual = 1.7;  // of the rendered scenes, where one camera is all there is
+  std::vector<float> ratios;
+  for (const auto& of_node : links.support) {
+    for (const Link& link : of_node) ratios.push_back(link.disagreement);
+  }
+  constexpr std::size_t kEnough = 200;
+  if (ratios.size() < kEnough) return kUsual;
+  const auto middle = ratios.begin() + static_cast<std::ptrdiff_t>(ratios.size() / 2);
+  std::nth_element(ratios.begin(), middle, ratios.end());
+  return 1.4826 * static_cast<double>(*middle);
+}
+
+constexpr double kUnseenErrors = 1.15;  // what the cameras have in common, as a factor
+
+void scale_sigma(double factor, std::span<DepthMap> maps) {
+  for (DepthMap& map : maps) {
+    for (DepthNode& node : map.nodes) node.sigma *= static_cast<float>(factor);
+  }
+}
+
 /// Measured nodes next to node i of one map that continue its surface.
 template <typename Visit>
 void for_each_neighbor(const DepthMap& map, std::size_t i, int reach, Visit&& visit) {
@@ -224,6 +281,55 @@ void for_each_neighbor(const DepthMap& map, std::size_t i, int reach, Visit&& vi
       if (std::abs(step) < limit) visit(j);
     }
   }
+}
+
+/// What the fit of a window cannot see: on a slanted surface the quadric bends more within it, and
+/// at the rim it leans on one side. Factors from rendered bunny, hand and balls.
+void widen_uncertain(const Rig& rig, std::span<DepthMap> maps) {
+  constexpr double kSlanted = 0.6;  // cosine of the incidence below which slant shows
+  for (DepthMap& map : maps) {
+    const Vec3 eye = rig.cameras[static_cast<std::size_t>(map.camera)].center();
+    std::vector<float> factor(map.nodes.size(), 1.F);
+    parallel_chunks(map.nodes.size(), [&](std::size_t i) {
+      if (!map.nodes[i].measured()) return;
+      int neighbors = 0;
+      for_each_neighbor(map, i, 1, [&](std::size_t) { ++neighbors; });
+      const double cosine =
+          (eye - node_point(rig, map, i)).normalized().dot(node_normal(rig, map, i));
+      const double slant = 1 + 0.5 * std::clamp((kSlanted - cosine) / 0.2, 0.0, 1.0);
+      const double rim = neighbors >= 7 ? 1 : neighbors >= 2 ? 1.3 : 1.8;
+      factor[i] = static_cast<float>(slant * rim);
+    });
+    for (std::size_t i = 0; i < factor.size(); ++i) map.nodes[i].sigma *= factor[i];
+  }
+}
+
+/// Lines of one projector fit a surface that is off by a whole line as well as the true one. So a
+/// node that shows one projector only, and that no other camera confirms, must continue into its
+/// neighbours, on nearly all sides where no labelled curve passes through it.
+std::size_t drop_lone(const Comparison& comparison, std::span<DepthMap> maps) {
+  constexpr int kLeastNeighbors = 3;
+  constexpr int kLeastNeighborsGrown = 7;
+  constexpr float kMisfit = 2.5F;
+  std::vector<char> drop(comparison.nodes().size(), 0);
+  parallel_chunks(drop.size(), [&](std::size_t i) {
+    const Node& node = comparison.nodes()[i];
+    const DepthNode& n = maps[node.map].nodes[node.index];
+    if (!n.measured() || std::popcount(n.lit) > 1 || n.support > 0.01F) return;
+    int neighbors = 0;
+    for_each_neighbor(maps[node.map], node.index, 1, [&](std::size_t) { ++neighbors; });
+    const int least = n.seeded ? kLeastNeighbors : kLeastNeighborsGrown;
+    drop[i] = neighbors < least || n.misfit > kMisfit ? 1 : 0;
+  });
+  std::size_t dropped = 0;
+  for (std::size_t i = 0; i < drop.size(); ++i) {
+    if (drop[i] == 0) continue;
+    DepthNode& n = maps[comparison.nodes()[i].map].nodes[comparison.nodes()[i].index];
+    n.w = 0;
+    n.reason = HoleReason::kOneProjector;
+    ++dropped;
+  }
+  return dropped;
 }
 
 std::size_t drop_islands(const ConsistencyOptions& options, std::span<const char> supported,
@@ -276,6 +382,7 @@ Vec3 node_normal(const Rig& rig, const DepthMap& map, std::size_t node) {
 ConsistencyReport check_consistency(const Rig& rig, std::span<const int> pattern_projector,
                                     std::span<DepthMap> maps, const ConsistencyOptions& options) {
   ConsistencyReport report;
+  widen_uncertain(rig, maps);
   const Comparison comparison(rig, pattern_projector, maps, options);
   const Links links = comparison.compare();
   const std::size_t count = comparison.nodes().size();
@@ -308,11 +415,15 @@ ConsistencyReport check_consistency(const Rig& rig, std::span<const int> pattern
     DepthNode& n = maps[node.map].nodes[node.index];
     supported[i] = support[i] > 0.5F;
     n.confidence = belief[i];
+    n.support = support[i];
     if (belief[i] >= static_cast<float>(options.min_confidence)) continue;
     n.w = 0;
     n.reason = HoleReason::kContradicted;
     ++report.contradicted;
   }
+  report.sigma_scale = sigma_scale(links);
+  scale_sigma(kUnseenErrors * std::clamp(report.sigma_scale, 1 / kUnseenErrors, 4.0), maps);
+  report.unconfirmed = drop_lone(comparison, maps);
   for (std::size_t m = 0; m < maps.size(); ++m)
     report.islands += drop_islands(options, supported, comparison, m, maps[m]);
   return report;

@@ -18,7 +18,9 @@ struct ConsistencyOptions {
 };
 
 struct ConsistencyReport {
+  double sigma_scale = 1;        ///< by which the cameras' disagreement exceeds what sigma says
   std::size_t contradicted = 0;  ///< nodes removed
+  std::size_t unconfirmed = 0;   ///< nodes of one projector removed, as no one confirms them
   std::size_t islands = 0;       ///< nodes removed as small islands
 };
 

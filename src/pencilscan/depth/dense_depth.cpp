@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <opencv2/core.hpp>
 
 #include "pencilscan/depth/seeds.h"
 
@@ -61,6 +62,20 @@ Quadric shifted(const DepthNode& n, double dx, double dy, int half) {
   q[4] = h * h * wxy;
   q[5] = 0.5 * h * h * wyy;
   return q;
+}
+
+/// Nodes without depth whose windows are overexposed for the most part.
+void mark_saturated(const CameraLight& light, int half, DepthMap& map) {
+  for (std::size_t i = 0; i < map.nodes.size(); ++i) {
+    if (map.nodes[i].measured()) continue;
+    const int u = static_cast<int>(map.pixel(i)[0]);
+    const int v = static_cast<int>(map.pixel(i)[1]);
+    if (light.valid.at<std::uint8_t>(v, u) != 0) continue;
+    const cv::Rect window = cv::Rect(u - half, v - half, 2 * half + 1, 2 * half + 1) &
+                            cv::Rect(0, 0, light.valid.cols, light.valid.rows);
+    if (2 * cv::countNonZero(light.valid(window)) < window.area())
+      map.nodes[i].reason = HoleReason::kSaturated;
+  }
 }
 
 double cost(const WindowFit& fit) { return static_cast<double>(fit.misfit); }
@@ -181,7 +196,9 @@ DepthMap dense_depth(const CameraLight& light, int camera, std::span<const Measu
         best = fit;
       }
     }
-    if (best) map.nodes[i] = node_of(*best, options.half);
+    if (!best) continue;
+    map.nodes[i] = node_of(*best, options.half);
+    map.nodes[i].seeded = true;
   }
   // Outwards from solved nodes, in rounds.
   std::vector<std::size_t> front;
@@ -224,6 +241,7 @@ DepthMap dense_depth(const CameraLight& light, int camera, std::span<const Measu
       front.push_back(j);
     }
   }
+  mark_saturated(light, options.half, map);
   return map;
 }
 

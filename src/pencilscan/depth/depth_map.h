@@ -30,7 +30,10 @@ struct DepthNode {
   float sigma = 0;        ///< mm of camera z, one standard deviation
   float misfit = 0;       ///< residual over what noise explains (1 = only noise)
   std::uint64_t lit = 0;  ///< bit per pattern (flat index) whose light was found
-  float confidence = 0;   ///< 0..1: what the other views say
+  float support = 0;      ///< number of other cameras that agree, each by its own confidence
+  bool seeded =
+      false;  ///< started from a labelled curve of a pattern found here, not from neighbours
+  float confidence = 0;  ///< 0..1: what the other views say
   HoleReason reason = HoleReason::kBackground;
 
   [[nodiscard]] bool measured() const { return w > 0; }

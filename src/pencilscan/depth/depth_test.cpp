@@ -8,6 +8,7 @@
 
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/core/random.h"
+#include "pencilscan/depth/depth_image.h"
 #include "pencilscan/depth/seeds.h"
 #include "pencilscan/simulation/panel_light.h"
 #include "pencilscan/simulation/render.h"
@@ -230,6 +231,48 @@ TEST(DenseDepth, BlurIsFound) {
   // Sensor 0.6 px and the pixel's own box, 0.29 px.
   for (const CameraDepthReport& camera : result.report.cameras)
     EXPECT_NEAR(camera.blur_px, std::hypot(0.6, 0.29), 0.12);
+}
+
+TEST(DenseDepth, SigmaTellsTheError) {
+  const BallScene& scene = ball_scene();
+  std::size_t below_one = 0;
+  std::size_t below_two = 0;
+  std::size_t count = 0;
+  const DepthResult result = scene.measure();
+  for (const DepthMap& map : result.maps) {
+    for (std::size_t i = 0; i < map.nodes.size(); ++i) {
+      if (!map.nodes[i].measured()) continue;
+      const Vec2 pixel = map.pixel(i);
+      const double z = scene.truth[static_cast<std::size_t>(map.camera)].depth.at<double>(
+          static_cast<int>(pixel[1]), static_cast<int>(pixel[0]));
+      if (!std::isfinite(z)) continue;
+      const double error = std::abs(1 / static_cast<double>(map.nodes[i].w) - z);
+      const auto sigma = static_cast<double>(map.nodes[i].sigma);
+      below_one += error < sigma ? 1 : 0;
+      below_two += error < 2 * sigma ? 1 : 0;
+      ++count;
+    }
+  }
+  // 0.68 and 0.95 for a normal distribution; the rim of this small image has a heavier tail.
+  const double share = static_cast<double>(below_one) / static_cast<double>(count);
+  EXPECT_GT(share, 0.58);
+  EXPECT_LT(share, 0.80);
+  EXPECT_GT(static_cast<double>(below_two), 0.82 * static_cast<double>(count));
+}
+
+TEST(DepthImage, NodesAreInTheirPixelsAndHolesAreNaN) {
+  const BallScene& scene = ball_scene();
+  const DepthMap map = scene.measure().maps[0];
+  const DepthImage image = depth_image(scene.rig.cameras[0], map);
+  for (std::size_t i = 0; i < map.nodes.size(); ++i) {
+    const Vec2 pixel = map.pixel(i);
+    const float z = image.depth.at<float>(static_cast<int>(pixel[1]), static_cast<int>(pixel[0]));
+    if (map.nodes[i].measured()) {
+      EXPECT_FLOAT_EQ(z, 1 / map.nodes[i].w);
+    } else {
+      EXPECT_TRUE(std::isnan(z));
+    }
+  }
 }
 
 TEST(DenseDepth, SameBytesForAnyThreadCount) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <vector>
 
 #include "pencilscan/geometry/types.h"
@@ -14,6 +15,7 @@ struct TriangleMesh {
   std::vector<std::array<int, 3>> faces;  ///< counter-clockwise seen from outside
   std::vector<float> sigma;               ///< mm along the normal
   std::vector<float> confidence;          ///< 0..1
+  std::vector<std::uint8_t> hole;         ///< why nobody measured it (HoleReason of depth)
 };
 
 struct BoundingBox {

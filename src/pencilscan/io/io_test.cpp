@@ -275,6 +275,44 @@ TEST_F(Io, ObjStlAndOffGiveOneClosedTetrahedron) {
   }
 }
 
+TEST_F(Io, ExportedMeshesAreReadBack) {
+  const TriangleMesh ball = make_sphere(30, 8, Vec3(5, 6, 7));
+  for (const char* name : {"ball.obj", "ball.stl"}) {
+    export_mesh(folder_ / name, ball);
+    const TriangleMesh read = read_mesh(folder_ / name);
+    EXPECT_EQ(read.vertices.size(), ball.vertices.size()) << name;
+    EXPECT_EQ(count_edges(read).boundary, 0U) << name;
+    // Five decimals in the text, floats in the binary file.
+    EXPECT_NEAR(signed_volume(read), signed_volume(ball), 1e-4 * signed_volume(ball)) << name;
+  }
+  EXPECT_THROW(export_mesh(folder_ / "ball.xyz", ball), InputError);
+}
+
+TEST_F(Io, GlbIsInMetresWithYUp) {
+  const TriangleMesh box = make_box(Vec3(100, 200, 300), Vec3(0, 0, 150));
+  export_mesh(folder_ / "box.glb", box);
+  const std::string bytes = read_file(folder_ / "box.glb");
+  const auto word = [&](std::size_t at) {
+    std::uint32_t value = 0;
+    for (std::size_t k = 4; k-- > 0;)
+      value = value << 8U | static_cast<std::uint8_t>(bytes[at + k]);
+    return value;
+  };
+  EXPECT_EQ(bytes.substr(0, 4), "glTF");
+  EXPECT_EQ(word(4), 2U);
+  EXPECT_EQ(word(8), bytes.size());
+  const std::uint32_t text = word(12);
+  EXPECT_EQ(text % 4, 0U);
+  const auto root = nlohmann::json::parse(bytes.substr(20, text));
+  EXPECT_EQ(word(20 + text) % 4, 0U);
+  const auto& position = root["accessors"][0];
+  EXPECT_NEAR(position["max"][1].get<double>(), 0.3, 1e-6);  // world z
+  EXPECT_NEAR(position["min"][1].get<double>(), 0, 1e-6);
+  EXPECT_NEAR(position["max"][2].get<double>(), 0.1, 1e-6);  // world -y
+  EXPECT_EQ(root["accessors"][2]["count"], 3 * box.faces.size());
+  EXPECT_GE(root["buffers"][0]["byteLength"], 24 * box.vertices.size() + 12 * box.faces.size());
+}
+
 TEST_F(Io, UnusableMeshesAreRejected) {
   const std::string vertices =
       "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"

@@ -162,6 +162,8 @@ void write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh) {
   const bool has_confidence = !mesh.confidence.empty();
   PENCILSCAN_CHECK(!has_sigma || mesh.sigma.size() == mesh.vertices.size());
   PENCILSCAN_CHECK(!has_confidence || mesh.confidence.size() == mesh.vertices.size());
+  const bool has_hole = !mesh.hole.empty();
+  PENCILSCAN_CHECK(!has_hole || mesh.hole.size() == mesh.vertices.size());
   std::string bytes;
   for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
     for (int axis = 0; axis < 3; ++axis) {
@@ -169,6 +171,7 @@ void write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh) {
     }
     if (has_sigma) append_little_endian(bytes, mesh.sigma[i]);
     if (has_confidence) append_little_endian(bytes, mesh.confidence[i]);
+    if (has_hole) append_little_endian(bytes, mesh.hole[i]);
   }
   for (const auto& face : mesh.faces) {
     append_little_endian(bytes, std::uint8_t{3});
@@ -180,6 +183,7 @@ void write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh) {
            << "\nproperty float x\nproperty float y\nproperty float z\n";
     if (has_sigma) stream << "property float sigma\n";
     if (has_confidence) stream << "property float confidence\n";
+    if (has_hole) stream << "property uchar hole\n";
     stream << "element face " << mesh.faces.size()
            << "\nproperty list uchar int vertex_indices\nend_header\n"
            << bytes;

@@ -11,8 +11,13 @@ namespace pencilscan {
 /// without faces or with non-finite vertices.
 [[nodiscard]] TriangleMesh read_mesh(const std::filesystem::path& path);
 
-/// Binary little-endian PLY: float x y z, optional float sigma, confidence; triangles. Whole or not
-/// at all.
+/// Binary little-endian PLY: float x y z, optional float sigma, confidence, uchar hole; triangles.
+/// Whole or not at all.
 void write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh);
+
+/// Writes for other programs, by the ending: .obj (text, mm), .stl (binary, mm) or .glb (glTF 2.0
+/// binary: metres, y up, as glTF wants it), positions and triangles only. Whole or not at all.
+/// InputError for another ending.
+void export_mesh(const std::filesystem::path& path, const TriangleMesh& mesh);
 
 }  // namespace pencilscan

@@ -104,7 +104,14 @@ ShapeResult measure_shape(const Rig& rig, const Frame& frame, const PointResult&
     const Stopwatch surface_watch;
     result.surface = fuse_depth(rig, points.points, result.depth.maps, options.fusion);
     result.times.push_back({"surface", surface_watch.seconds()});
-    if (result.surface.report.status != SurfaceStatus::kTooFewPoints) return result;
+    if (result.surface.report.status != SurfaceStatus::kTooFewPoints) {
+      const Stopwatch hole_watch;
+      result.holes = explain_holes(rig, result.surface.mesh, result.depth.maps);
+      for (const HoleReason reason : result.holes.vertices)
+        result.surface.mesh.hole.push_back(static_cast<std::uint8_t>(reason));
+      result.times.push_back({"holes", hole_watch.seconds()});
+      return result;
+    }
   }
   const Stopwatch surface_watch;
   result.surface = reconstruct_surface(rig, points.points, options.surface);

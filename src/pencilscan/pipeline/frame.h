@@ -12,6 +12,7 @@
 #include "pencilscan/solution/second_look.h"
 #include "pencilscan/solution/settle.h"
 #include "pencilscan/solution/triangulate.h"
+#include "pencilscan/surface/holes.h"
 #include "pencilscan/surface/surface.h"
 
 namespace pencilscan {
@@ -63,6 +64,7 @@ struct PointResult {
 /// Dense depth and surface of one frame.
 struct ShapeResult {
   DepthResult depth;  ///< empty where it is off
+  HoleReport holes;   ///< empty without dense depth
   SurfaceResult surface;
   std::vector<StageTime> times;
 };

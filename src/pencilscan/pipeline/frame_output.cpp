@@ -91,17 +91,32 @@ ordered_json component_report(const Rig& rig, const ComponentReport& component) 
   return report;
 }
 
-ordered_json depth_report(const Rig& rig, const DepthReport& depth) {
+/// Nodes of one camera by why they have no depth; the background is left out.
+ordered_json hole_counts(const std::array<std::size_t, kHoleReasons>& nodes) {
+  ordered_json counts;
+  for (std::size_t k = 0; k < kHoleReasons; ++k) {
+    const auto reason = static_cast<HoleReason>(k);
+    if (reason == HoleReason::kBackground || reason == HoleReason::kNotSeen) continue;
+    counts[to_string(reason)] = nodes[k];
+  }
+  return counts;
+}
+
+ordered_json depth_report(const Rig& rig, const DepthReport& depth, const HoleReport& holes) {
   ordered_json report;
+  report["sigma_scale"] = number(depth.consistency.sigma_scale);
+  report["nodes_unconfirmed"] = depth.consistency.unconfirmed;
   report["nodes_contradicted"] = depth.consistency.contradicted;
   report["nodes_in_small_islands"] = depth.consistency.islands;
   report["cameras"] = ordered_json::array();
-  for (const CameraDepthReport& camera : depth.cameras) {
-    report["cameras"].push_back(
-        {{"name", rig.cameras[static_cast<std::size_t>(camera.camera)].name},
-         {"nodes_measured", camera.measured},
-         {"blur_px", number(camera.blur_px)},
-         {"sigma_median_mm", number(camera.sigma_median_mm)}});
+  for (std::size_t i = 0; i < depth.cameras.size(); ++i) {
+    const CameraDepthReport& camera = depth.cameras[i];
+    ordered_json entry = {{"name", rig.cameras[static_cast<std::size_t>(camera.camera)].name},
+                          {"nodes_measured", camera.measured},
+                          {"blur_px", number(camera.blur_px)},
+                          {"sigma_median_mm", number(camera.sigma_median_mm)}};
+    if (i < holes.nodes.size()) entry["nodes"] = hole_counts(holes.nodes[i]);
+    report["cameras"].push_back(entry);
   }
   return report;
 }
@@ -168,7 +183,8 @@ nlohmann::ordered_json frame_report(const Rig& rig, const Frame& frame, const Po
   for (const ComponentReport& component : points.labeling.components) {
     report["components"].push_back(component_report(rig, component));
   }
-  if (!shape.depth.maps.empty()) report["depth"] = depth_report(rig, shape.depth.report);
+  if (!shape.depth.maps.empty())
+    report["depth"] = depth_report(rig, shape.depth.report, shape.holes);
   const SurfaceReport& s = shape.surface.report;
   report["surface"] = {{"status", to_string(s.status)},
                        {"points_used", s.points_used},
@@ -179,6 +195,11 @@ nlohmann::ordered_json frame_report(const Rig& rig, const Frame& frame, const Po
                        {"boundary_edges", s.edges.boundary},
                        {"non_manifold_edges", s.edges.non_manifold},
                        {"measured_share", number(s.measured_share)}};
+  if (!shape.holes.vertices.empty()) {
+    ordered_json& area = report["surface"]["area_mm2"];
+    for (std::size_t k = 1; k < kHoleReasons; ++k)
+      area[to_string(static_cast<HoleReason>(k))] = number(shape.holes.area_mm2[k]);
+  }
   report["warnings"] = points.warnings;
   for (const std::string& warning : s.warnings) report["warnings"].push_back(warning);
   return report;

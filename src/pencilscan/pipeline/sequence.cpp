@@ -7,6 +7,7 @@
 #include "pencilscan/core/stopwatch.h"
 #include "pencilscan/io/file.h"
 #include "pencilscan/io/mesh_file.h"
+#include "pencilscan/pipeline/depth_output.h"
 #include "pencilscan/pipeline/frame_files.h"
 #include "pencilscan/pipeline/frame_output.h"
 
@@ -110,9 +111,13 @@ void reconstruct_frame(const Rig& rig, const FrameFiles& files, const fs::path& 
   write_points(folder / "points.ply", points.points);
   write_mesh(folder / "mesh.ply", surface.mesh);
   write_mesh(folder / "mesh_measured.ply", surface.measured);
+  for (const std::string& format : options.mesh_formats)
+    export_mesh(folder / ("mesh." + format), surface.mesh);
+  if (options.depth_maps) write_depth_maps(folder, rig, shape);
   if (options.pictures) {
     const Stopwatch picture_watch;
     write_frame_pictures(folder / "pictures", rig, frame, points, shape);
+    write_hole_pictures(folder / "pictures", rig, shape);
     points.times.push_back({"pictures", picture_watch.seconds()});
   }
   ordered_json timing;

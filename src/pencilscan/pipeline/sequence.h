@@ -13,7 +13,9 @@ struct SequenceOptions {
   PointOptions points;
   ShapeOptions shape;
   bool pictures = true;
-  bool overwrite = false;   ///< replace the results of other inputs or options
+  bool depth_maps = false;                ///< depth/ and sigma/ of every camera
+  std::vector<std::string> mesh_formats;  ///< of obj, stl, glb: the closed mesh once more
+  bool overwrite = false;                 ///< replace the results of other inputs or options
   std::string description;  ///< of the options: output of another description is not resumed
 };
 

@@ -43,6 +43,7 @@ TriangleMesh submesh(const TriangleMesh& mesh, std::span<const char> keep_face) 
     part.vertices.push_back(mesh.vertices[v]);
     if (!mesh.sigma.empty()) part.sigma.push_back(mesh.sigma[v]);
     if (!mesh.confidence.empty()) part.confidence.push_back(mesh.confidence[v]);
+    if (!mesh.hole.empty()) part.hole.push_back(mesh.hole[v]);
   }
   for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
     if (!keep_face[f]) continue;

@@ -59,7 +59,7 @@ std::vector<char> judge_samples(const Rig& rig, const SurfaceOptions& options, S
 /// Samples of the depth maps' nodes; the spacing is the distance of nodes on the surface.
 std::vector<SurfaceSample> dense_samples(const Rig& rig, std::span<const DepthMap> maps,
                                          double& spacing) {
-  constexpr double kLeastCosine = 0.3;   // stretches the spacing of grazing nodes no further
+  constexpr double kLeastCosine = 0.7;   // stretches the spacing of grazing nodes no further
   constexpr double kLeastSigma = 0.005;  // mm; keeps one node from ruling its neighbours
   std::vector<SurfaceSample> samples;
   std::vector<double> spacings;

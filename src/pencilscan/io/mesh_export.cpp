@@ -1,0 +1,145 @@
+#include <algorithm>
+#include <cctype>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "pencilscan/core/error.h"
+#include "pencilscan/io/file.h"
+#include "pencilscan/io/little_endian.h"
+#include "pencilscan/io/mesh_file.h"
+
+namespace pencilscan {
+namespace {
+
+std::string obj_text(const TriangleMesh& mesh) {
+  std::string text = "# unit mm\n";
+  char line[96];
+  for (const Vec3& v : mesh.vertices) {
+    std::snprintf(line, sizeof line, "v %.5f %.5f %.5f\n", v[0], v[1], v[2]);
+    text += line;
+  }
+  for (const auto& f : mesh.faces) {
+    std::snprintf(line, sizeof line, "f %d %d %d\n", f[0] + 1, f[1] + 1, f[2] + 1);
+    text += line;
+  }
+  return text;
+}
+
+void append_vector(std::string& bytes, const Vec3& v) {
+  for (int axis = 0; axis < 3; ++axis) append_little_endian(bytes, static_cast<float>(v[axis]));
+}
+
+std::string stl_bytes(const TriangleMesh& mesh) {
+  std::string bytes = "binary STL, unit mm";
+  bytes.resize(80, ' ');
+  append_little_endian(bytes, static_cast<std::uint32_t>(mesh.faces.size()));
+  for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
+    append_vector(bytes, face_normal(mesh, f));
+    for (const int v : mesh.faces[f])
+      append_vector(bytes, mesh.vertices[static_cast<std::size_t>(v)]);
+    append_little_endian(bytes, std::uint16_t{0});
+  }
+  return bytes;
+}
+
+/// World z up in mm -> glTF's y up in m: (x, z, -y) / 1000.
+Vec3 gltf_position(const Vec3& v) { return Vec3(v[0], v[2], -v[1]) / 1000; }
+
+/// glTF 2.0, "GLB File Format Specification": a header, a chunk of JSON padded with spaces and one
+/// of binary data padded with zeros, each to four bytes.
+std::string glb_bytes(const TriangleMesh& mesh) {
+  using nlohmann::json;
+  std::string data;
+  Vec3 low = Vec3::Constant(1e30);
+  Vec3 high = -low;
+  for (const Vec3& v : mesh.vertices) {
+    const Vec3 p = gltf_position(v).cast<float>().cast<double>();
+    low = low.cwiseMin(p);
+    high = high.cwiseMax(p);
+    append_vector(data, p);
+  }
+  const std::size_t position_bytes = data.size();
+  const std::vector<Vec3> normals = vertex_normals(mesh);
+  for (const Vec3& n : normals) {
+    // Validators want unit normals, also of a vertex without area.
+    const Vec3 up(n[0], n[2], -n[1]);
+    append_vector(data, up.squaredNorm() > 0.5 ? up : Vec3::UnitY());
+  }
+  const std::size_t index_start = data.size();
+  for (const auto& f : mesh.faces) {
+    for (const int v : f) append_little_endian(data, static_cast<std::uint32_t>(v));
+  }
+  json root;
+  root["asset"] = {{"version", "2.0"}, {"generator", "pencilscan"}};
+  root["scene"] = 0;
+  root["scenes"] = json::array({{{"nodes", {0}}}});
+  root["nodes"] = json::array({{{"mesh", 0}, {"name", "surface"}}});
+  root["materials"] = json::array(
+      {{{"pbrMetallicRoughness", {{"metallicFactor", 0.0}, {"roughnessFactor", 0.8}}}}});
+  root["meshes"] =
+      json::array({{{"primitives", json::array({{{"attributes", {{"POSITION", 0}, {"NORMAL", 1}}},
+                                                 {"indices", 2},
+                                                 {"material", 0}}})}}});
+  root["buffers"] = json::array({{{"byteLength", data.size()}}});
+  constexpr int kArrayBuffer = 34962;
+  constexpr int kElementBuffer = 34963;
+  root["bufferViews"] = json::array(
+      {{{"buffer", 0}, {"byteOffset", 0}, {"byteLength", position_bytes}, {"target", kArrayBuffer}},
+       {{"buffer", 0},
+        {"byteOffset", position_bytes},
+        {"byteLength", position_bytes},
+        {"target", kArrayBuffer}},
+       {{"buffer", 0},
+        {"byteOffset", index_start},
+        {"byteLength", data.size() - index_start},
+        {"target", kElementBuffer}}});
+  constexpr int kFloat = 5126;
+  constexpr int kUnsignedInt = 5125;
+  root["accessors"] = json::array({{{"bufferView", 0},
+                                    {"componentType", kFloat},
+                                    {"count", mesh.vertices.size()},
+                                    {"type", "VEC3"},
+                                    {"min", {low[0], low[1], low[2]}},
+                                    {"max", {high[0], high[1], high[2]}}},
+                                   {{"bufferView", 1},
+                                    {"componentType", kFloat},
+                                    {"count", mesh.vertices.size()},
+                                    {"type", "VEC3"}},
+                                   {{"bufferView", 2},
+                                    {"componentType", kUnsignedInt},
+                                    {"count", 3 * mesh.faces.size()},
+                                    {"type", "SCALAR"}}});
+  std::string text = root.dump();
+  text.resize((text.size() + 3) / 4 * 4, ' ');
+  data.resize((data.size() + 3) / 4 * 4, '\0');
+  std::string bytes = "glTF";
+  append_little_endian(bytes, std::uint32_t{2});
+  append_little_endian(bytes, static_cast<std::uint32_t>(12 + 8 + text.size() + 8 + data.size()));
+  append_little_endian(bytes, static_cast<std::uint32_t>(text.size()));
+  bytes += "JSON" + text;
+  append_little_endian(bytes, static_cast<std::uint32_t>(data.size()));
+  bytes.append("BIN\0", 4);
+  return bytes + data;
+}
+
+}  // namespace
+
+void export_mesh(const std::filesystem::path& path, const TriangleMesh& mesh) {
+  std::string ending = path.extension().string();
+  std::transform(ending.begin(), ending.end(), ending.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  std::string bytes;
+  if (ending == ".obj") {
+    bytes = obj_text(mesh);
+  } else if (ending == ".stl") {
+    bytes = stl_bytes(mesh);
+  } else if (ending == ".glb") {
+    bytes = glb_bytes(mesh);
+  } else {
+    throw InputError(path.string(), "", ending, "a mesh is exported to .obj, .stl or .glb");
+  }
+  write_atomically(path, [&](std::ostream& stream) { stream << bytes; });
+}
+
+}  // namespace pencilscan

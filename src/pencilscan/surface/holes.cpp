@@ -1,0 +1,215 @@
+#include "pencilscan/surface/holes.h"
+
+#include <Eigen/LU>
+#include <algorithm>
+
+#include "pencilscan/core/parallel.h"
+#include "pencilscan/depth/pattern_view.h"
+#include "pencilscan/geometry/ray_scene.h"
+#include "pencilscan/surface/mesh_parts.h"
+
+namespace pencilscan {
+namespace {
+
+constexpr std::size_t kChunk = 256;
+constexpr double kOffSurface = 0.5;  // mm; keeps a ray's end off the surface it lies on
+
+/// What a camera could have measured at a place of the closed mesh.
+class Visibility {
+ public:
+  Visibility(const Rig& rig, const TriangleMesh& mesh, const HoleOptions& options)
+      : rig_(rig), scene_(mesh), options_(options) {
+    for (const Camera& camera : rig.cameras) {
+      std::vector<PatternView> views;
+      for (std::size_t p = 0; p < rig.projectors.size(); ++p) {
+        for (std::size_t k = 0; k < rig.projectors[p].patterns.size(); ++k)
+          views.emplace_back(rig, camera, static_cast<int>(p), static_cast<int>(k));
+      }
+      views_.push_back(std::move(views));
+    }
+  }
+
+  [[nodiscard]] const RayScene& scene() const { return scene_; }
+
+  [[nodiscard]] bool sees(const Vec3& eye, const Vec3& x, const Vec3& normal,
+                          double least_cosine) const {
+    if ((eye - x).normalized().dot(normal) < least_cosine) return false;
+    return scene_.visible(eye, x + kOffSurface * normal, kOffSurface);
+  }
+
+  /// Bit per projector that lights the place.
+  [[nodiscard]] std::uint64_t lighting(const Vec3& x, const Vec3& normal) const {
+    std::uint64_t lit = 0;
+    for (std::size_t p = 0; p < std::min<std::size_t>(rig_.projectors.size(), 64); ++p) {
+      const auto pixel = rig_.projectors[p].project(x);
+      if (!pixel || !rig_.projectors[p].contains(*pixel)) continue;
+      if (sees(rig_.projectors[p].center(), x, normal, options_.least_cosine))
+        lit |= std::uint64_t{1} << p;
+    }
+    return lit;
+  }
+
+  /// Reason from geometry alone for a place that camera c sees.
+  [[nodiscard]] HoleReason reason(std::size_t c, const Vec3& x, const Vec3& normal,
+                                  std::uint64_t lit) const {
+    if (lit == 0) return HoleReason::kNoProjector;
+    const Camera& camera = rig_.cameras[c];
+    if ((camera.center() - x).normalized().dot(normal) < options_.least_cosine)
+      return HoleReason::kTooCompressed;
+    const Vec3 local = camera.device_from_world * x;
+    const double w = 1 / local.z();
+    const Vec2 m = local.head<2>() * w;
+    const Eigen::Matrix2d jacobian = camera.K.topLeftCorner<2, 2>().inverse();
+    // Inverse depth of the tangent plane: w = omega . (x, y, 1), omega = n / (n . X).
+    const Vec3 n = camera.device_from_world.rotation * normal;
+    const Vec3 omega = n / n.dot(local);
+    const Vec2 slope = jacobian.transpose() * omega.head<2>();
+    std::uint64_t resolved = 0;
+    for (const PatternView& view : views_[c]) {
+      if (view.projector() >= 64 || ((lit >> view.projector()) & 1U) == 0) continue;
+      bool ok = false;
+      const WindowLines lines = view.lines(m, jacobian, w, ok);
+      if (!ok) continue;
+      const auto gradient = lines.gradient(static_cast<float>(w), static_cast<float>(slope[0]),
+                                           static_cast<float>(slope[1]));
+      if (static_cast<double>(gradient.norm()) * options_.least_spacing_px < 1)
+        resolved |= std::uint64_t{1} << view.projector();
+    }
+    if (resolved == 0) return HoleReason::kTooCompressed;
+    return (resolved & (resolved - 1)) == 0 ? HoleReason::kOneProjector : HoleReason::kAmbiguous;
+  }
+
+ private:
+  const Rig& rig_;
+  RayScene scene_;
+  HoleOptions options_;
+  std::vector<std::vector<PatternView>> views_;  ///< per camera
+};
+
+bool found_by_depth(HoleReason reason) {
+  return reason == HoleReason::kContradicted || reason == HoleReason::kSaturated;
+}
+
+void explain_nodes(const Rig& rig, const Visibility& visibility,
+                   const std::vector<Vec3>& face_normals, DepthMap& map) {
+  const auto c = static_cast<std::size_t>(map.camera);
+  parallel_for((map.nodes.size() + kChunk - 1) / kChunk, [&](std::size_t chunk) {
+    const std::size_t end = std::min(map.nodes.size(), (chunk + 1) * kChunk);
+    for (std::size_t i = chunk * kChunk; i < end; ++i) {
+      DepthNode& node = map.nodes[i];
+      if (node.measured() || found_by_depth(node.reason)) continue;
+      const auto hit = visibility.scene().first_hit(rig.cameras[c].ray(map.pixel(i)));
+      if (!hit) {
+        node.reason = HoleReason::kBackground;
+        continue;
+      }
+      const Vec3& normal = face_normals[hit->face];
+      const std::uint64_t lit = visibility.lighting(hit->point, normal);
+      if (node.reason == HoleReason::kOneProjector && lit != 0) continue;  // the depth stage knows
+      node.reason = visibility.reason(c, hit->point, normal, lit);
+    }
+  });
+}
+
+/// Later is more hopeful.
+int rank(HoleReason reason) {
+  switch (reason) {
+    case HoleReason::kNoProjector:
+      return 1;
+    case HoleReason::kTooCompressed:
+      return 2;
+    case HoleReason::kOneProjector:
+      return 3;
+    case HoleReason::kAmbiguous:
+      return 4;
+    case HoleReason::kSaturated:
+      return 5;
+    case HoleReason::kContradicted:
+      return 6;
+    default:
+      return 0;
+  }
+}
+
+HoleReason explain_vertex(const Rig& rig, const Visibility& visibility,
+                          std::span<const DepthMap> maps, const Vec3& x, const Vec3& normal) {
+  HoleReason best = HoleReason::kNotSeen;
+  const std::uint64_t lit = visibility.lighting(x, normal);
+  for (const DepthMap& map : maps) {
+    const auto c = static_cast<std::size_t>(map.camera);
+    const auto pixel = rig.cameras[c].project(x);
+    if (!pixel || !rig.cameras[c].contains(*pixel)) continue;
+    if (!visibility.sees(rig.cameras[c].center(), x, normal, 0.02)) continue;
+    HoleReason reason = visibility.reason(c, x, normal, lit);
+    const int column = static_cast<int>(std::lround((*pixel)[0] / map.stride));
+    const int row = static_cast<int>(std::lround((*pixel)[1] / map.stride));
+    if (row >= 0 && column >= 0 && row < map.rows && column < map.columns) {
+      const HoleReason known = map.nodes[map.index(row, column)].reason;
+      if (found_by_depth(known)) reason = known;
+    }
+    if (rank(reason) > rank(best)) best = reason;
+  }
+  return best;
+}
+
+}  // namespace
+
+HoleReport explain_holes(const Rig& rig, const TriangleMesh& mesh, std::span<DepthMap> maps,
+                         const HoleOptions& options) {
+  HoleReport report;
+  report.nodes.resize(maps.size());
+  if (mesh.faces.empty()) return report;
+  const Visibility visibility(rig, mesh, options);
+  std::vector<Vec3> face_normals(mesh.faces.size());
+  for (std::size_t f = 0; f < mesh.faces.size(); ++f) face_normals[f] = face_normal(mesh, f);
+  for (std::size_t m = 0; m < maps.size(); ++m) {
+    explain_nodes(rig, visibility, face_normals, maps[m]);
+    for (const DepthNode& node : maps[m].nodes)
+      ++report.nodes[m][static_cast<std::size_t>(node.reason)];
+  }
+  const std::vector<Vec3> normals = vertex_normals(mesh);
+  report.vertices.assign(mesh.vertices.size(), HoleReason::kMeasured);
+  parallel_for((mesh.vertices.size() + kChunk - 1) / kChunk, [&](std::size_t chunk) {
+    const std::size_t end = std::min(mesh.vertices.size(), (chunk + 1) * kChunk);
+    for (std::size_t v = chunk * kChunk; v < end; ++v) {
+      if (mesh.confidence.empty() || mesh.confidence[v] > 0) continue;
+      report.vertices[v] = explain_vertex(rig, visibility, maps, mesh.vertices[v], normals[v]);
+    }
+  });
+  // A face belongs to the reason of its first invented vertex.
+  for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
+    HoleReason reason = HoleReason::kMeasured;
+    for (const int v : mesh.faces[f]) {
+      const HoleReason of_vertex = report.vertices[static_cast<std::size_t>(v)];
+      if (reason == HoleReason::kMeasured) reason = of_vertex;
+    }
+    report.area_mm2[static_cast<std::size_t>(reason)] += face_area(mesh, f);
+  }
+  return report;
+}
+
+const char* to_string(HoleReason reason) {
+  switch (reason) {
+    case HoleReason::kBackground:
+      return "background";
+    case HoleReason::kMeasured:
+      return "measured";
+    case HoleReason::kNoProjector:
+      return "no_projector";
+    case HoleReason::kOneProjector:
+      return "one_projector";
+    case HoleReason::kTooCompressed:
+      return "too_compressed";
+    case HoleReason::kAmbiguous:
+      return "ambiguous";
+    case HoleReason::kContradicted:
+      return "contradicted";
+    case HoleReason::kSaturated:
+      return "saturated";
+    case HoleReason::kNotSeen:
+      return "not_seen";
+  }
+  return "unknown";
+}
+
+}  // namespace pencilscan
