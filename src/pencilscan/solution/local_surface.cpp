@@ -131,7 +131,8 @@ LocalSurface::LocalSurface(const Camera& camera, std::span<const MeasuredPoint> 
   const Vec3 center = camera.center();
   const Vec3 forward = camera.forward();
   const auto floor = static_cast<float>(options.floor_px / camera.K(0, 0));
-  for (const MeasuredPoint& p : points) {
+  for (std::size_t i = 0; i < points.size(); i += static_cast<std::size_t>(options.thinning)) {
+    const MeasuredPoint& p = points[i];
     const Vec3 way = Vec3(p.x, p.y, p.z) - center;
     const int x = std::clamp(static_cast<int>(p.u) / kCell, 0, cell_columns_ - 1);
     const int y = std::clamp(static_cast<int>(p.v) / kCell, 0, cell_rows_ - 1);

@@ -13,10 +13,11 @@ namespace pencilscan {
 struct LocalSurfaceOptions {
   double reach_px = 6;         ///< standard deviation of the weight of points around; > 0
   int step_px = 6;             ///< between patches; >= 1
+  int thinning = 3;            ///< every how many points are used: neighbours are alike; >= 1
   double floor_px = 0.1;       ///< error that every point has: depth in pixel footprints
   double curvature = 4e-3;     ///< prior deviation of quadratic terms, relative depth per reach^2
-  double alike_points = 6;     ///< neighbours on a curve that share one error
-  int min_points = 8;          ///< that agree
+  double alike_points = 2;     ///< thinned neighbours on a curve that share one error
+  int min_points = 4;          ///< that agree
   double min_agreement = 0.6;  ///< share of the points within twice the reach
 };
 
