@@ -51,11 +51,11 @@ ordered_json camera_report(const Rig& rig, const Frame& frame, const PointResult
     report["curve_sigma_median_px"] = number(*middle);
   }
   if (c < result.labeling.undecided.size()) {
-    const UndecidedPoints& undecided = result.labeling.undecided[c];
-    report["undecided_points"] = {{"no_crossing", undecided.no_crossing},
-                                  {"ambiguous", undecided.ambiguous},
-                                  {"contradicted", undecided.contradicted},
-                                  {"outside_volume", undecided.outside_volume}};
+    const auto points = undecided_points(result.labeling.undecided[c], result.labeling.runs[c]);
+    report["undecided_points"] = {{"no_crossing", points[0]},
+                                  {"ambiguous", points[1]},
+                                  {"contradicted", points[2]},
+                                  {"outside_volume", points[3]}};
   }
   report["saturated_pixels"] = result.detections[c].saturated_pixels;
   report["crosstalk_estimated"] = result.detections[c].unmixing.estimated;

@@ -130,17 +130,19 @@ float confidence_of(float margin) { return 1 / (1 + std::exp(0.13F - 0.52F * mar
 /// Runs of the decided pieces of one camera, and why the others are not.
 void write_decisions(const LabelledPieces& pieces, const std::vector<Decision>& decisions,
                      const JointOptions& options, std::vector<LabeledRun>& runs,
-                     std::vector<LabeledRun>& tentative, UndecidedPoints& undecided) {
+                     std::vector<LabeledRun>& tentative, std::vector<UndecidedRun>& undecided) {
   std::vector<char> is_crossed(decisions.size(), 0);
   for (const PieceCrossing& x : pieces.graph.crossings) {
     is_crossed[static_cast<std::size_t>(x.a)] = is_crossed[static_cast<std::size_t>(x.b)] = 1;
   }
   for (std::size_t p = 0; p < decisions.size(); ++p) {
     const CurvePiece& piece = pieces.graph.pieces[p];
-    const auto points = static_cast<std::size_t>(piece.end - piece.begin);
+    const auto leave = [&](UndecidedReason reason) {
+      undecided.push_back({piece.curve, piece.begin, piece.end, reason});
+    };
     const float confidence = confidence_of(decisions[p].margin);
     if (pieces.labels[p].empty()) {
-      undecided.outside_volume += points;
+      leave(UndecidedReason::kOutsideVolume);
       continue;
     }
     const bool is_sure = confidence >= static_cast<float>(options.min_confidence);
@@ -152,11 +154,9 @@ void write_decisions(const LabelledPieces& pieces, const std::vector<Decision>& 
                CurveLabel{label.pattern, label.line, static_cast<double>(label.line), confidence}});
       if (is_sure) continue;
     }
-    if (is_crossed[p] == 0) {
-      undecided.no_crossing += points;
-    } else {
-      (decisions[p].label < 0 ? undecided.contradicted : undecided.ambiguous) += points;
-    }
+    leave(is_crossed[p] == 0       ? UndecidedReason::kNoCrossing
+          : decisions[p].label < 0 ? UndecidedReason::kContradicted
+                                   : UndecidedReason::kAmbiguous);
   }
 }
 

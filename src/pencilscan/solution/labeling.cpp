@@ -135,6 +135,20 @@ float JointOptions::disagreement_cost() const {
   return static_cast<float>(-std::log(crossing_outliers));
 }
 
+std::array<std::size_t, 4> undecided_points(std::span<const UndecidedRun> undecided,
+                                            std::span<const LabeledRun> labelled) {
+  std::array<std::size_t, 4> points{};
+  for (const UndecidedRun& run : undecided) {
+    int left = run.end - run.begin;
+    for (const LabeledRun& other : labelled) {
+      if (other.curve == run.curve)
+        left -= std::max(0, std::min(run.end, other.end) - std::max(run.begin, other.begin));
+    }
+    points[static_cast<std::size_t>(run.reason)] += static_cast<std::size_t>(left);
+  }
+  return points;
+}
+
 std::optional<Method> method_from_name(std::string_view name) {
   if (name == "linear") return Method::kLinear;
   if (name == "multiview") return Method::kMultiview;

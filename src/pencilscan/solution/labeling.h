@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <optional>
 #include <span>
 #include <string>
@@ -44,12 +45,19 @@ struct LabeledRun {
   CurveLabel label;
 };
 
-/// Curve points that a solution left undecided, by reason.
-struct UndecidedPoints {
-  std::size_t no_crossing = 0;     ///< nothing crosses them, and their surroundings do not decide
-  std::size_t ambiguous = 0;       ///< several lines fit
-  std::size_t contradicted = 0;    ///< no line fits their crossings
-  std::size_t outside_volume = 0;  ///< no line meets their rays in the volume
+enum class UndecidedReason {
+  kNoCrossing,     ///< nothing crosses it, and its surroundings do not decide
+  kAmbiguous,      ///< several lines fit
+  kContradicted,   ///< no line fits its crossings
+  kOutsideVolume,  ///< no line meets its rays in the volume
+};
+
+/// A stretch of a curve that a solution left undecided; a second look may have labelled some of it.
+struct UndecidedRun {
+  int curve = 0;
+  int begin = 0;  ///< first point
+  int end = 0;    ///< one past the last
+  UndecidedReason reason = UndecidedReason::kAmbiguous;
 };
 
 /// Result of a solution over all cameras; curve points in no run are undecided.
@@ -57,9 +65,13 @@ struct Labeling {
   std::vector<std::vector<LabeledRun>> runs;  ///< per camera, ordered by (curve, begin), disjoint
   /// Per camera, the likeliest labels of undecided stretches; joint only.
   std::vector<std::vector<LabeledRun>> tentative;
-  std::vector<ComponentReport> components;  ///< linear and multi-view only
-  std::vector<UndecidedPoints> undecided;   ///< per camera; joint only
+  std::vector<ComponentReport> components;           ///< linear and multi-view only
+  std::vector<std::vector<UndecidedRun>> undecided;  ///< per camera; joint only
 };
+
+/// Points of undecided runs that no labelled run holds, per reason (the order of the enum).
+[[nodiscard]] std::array<std::size_t, 4> undecided_points(std::span<const UndecidedRun> undecided,
+                                                          std::span<const LabeledRun> labelled);
 
 enum class Method { kLinear, kMultiview, kJoint };
 [[nodiscard]] std::optional<Method> method_from_name(std::string_view name);
@@ -79,7 +91,7 @@ struct JointOptions {
   int passes = 2;                    ///< message passing, then what the cameras say of each other
   int rounds = 4;                    ///< of messages in a pass
   double damping = 0.3;              ///< share of the old message kept, [0, 1)
-  double min_confidence = 0.96;      ///< pieces below stay undecided
+  double min_confidence = 0.955;     ///< pieces below stay undecided
 
   /// Cost of a crossing whose planes do not meet.
   [[nodiscard]] float disagreement_cost() const;

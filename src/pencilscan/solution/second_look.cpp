@@ -231,6 +231,7 @@ std::vector<std::vector<char>> CameraLook::decided_points() const {
 void CameraLook::confirm_tentative() {
   const auto decided = decided_points();
   for (const LabeledRun& run : tentative_) {
+    if (run.label.confidence < static_cast<float>(options_.min_tentative)) continue;
     const Curve& curve = graph_.curves[static_cast<std::size_t>(run.curve)];
     const LineName name{run.label.pattern, run.label.line};
     const auto agrees = [&](int i) {

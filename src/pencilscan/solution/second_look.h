@@ -17,14 +17,15 @@ struct SecondLookOptions {
   double max_offset_px = 1.5;     ///< the same, px
   double max_sigma_px = 0.6;      ///< of points that are found anew
   double min_amplitude = 0.3;     ///< share of the amplitude of the lines around
-  int min_points = 5;             ///< of a new curve or a confirmed label, in a row
+  double min_tentative = 0.7;     ///< confidence of a tentative label that can be confirmed
+  int min_points = 4;             ///< of a new curve or a confirmed label, in a row
   int min_adopted = 10;           ///< of a part of an undecided stretch, in a row
   int min_whole = 6;              ///< of most of an undecided stretch, in a row
   double support_px = 16;         ///< within which lines around must be known ...
   double support_lines = 1.5;     ///< ... or so many line spacings, if those are more
   int min_support = 3;            ///< points of them
   int passes = 2;
-  float confidence = 0.98F;
+  float confidence = 0.99F;
 };
 
 /// What the labelled surface says of what the first look missed, per camera. Lines of all

@@ -11,8 +11,8 @@ namespace pencilscan {
 struct SettleOptions {
   LocalSurfaceOptions surface;
   double model_px = 0.05;  ///< what a quadratic patch misses: depth in pixel footprints, at tilt 0
-  double max_deviations = 6;           ///< from the surface around, in standard deviations; > 0
-  double min_alone_confidence = 0.99;  ///< of a point where nothing around shows one surface
+  double max_deviations = 6;            ///< from the surface around, in standard deviations; > 0
+  double min_alone_confidence = 0.995;  ///< of a point where nothing around shows one surface
 };
 
 /// Each point together with those around it: its depth becomes the mean, by variance, of its own
