@@ -5,7 +5,9 @@
 #include <optional>
 
 #include "pencilscan/core/parallel.h"
+#include "pencilscan/grid/local_ids.h"
 #include "pencilscan/solution/min_sum.h"
+#include "pencilscan/solution/next_lines.h"
 #include "pencilscan/solution/other_views.h"
 #include "pencilscan/solution/piece_labels.h"
 #include "pencilscan/solution/surroundings.h"
@@ -76,6 +78,29 @@ PairwiseEnergy pairwise_energy(const LabelledPieces& pieces, const JointOptions&
   return energy;
 }
 
+/// Where nothing crosses: pieces side by side are lines side by side.
+void add_order(const Rig& rig, const GridGraph& graph, const LabelledPieces& pieces,
+               PairwiseEnergy& energy) {
+  const Camera& camera = rig.cameras[static_cast<std::size_t>(graph.camera)];
+  for (const NextPiece& next : next_pieces(camera, graph, pieces.graph)) {
+    const auto& a = pieces.labels[static_cast<std::size_t>(next.a)];
+    const auto& b = pieces.labels[static_cast<std::size_t>(next.b)];
+    const Vec3 ray = camera.normalized_from_pixel(next.pixel.cast<double>()).homogeneous();
+    PatternRef known{-1, -1};
+    int order = 0;
+    add_edge(energy, next.a, next.b, a, b, [&](const PieceLabel& la, const PieceLabel& lb) {
+      if (!(la.pattern == known)) {  // labels are ordered by pattern
+        known = la.pattern;
+        const double depth = 1 / la.q.cast<double>().dot(ray);
+        order = line_order_sign(rig, camera, known, next.pixel.cast<double>(),
+                                next.tangent.cast<double>(), depth);
+        if (next.side < 0) order = -order;
+      }
+      return next_piece_cost(la, lb, order);
+    });
+  }
+}
+
 /// Beliefs as probabilities of each label; what is missing to 1 is "outlier".
 PieceBeliefs beliefs_of(const LabelledPieces& pieces, const std::vector<float>& costs) {
   constexpr float kTemperature = 2;  // loops count evidence more than once
@@ -121,6 +146,24 @@ std::vector<Decision> decisions_of(const LabelledPieces& pieces, const std::vect
     at += n;
   }
   return decisions;
+}
+
+/// Without crossings only the code tells lines apart: a piece is ambiguous where a line a whole
+/// period away is possible too.
+void leave_periodic(const Rig& rig, const LabelledPieces& pieces,
+                    std::vector<Decision>& decisions) {
+  for (std::size_t p = 0; p < decisions.size(); ++p) {
+    if (decisions[p].label < 0) continue;
+    const PieceLabel& best = pieces.labels[p][static_cast<std::size_t>(decisions[p].label)];
+    const int period = rig.projectors[static_cast<std::size_t>(best.pattern.projector)]
+                           .patterns[static_cast<std::size_t>(best.pattern.pattern)]
+                           .period();
+    for (const PieceLabel& other : pieces.labels[p]) {
+      const int apart = std::abs(other.line - best.line);
+      if (other.pattern == best.pattern && apart > 0 && apart % period == 0)
+        decisions[p].margin = 0;
+    }
+  }
 }
 
 /// Share of points that are right at this margin: a logistic fit over five rendered scenes (bunny
@@ -175,6 +218,7 @@ Labeling solve_joint(const Rig& rig, const std::vector<ColorFamily>& families,
     surroundings[g].emplace(rig.cameras[static_cast<std::size_t>(graphs[g].camera)], graphs[g],
                             pieces[g]);
     energies[g] = pairwise_energy(pieces[g], options);
+    if (lacks_crossings(pieces[g].graph)) add_order(rig, graphs[g], pieces[g], energies[g]);
   });
   std::vector<std::vector<Decision>> decisions(graphs.size());
   std::vector<PieceBeliefs> beliefs(graphs.size());
@@ -184,10 +228,13 @@ Labeling solve_joint(const Rig& rig, const std::vector<ColorFamily>& families,
       auto evidence = others.costs(g, beliefs);
       add(surroundings[g]->costs(beliefs[g]), evidence);
       set_unary(pieces[g], evidence, energies[g]);
+      // Order and code reach a piece over as many neighbours as the code is long, and more.
+      const int rounds = lacks_crossings(pieces[g].graph) ? 6 * options.rounds : options.rounds;
       const std::vector<float> costs =
-          min_sum(energies[g], options.rounds, static_cast<float>(options.damping));
+          min_sum(energies[g], rounds, static_cast<float>(options.damping));
       next[g] = beliefs_of(pieces[g], costs);
       decisions[g] = decisions_of(pieces[g], costs);
+      if (lacks_crossings(pieces[g].graph)) leave_periodic(rig, pieces[g], decisions[g]);
     });
     beliefs = std::move(next);
   }

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "pencilscan/core/random.h"
+#include "pencilscan/pattern/de_bruijn.h"
 #include "pencilscan/solution/line_sheets.h"
 #include "pencilscan/solution/min_sum.h"
 #include "pencilscan/solution/two_projector_scene.h"
@@ -154,6 +155,25 @@ TEST_F(JointScene, CurveThatJumpsToTheNextLineGetsBothLabels) {
   }
   EXPECT_GE(before, 2);
   EXPECT_GE(after, 2);
+}
+
+TEST_F(JointScene, LoneProjectorIsDecodedFromACodeThatIsUniqueInItsWindow) {
+  LinePattern& pattern = rig.projectors[0].patterns.front();
+  rig.projectors.resize(1);
+  families = color_families(rig);
+  const auto alone = [&] {
+    std::vector<GridGraph> graphs = {graph(0, 60, 0.2, 9)};
+    return shares(graphs);
+  };
+  // Seven symbols of two colours name one of 128 lines; three name one of eight, which is not
+  // enough.
+  EXPECT_LT(alone().first + alone().second, 0.02);
+  true_lines[0].clear();
+  pattern.order = 7;
+  pattern.sequence = de_bruijn_sequence(2, 7);
+  const auto [right, wrong] = alone();
+  EXPECT_GT(right, 0.9);
+  EXPECT_LT(wrong, 0.005);
 }
 
 }  // namespace

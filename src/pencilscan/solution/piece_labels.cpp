@@ -6,6 +6,8 @@
 #include <numbers>
 #include <tuple>
 
+#include "pencilscan/solution/next_lines.h"
+
 namespace pencilscan {
 namespace {
 
@@ -134,11 +136,14 @@ void keep_supported(LabelledPieces& pieces, const JointOptions& options) {
     for (std::size_t k = 0; k < scores[p].size(); ++k) scores[p][k] += pieces.labels[p][k].cost;
   }
   scores = along_curves(pieces, scores, options);
+  // Without crossings nothing tells them apart yet.
+  const auto max_labels =
+      static_cast<std::size_t>(options.max_labels) * (lacks_crossings(pieces.graph) ? 6U : 1U);
   for (std::size_t p = 0; p < pieces.labels.size(); ++p) {
     auto& labels = pieces.labels[p];
     std::vector<std::size_t> order(labels.size());
     for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
-    const std::size_t count = std::min(labels.size(), static_cast<std::size_t>(options.max_labels));
+    const std::size_t count = std::min(labels.size(), max_labels);
     std::partial_sort(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(count),
                       order.end(), [&](std::size_t i, std::size_t j) {
                         return scores[p][i] != scores[p][j] ? scores[p][i] < scores[p][j] : i < j;

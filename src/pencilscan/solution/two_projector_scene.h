@@ -49,7 +49,7 @@ struct TwoProjectorScene {
     GridGraph graph;
     graph.camera = camera;
     Random random(seed);
-    for (int p = 0; p < 2; ++p) {
+    for (int p = 0; p < static_cast<int>(rig.projectors.size()); ++p) {
       const Projector& projector = rig.projectors[static_cast<std::size_t>(p)];
       const LinePattern& pattern = projector.patterns.front();
       const auto axis = static_cast<Eigen::Index>(pattern.axis);

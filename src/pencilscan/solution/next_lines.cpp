@@ -1,0 +1,100 @@
+#include "pencilscan/solution/next_lines.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+namespace pencilscan {
+namespace {
+
+using Eigen::Vector2f;
+
+struct Place {
+  Vector2f pixel;
+  Vector2f tangent;
+  int curve;
+  int piece;
+};
+
+constexpr int kCell = 16;
+constexpr float kReachPx = 48;
+
+}  // namespace
+
+bool lacks_crossings(const PieceGraph& graph) {
+  return 10 * graph.crossings.size() < graph.pieces.size();
+}
+
+std::vector<NextPiece> next_pieces(const Camera& camera, const GridGraph& graph,
+                                   const PieceGraph& pieces) {
+  const int columns = camera.width / kCell + 1;
+  const int rows = camera.height / kCell + 1;
+  std::vector<std::vector<Place>> cells(static_cast<std::size_t>(columns * rows));
+  const auto column = [&](float x) {
+    return std::clamp(static_cast<int>(x) / kCell, 0, columns - 1);
+  };
+  const auto row = [&](float y) { return std::clamp(static_cast<int>(y) / kCell, 0, rows - 1); };
+  for (std::size_t p = 0; p < pieces.pieces.size(); ++p) {
+    const CurvePiece& piece = pieces.pieces[p];
+    for (int i = piece.begin; i < piece.end; ++i) {
+      const CurvePoint& point =
+          graph.curves[static_cast<std::size_t>(piece.curve)].points[static_cast<std::size_t>(i)];
+      cells[static_cast<std::size_t>(row(point.position.y()) * columns +
+                                     column(point.position.x()))]
+          .push_back({point.position, point.tangent(), piece.curve, static_cast<int>(p)});
+    }
+  }
+  std::vector<NextPiece> result;
+  std::set<std::pair<int, int>> seen;
+  for (std::size_t p = 0; p < pieces.pieces.size(); ++p) {
+    const CurvePiece& piece = pieces.pieces[p];
+    const Curve& curve = graph.curves[static_cast<std::size_t>(piece.curve)];
+    const CurvePoint& middle =
+        curve.points[static_cast<std::size_t>((piece.begin + piece.end) / 2)];
+    const Vector2f tangent = middle.tangent();
+    const Vector2f normal(tangent.y(), -tangent.x());
+    for (const float side : {1.F, -1.F}) {
+      float nearest = kReachPx;
+      const Place* found = nullptr;
+      const Vector2f& at = middle.position;
+      for (int y = row(at.y() - kReachPx); y <= row(at.y() + kReachPx); ++y) {
+        for (int x = column(at.x() - kReachPx); x <= column(at.x() + kReachPx); ++x) {
+          for (const Place& place : cells[static_cast<std::size_t>(y * columns + x)]) {
+            const Vector2f way = place.pixel - at;
+            const float across = side * way.dot(normal);
+            if (across < 1.5F || across >= nearest || std::abs(way.dot(tangent)) > 1) continue;
+            if (place.curve == piece.curve || std::abs(place.tangent.dot(tangent)) < 0.85F ||
+                graph.curves[static_cast<std::size_t>(place.curve)].family != curve.family)
+              continue;
+            nearest = across;
+            found = &place;
+          }
+        }
+      }
+      if (found == nullptr) continue;
+      const int a = static_cast<int>(p);
+      if (!seen.insert(std::minmax(a, found->piece)).second) continue;
+      result.push_back({a, found->piece, at, tangent, side});
+    }
+  }
+  return result;
+}
+
+float next_piece_cost(const PieceLabel& a, const PieceLabel& b, int order) {
+  constexpr float kNext = -1.5F;
+  constexpr float kOneMissed = 0.5F;
+  constexpr float kMoreMissed = 2;
+  constexpr float kWrongOrder = 3;
+  if (order == 0) return 0;
+  if (!(a.pattern == b.pattern)) return kMoreMissed;
+  switch ((b.line - a.line) * order) {
+    case 1:
+      return kNext;
+    case 2:
+      return kOneMissed;
+    default:
+      return (b.line - a.line) * order > 0 ? kMoreMissed : kWrongOrder;
+  }
+}
+
+}  // namespace pencilscan
