@@ -1,0 +1,49 @@
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "pencilscan/pipeline/frame.h"
+#include "pencilscan/refinement/refine_rig.h"
+
+namespace pencilscan {
+
+struct RigRefinementOptions {
+  PointOptions points;
+  /// Tolerance of the labels, projector px, one round of labelling and refining each: coarse while
+  /// the rig is wrong, fine at the end.
+  std::vector<double> tolerances_px = {2, 1, 0.5, 0.3};
+  TrackOptions tracks;
+  RefineRigOptions refine;
+};
+
+/// Labels and refinement at one tolerance.
+struct RefinementRound {
+  double tolerance_px = 0;
+  std::size_t tracks = 0;
+  CrossingDisagreement before;  ///< with the rig that the labels were made of
+  CrossingDisagreement after;
+};
+
+struct RigRefinement {
+  Rig rig;                 ///< as given where report.refined is false
+  RefineRigReport report;  ///< of the last round; "before" is the calibration as given
+  std::vector<RefinementRound> rounds;
+  std::vector<std::string> warnings;
+};
+
+/// Curves of one frame: what refinement needs of its images.
+struct FrameCurves {
+  std::vector<ColorFamily> families;
+  std::vector<GridGraph> graphs;  ///< per camera
+};
+
+/// Corrects the poses of the devices so that the crossings of labelled lines of all frames agree:
+/// joint labels with a wide tolerance, refinement of the rig, labels with a narrower one, and so
+/// on.
+[[nodiscard]] RigRefinement refine_rig_on_frames(const Rig& calibrated,
+                                                 std::span<const FrameCurves> frames,
+                                                 const RigRefinementOptions& options = {});
+
+}  // namespace pencilscan

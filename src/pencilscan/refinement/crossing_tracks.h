@@ -1,0 +1,66 @@
+#pragma once
+
+#include <array>
+#include <span>
+#include <vector>
+
+#include "pencilscan/solution/labeling.h"
+
+namespace pencilscan {
+
+/// A projected line as a measurement of its projector: points on it have this coordinate.
+struct LineOfProjector {
+  int projector = 0;
+  Axis axis = Axis::kColumn;
+  double coordinate_px = 0;
+};
+
+/// One camera's view of a surface point. whitening * (projected point - pixel) has unit covariance:
+/// its two rows are the distances from the two curves that cross there, over their deviations.
+struct CrossingSighting {
+  int camera = 0;
+  Vec2 pixel = Vec2::Zero();
+  Eigen::Matrix2d whitening = Eigen::Matrix2d::Identity();
+};
+
+/// A surface point where two projected lines cross, seen by one camera or several.
+struct CrossingTrack {
+  std::array<LineOfProjector, 2> lines;
+  std::vector<CrossingSighting> sightings;  ///< at least one, at most one per camera
+  Vec3 point = Vec3::Zero();                ///< in world, with the rig that the labels were made of
+
+  /// Equations that are left when the point is solved for.
+  [[nodiscard]] int redundancy() const { return 2 * static_cast<int>(sightings.size()) - 1; }
+};
+
+struct TrackOptions {
+  double position_factor = 2.2;  ///< real over fitted deviation of a curve: errors are alike along
+                                 ///< it (as TriangulationOptions)
+  double min_sigma_px = 0.05;    ///< of a curve; > 0
+  double same_family_sigma_px = 0.1;  ///< added where two curves of one colour cross: their
+                                      ///< profiles disturb each other
+  double merge_px = 4;  ///< views of one crossing are one point when it reprojects this closely
+  double max_sigma_mm =
+      2;  ///< crossings whose point is less certain for 1 px of error are left out
+};
+
+/// The crossings of labelled curves of one frame, those of the same two lines seen by several
+/// cameras joined. Ordered by lines, then camera: independent of the number of threads.
+[[nodiscard]] std::vector<CrossingTrack> crossing_tracks(const Rig& rig,
+                                                         std::span<const GridGraph> graphs,
+                                                         const Labeling& labeling,
+                                                         const TrackOptions& options = {});
+
+/// How far the two planes of labelled crossings miss each other on the camera ray, as the error
+/// that one of them would have to have: |w_a - w_b| / hypot(dw_a, dw_b), w the inverse depth
+/// and dw its change for one projector pixel (algebraically equation (5) of the paper, in projector
+/// px).
+struct CrossingDisagreement {
+  std::size_t crossings = 0;
+  double median_px = 0;
+  double expected_px = 0;  ///< median that the noise of the curves alone gives
+};
+[[nodiscard]] CrossingDisagreement crossing_disagreement(const Rig& rig,
+                                                         std::span<const CrossingTrack> tracks);
+
+}  // namespace pencilscan
