@@ -21,8 +21,19 @@ struct ReconstructOptions {
   bool no_depth = false;
   bool depth_maps = false;
   std::vector<std::string> mesh_formats;
+  bool refine_rig = false;
   bool overwrite = false;
 };
+
+void print_refinement(const RefinementOutcome& refinement, nlohmann::ordered_json& figures) {
+  for (const std::string& move : refinement.moves) std::cerr << "pencilscan: " << move << "\n";
+  for (const std::string& warning : refinement.warnings)
+    std::cerr << "pencilscan: warning: " << warning << "\n";
+  figures["rig_refined"] = refinement.refined;
+  if (!refinement.refined) return;
+  figures["crossing_disagreement_before_px"] = refinement.before_px;
+  figures["crossing_disagreement_after_px"] = refinement.after_px;
+}
 
 void reconstruct(const ReconstructOptions& options) {
   const ThreadLimit limit(options.common.threads);
@@ -33,6 +44,7 @@ void reconstruct(const ReconstructOptions& options) {
   // The paper's two methods keep their own, continuous planes: their surface rests on the curves.
   sequence.shape.depth.enabled =
       !options.no_depth && sequence.points.solution.method == Method::kJoint;
+  sequence.refine_rig = options.refine_rig;
   sequence.pictures = !options.no_pictures;
   sequence.depth_maps = options.depth_maps;
   sequence.mesh_formats = options.mesh_formats;
@@ -40,11 +52,13 @@ void reconstruct(const ReconstructOptions& options) {
   sequence.description = "method=" + options.method + " multiview-cost=" + options.cost +
                          " pictures=" + (options.no_pictures ? "no" : "yes") +
                          " depth=" + (sequence.shape.depth.enabled ? "yes" : "no") +
-                         " depth-maps=" + (options.depth_maps ? "yes" : "no");
+                         " depth-maps=" + (options.depth_maps ? "yes" : "no") +
+                         " refine-rig=" + (options.refine_rig ? "yes" : "no");
   for (const std::string& format : options.mesh_formats) sequence.description += " " + format;
-  const auto outcomes =
+  const auto [outcomes, refinement] =
       reconstruct_sequence(options.rig, options.frames, options.out, sequence, stderr_progress());
   nlohmann::ordered_json figures;
+  if (refinement) print_refinement(*refinement, figures);
   std::size_t failed = 0;
   for (const FrameOutcome& outcome : outcomes) {
     for (const std::string& warning : outcome.warnings) {
@@ -68,6 +82,9 @@ void reconstruct(const ReconstructOptions& options) {
   if (failed > 0) {
     throw StageError(std::to_string(failed) + " of " + std::to_string(outcomes.size()) +
                      " frames could not be reconstructed");
+  }
+  if (refinement && !refinement->refined) {
+    throw StageError("the rig could not be refined and was used as given: " + refinement->reason);
   }
 }
 
@@ -101,6 +118,8 @@ void add_reconstruct_command(CLI::App& app) {
                    "the closed mesh also as obj, stl or glb (several with commas)")
       ->delimiter(',')
       ->check(CLI::IsMember({"obj", "stl", "glb"}));
+  command->add_flag("--refine-rig", options->refine_rig,
+                    "correct the poses of the devices from the lines that cross in the frames");
   command->add_flag("--no-pictures", options->no_pictures, "leave overlays and views out");
   command->add_flag("--overwrite", options->overwrite, "replace output of other inputs or options");
   add_common_options(*command, options->common,

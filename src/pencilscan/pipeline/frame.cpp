@@ -1,5 +1,7 @@
 #include "pencilscan/pipeline/frame.h"
 
+#include <array>
+#include <cstdio>
 #include <utility>
 
 #include "pencilscan/core/parallel.h"
@@ -40,9 +42,19 @@ std::vector<std::string> detection_warnings(const Rig& rig, const Frame& frame,
   return warnings;
 }
 
+std::string disagreement_warning(const CrossingDisagreement& crossings) {
+  std::array<char, 200> text{};
+  std::snprintf(
+      text.data(), text.size(),
+      "crossing lines miss each other by %.2f projector pixels (median) where image noise "
+      "explains %.2f: the rig's calibration is off; --refine-rig can correct it",
+      crossings.median_px, crossings.expected_px);
+  return text.data();
+}
+
 }  // namespace
 
-PointResult measure_points(const Rig& rig, const Frame& frame, const PointOptions& options) {
+PointResult detect_frame(const Rig& rig, const Frame& frame, const PointOptions& options) {
   PointResult result;
   result.families = color_families(rig);
   const std::size_t cameras = rig.cameras.size();
@@ -67,10 +79,20 @@ PointResult measure_points(const Rig& rig, const Frame& frame, const PointOption
                                         std::move(result.detections[c].curves), grid);
   });
   result.times.push_back({"grid", grid_watch.seconds()});
+  return result;
+}
 
+PointResult measure_points(const Rig& rig, const Frame& frame, const PointOptions& options) {
+  PointResult result = detect_frame(rig, frame, options);
   Stopwatch solution_watch;
   result.labeling = solve(rig, result.families, result.graphs, options.solution);
   result.times.push_back({"solution", solution_watch.seconds()});
+  if (options.solution.method == Method::kJoint) {
+    const auto tracks = crossing_tracks(rig, result.graphs, result.labeling);
+    result.crossings = crossing_disagreement(rig, tracks);
+    if (disagrees(result.crossings))
+      result.warnings.push_back(disagreement_warning(result.crossings));
+  }
 
   if (options.solution.method == Method::kJoint) {
     Stopwatch second_look_watch;

@@ -8,6 +8,7 @@
 #include "pencilscan/detection/detect.h"
 #include "pencilscan/grid/grid_graph.h"
 #include "pencilscan/io/point_file.h"
+#include "pencilscan/refinement/crossing_tracks.h"
 #include "pencilscan/solution/labeling.h"
 #include "pencilscan/solution/second_look.h"
 #include "pencilscan/solution/settle.h"
@@ -51,10 +52,16 @@ struct PointResult {
   std::vector<CameraDetection> detections;  ///< per camera; curves have moved into the graphs
   std::vector<GridGraph> graphs;            ///< per camera
   Labeling labeling;
+  CrossingDisagreement crossings;  ///< joint only: the paper's two have none by construction
   std::vector<MeasuredPoint> points;
   std::vector<StageTime> times;
   std::vector<std::string> warnings;
 };
+
+/// The first half of measure_points(): curves and grid graphs, which do not depend on where the
+/// devices stand (joint), without labels and points.
+[[nodiscard]] PointResult detect_frame(const Rig& rig, const Frame& frame,
+                                       const PointOptions& options = {});
 
 /// The paper's Fig. 3 for one frame: detection and grid per camera, one solution over all cameras,
 /// triangulation.

@@ -179,6 +179,11 @@ nlohmann::ordered_json frame_report(const Rig& rig, const Frame& frame, const Po
   for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
     report["cameras"].push_back(camera_report(rig, frame, points, c));
   }
+  if (points.crossings.crossings > 0) {
+    report["crossing_disagreement"] = {{"crossings", points.crossings.crossings},
+                                       {"median_px", number(points.crossings.median_px)},
+                                       {"expected_px", number(points.crossings.expected_px)}};
+  }
   report["components"] = ordered_json::array();
   for (const ComponentReport& component : points.labeling.components) {
     report["components"].push_back(component_report(rig, component));

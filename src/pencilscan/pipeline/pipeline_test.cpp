@@ -93,7 +93,7 @@ class PipelineTest : public testing::Test {
 
   static std::vector<FrameOutcome> run(const fs::path& frames, const fs::path& out,
                                        const SequenceOptions& options) {
-    return reconstruct_sequence(*folder_ / "rig.json", frames, out, options);
+    return reconstruct_sequence(*folder_ / "rig.json", frames, out, options).frames;
   }
 
   static SequenceOptions quick() {
@@ -179,6 +179,58 @@ TEST_F(PipelineTest, ResumesItsOwnOutputAndRefusesThatOfOtherOptions) {
   EXPECT_EQ(read_file(out / "000000" / "report.json"), report);
   other.overwrite = true;
   EXPECT_TRUE(run(*folder_ / "frames", out, other).front().done);
+}
+
+TEST_F(PipelineTest, RefinedRigIsWrittenUsedAndResumed) {
+  const PoseCorrection one{{0.5, 0.7, -0.3}, {0.1, 0.1, 0.2}};
+  const PoseCorrection other{{-0.6, 0.5, 0.4}, {-0.1, 0.2, -0.1}};
+  const fs::path folder = *folder_ / "refine";
+  write_rig(corrected_rig(*rig_, {one, other, other, one}), folder / "rig.json");
+  SequenceOptions options = quick();
+  options.refine_rig = true;
+  options.shape.depth.enabled = false;
+  std::vector<std::string> rigs;
+  for (const int threads : {1, 2}) {
+    const ThreadLimit limit(threads);
+    const fs::path out = folder / ("out_" + std::to_string(threads));
+    const auto once = reconstruct_sequence(folder / "rig.json", *folder_ / "frames", out, options);
+    ASSERT_TRUE(once.frames.front().done) << once.frames.front().failure;
+    ASSERT_TRUE(once.refinement.value().refined) << once.refinement->reason;
+    EXPECT_GT(once.refinement->before_px, 0.2);
+    EXPECT_LT(once.refinement->after_px, 0.05);  // a perfect rig's, of images without noise: 0.02
+    EXPECT_EQ(once.refinement->moves.size(), 4U);
+    rigs.push_back(read_file(out / "rig.json"));
+  }
+  EXPECT_EQ(rigs[0], rigs[1]);
+  const fs::path out = folder / "out_1";
+  const auto again = reconstruct_sequence(folder / "rig.json", *folder_ / "frames", out, options);
+  EXPECT_TRUE(again.refinement.value().resumed);
+  EXPECT_TRUE(again.refinement->refined);
+  EXPECT_TRUE(again.frames.front().resumed);
+  EXPECT_EQ(read_file(out / "rig.json"), rigs[0]);
+}
+
+TEST_F(PipelineTest, RigOfOneProjectorIsNotRefinedAndStaysAsItIs) {
+  Rig rig = *rig_;
+  rig.projectors.pop_back();
+  const fs::path folder = *folder_ / "refuse";
+  write_rig(rig, folder / "rig.json");
+  SequenceOptions options = quick();
+  options.refine_rig = true;
+  options.shape.depth.enabled = false;
+  const auto outcome =
+      reconstruct_sequence(folder / "rig.json", *folder_ / "frames", folder / "out", options);
+  ASSERT_TRUE(outcome.refinement);
+  EXPECT_FALSE(outcome.refinement->refined);
+  EXPECT_THAT(outcome.refinement->reason, testing::HasSubstr("crossings"));
+  EXPECT_EQ(read_file(folder / "out" / "rig.json"), read_file(folder / "rig.json"));
+}
+
+TEST_F(PipelineTest, WrongRigIsToldFromATrueOne) {
+  const auto hint = testing::Contains(testing::HasSubstr("--refine-rig"));
+  EXPECT_THAT(measure_points(*rig_, *frame_).warnings, testing::Not(hint));
+  const Rig wrong = corrected_rig(*rig_, {{{0, 0.7, 0}, {}}, {}, {{0, 0.5, 0}, {}}, {}});
+  EXPECT_THAT(measure_points(wrong, *frame_).warnings, hint);
 }
 
 TEST_F(PipelineTest, MissingCameraIsAWarningAndNotAFailure) {

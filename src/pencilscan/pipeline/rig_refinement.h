@@ -1,7 +1,6 @@
 #pragma once
 
 #include <span>
-#include <string>
 #include <vector>
 
 #include "pencilscan/pipeline/frame.h"
@@ -11,9 +10,10 @@ namespace pencilscan {
 
 struct RigRefinementOptions {
   PointOptions points;
-  /// Tolerance of the labels, projector px, one round of labelling and refining each: coarse while
-  /// the rig is wrong, fine at the end.
-  std::vector<double> tolerances_px = {2, 1, 0.5, 0.3};
+  /// Tolerance of the labels in the first round, projector px: about the error of a line with the
+  /// rig as given. Each later round takes half of it or what the crossings then show; the last one
+  /// is that of solution.joint.
+  double first_tolerance_px = 2;
   TrackOptions tracks;
   RefineRigOptions refine;
 };
@@ -30,7 +30,6 @@ struct RigRefinement {
   Rig rig;                 ///< as given where report.refined is false
   RefineRigReport report;  ///< of the last round; "before" is the calibration as given
   std::vector<RefinementRound> rounds;
-  std::vector<std::string> warnings;
 };
 
 /// Curves of one frame: what refinement needs of its images.

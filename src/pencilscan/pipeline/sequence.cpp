@@ -1,6 +1,8 @@
 #include "pencilscan/pipeline/sequence.h"
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/parallel.h"
@@ -10,6 +12,7 @@
 #include "pencilscan/pipeline/depth_output.h"
 #include "pencilscan/pipeline/frame_files.h"
 #include "pencilscan/pipeline/frame_output.h"
+#include "pencilscan/pipeline/rig_refinement.h"
 
 namespace pencilscan {
 namespace {
@@ -18,6 +21,8 @@ namespace fs = std::filesystem;
 using nlohmann::ordered_json;
 
 constexpr const char* kInputsFile = "inputs.json";
+constexpr const char* kRigFile = "rig.json";
+constexpr const char* kRefinementFile = "refinement.json";
 
 std::string hex(std::uint64_t value) {
   static constexpr char kDigits[] = "0123456789abcdef";
@@ -51,13 +56,15 @@ bool same_settings(const nlohmann::json& earlier, const ordered_json& now) {
          earlier["options"] == now["options"].get<std::string>();
 }
 
-/// Decides which frames are there already; refuses the output of other inputs.
+/// Decides which frames are there already; refuses the output of other inputs. A refined rig is of
+/// all frames together: with another frame, none is there.
 std::vector<char> resumable(const fs::path& out, const std::vector<FrameFiles>& frames,
-                            const ordered_json& inputs, bool overwrite) {
+                            const ordered_json& inputs, const SequenceOptions& options) {
   std::vector<char> done(frames.size(), 0);
   if (!fs::exists(out) || (fs::is_directory(out) && fs::is_empty(out))) return done;
   const auto refuse = [&](const std::string& what) {
-    if (!overwrite) throw InputError("--out", "", out.string(), what + " (or give --overwrite)");
+    if (!options.overwrite)
+      throw InputError("--out", "", out.string(), what + " (or give --overwrite)");
   };
   if (!fs::is_directory(out)) throw InputError("--out", "", out.string(), "must be a folder");
   if (!fs::exists(out / kInputsFile)) {
@@ -67,6 +74,11 @@ std::vector<char> resumable(const fs::path& out, const std::vector<FrameFiles>& 
   const nlohmann::json earlier = read_json(out / kInputsFile);
   if (!same_settings(earlier, inputs)) {
     refuse("holds the output of another rig or other options");
+    return done;
+  }
+  if (options.refine_rig &&
+      earlier.value("frames", nlohmann::json()) != nlohmann::json(inputs["frames"])) {
+    refuse("holds a rig refined from other frames");
     return done;
   }
   for (std::size_t i = 0; i < frames.size(); ++i) {
@@ -134,26 +146,66 @@ void reconstruct_frame(const Rig& rig, const FrameFiles& files, const fs::path& 
   outcome.done = true;
 }
 
+/// The rig to reconstruct with: refined from the frames, or what an earlier run refined.
+Rig refined_rig(const Rig& rig, const std::vector<FrameFiles>& frames, const fs::path& out,
+                const SequenceOptions& options, const Progress& progress,
+                RefinementOutcome& outcome) {
+  if (fs::exists(out / kRigFile) && fs::exists(out / kRefinementFile)) {
+    outcome = refinement_outcome(ordered_json(read_json(out / kRefinementFile)));
+    outcome.resumed = true;
+    return read_rig(out / kRigFile);
+  }
+  constexpr std::size_t kMaxFrames = 24;  // more add little but time
+  const std::size_t count = std::min(frames.size(), kMaxFrames);
+  std::vector<FrameCurves> curves;
+  std::vector<std::string> names;
+  for (std::size_t i = 0; i < count; ++i) {
+    const FrameFiles& files = frames[i * frames.size() / count];
+    if (progress)
+      progress("lines for the rig", static_cast<double>(i) / static_cast<double>(count));
+    PointOptions joint = options.points;
+    joint.solution.method = Method::kJoint;
+    PointResult detected = detect_frame(rig, read_frame(rig, files), joint);
+    curves.push_back({std::move(detected.families), std::move(detected.graphs)});
+    names.push_back(files.name);
+  }
+  if (progress) progress("refining the rig", 0);
+  RigRefinementOptions refinement_options;
+  refinement_options.points = options.points;
+  const RigRefinement refinement = refine_rig_on_frames(rig, curves, refinement_options);
+  const ordered_json report = refinement_report(refinement, names);
+  write_json(out / kRefinementFile, report);
+  write_rig(refinement.rig, out / kRigFile);  // last: its presence means that refinement is done
+  outcome = refinement_outcome(report);
+  return refinement.rig;
+}
+
 }  // namespace
 
-std::vector<FrameOutcome> reconstruct_sequence(const fs::path& rig_path,
-                                               const fs::path& frames_path, const fs::path& out,
-                                               const SequenceOptions& options,
-                                               const Progress& progress) {
-  const Rig rig = read_rig(rig_path);
+SequenceOutcome reconstruct_sequence(const fs::path& rig_path, const fs::path& frames_path,
+                                     const fs::path& out, const SequenceOptions& options,
+                                     const Progress& progress) {
+  Rig rig = read_rig(rig_path);
   const std::vector<FrameFiles> frames = find_frames(rig, frames_path);
   check_images(rig, frames, progress);
   const ordered_json inputs = describe_inputs(rig_path, frames, options.description);
-  const std::vector<char> there = resumable(out, frames, inputs, options.overwrite);
+  const std::vector<char> there = resumable(out, frames, inputs, options);
 
   // From here on the output may change. What is to be made anew goes first, so that an abort leaves
   // no frame that claims to be of these inputs and is not.
   for (std::size_t i = 0; i < frames.size(); ++i) {
     if (there[i] == 0) fs::remove_all(out / frames[i].name);
   }
+  const bool any_there = std::find(there.begin(), there.end(), 1) != there.end();
+  if (!(options.refine_rig && any_there)) {
+    fs::remove(out / kRigFile);
+    fs::remove(out / kRefinementFile);
+  }
   write_json(out / kInputsFile, inputs);
 
-  std::vector<FrameOutcome> outcomes;
+  SequenceOutcome result;
+  if (options.refine_rig)
+    rig = refined_rig(rig, frames, out, options, progress, result.refinement.emplace());
   for (std::size_t i = 0; i < frames.size(); ++i) {
     FrameOutcome outcome;
     outcome.name = frames[i].name;
@@ -166,13 +218,13 @@ std::vector<FrameOutcome> reconstruct_sequence(const fs::path& rig_path,
         outcome.failure = error.what();
       }
     }
-    outcomes.push_back(std::move(outcome));
+    result.frames.push_back(std::move(outcome));
     if (progress) {
       progress("frame " + frames[i].name,
                static_cast<double>(i + 1) / static_cast<double>(frames.size()));
     }
   }
-  return outcomes;
+  return result;
 }
 
 }  // namespace pencilscan

@@ -1,17 +1,20 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "pencilscan/core/progress.h"
 #include "pencilscan/pipeline/frame.h"
+#include "pencilscan/pipeline/refinement_output.h"
 
 namespace pencilscan {
 
 struct SequenceOptions {
   PointOptions points;
   ShapeOptions shape;
+  bool refine_rig = false;  ///< correct the poses of the devices from the frames first
   bool pictures = true;
   bool depth_maps = false;                ///< depth/ and sigma/ of every camera
   std::vector<std::string> mesh_formats;  ///< of obj, stl, glb: the closed mesh once more
@@ -29,15 +32,22 @@ struct FrameOutcome {
   std::vector<std::string> warnings;
 };
 
+struct SequenceOutcome {
+  std::vector<FrameOutcome> frames;
+  std::optional<RefinementOutcome> refinement;  ///< with refine_rig
+};
+
 /// Reconstructs every frame below `frames` into `out`/<frame>: points.ply, mesh.ply,
 /// mesh_measured.ply, pictures/, timing.json and, last, report.json. All input is checked before
 /// the first byte is written (InputError). A frame that fails does not stop the others. A frame
 /// that is there already from the same rig, images and options is kept; output of anything else is
-/// an InputError unless `overwrite`.
-[[nodiscard]] std::vector<FrameOutcome> reconstruct_sequence(const std::filesystem::path& rig_path,
-                                                             const std::filesystem::path& frames,
-                                                             const std::filesystem::path& out,
-                                                             const SequenceOptions& options,
-                                                             const Progress& progress = {});
+/// an InputError unless `overwrite`. With refine_rig the rig is refined from all frames together
+/// (of a long sequence, from frames evenly picked) and written to `out`/rig.json with
+/// refinement.json; where the frames do not determine it, that is the rig as given.
+[[nodiscard]] SequenceOutcome reconstruct_sequence(const std::filesystem::path& rig_path,
+                                                   const std::filesystem::path& frames,
+                                                   const std::filesystem::path& out,
+                                                   const SequenceOptions& options,
+                                                   const Progress& progress = {});
 
 }  // namespace pencilscan

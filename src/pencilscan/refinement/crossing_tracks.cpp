@@ -206,4 +206,11 @@ CrossingDisagreement crossing_disagreement(const Rig& rig, std::span<const Cross
           kMedianOfAbsoluteNormal * median(std::move(noises))};
 }
 
+bool disagrees(const CrossingDisagreement& crossings) {
+  constexpr std::size_t kEnough = 30;  // below, the median is chance
+  constexpr double kFactor = 2;
+  return crossings.crossings >= kEnough &&
+         crossings.median_px > kFactor * std::max(0.05, crossings.expected_px);
+}
+
 }  // namespace pencilscan

@@ -63,4 +63,8 @@ struct CrossingDisagreement {
 [[nodiscard]] CrossingDisagreement crossing_disagreement(const Rig& rig,
                                                          std::span<const CrossingTrack> tracks);
 
+/// True when the crossings disagree by more than noise and the labels' own tolerance explain: the
+/// devices stand elsewhere than the rig says.
+[[nodiscard]] bool disagrees(const CrossingDisagreement& crossings);
+
 }  // namespace pencilscan

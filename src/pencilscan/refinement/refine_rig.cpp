@@ -33,8 +33,7 @@ struct Scales {
     }
   }
   [[nodiscard]] PoseCorrection correction(std::size_t device, const double* p) const {
-    return {rotation_px * Vec3(p[0], p[1], p[2]),
-            translation_mm[device] * Vec3(p[3], p[4], p[5])};
+    return {rotation_px * Vec3(p[0], p[1], p[2]), translation_mm[device] * Vec3(p[3], p[4], p[5])};
   }
   [[nodiscard]] Parameters parameters(std::size_t device, const PoseCorrection& c) const {
     const Vec3 r = c.rotation_px / rotation_px;
@@ -328,6 +327,8 @@ RefineRigResult refine_rig(const Rig& calibrated, std::span<const CrossingTrack>
     report.devices[d].refined = used.is_refined[d] != 0;
     report.devices[d].rotation_px = correction[d].rotation_px.norm();
     report.devices[d].translation_mm = correction[d].translation_mm.norm();
+    report.devices[d].translation_px =
+        options.translation_sigma_px * report.devices[d].translation_mm / scales.translation_mm[d];
   }
   return result;
 }

@@ -24,12 +24,12 @@ namespace pencilscan {
 /// whole rig that no picture can tell apart, the one that moves the devices least.
 struct RefineRigOptions {
   double rotation_sigma_px = 1;  ///< expected calibration error per axis, at the image centre; > 0
-  /// Likewise of the translation, as the shift of the volume's centre in the image; > 0. At 1.1 m and
-  /// f = 2300 px, 1 px is 0.48 mm.
+  /// Likewise of the translation, as the shift of the volume's centre in the image; > 0. At 1.1 m
+  /// and f = 2300 px, 1 px is 0.48 mm.
   double translation_sigma_px = 1;
-  double line_sigma_px = 0.05;        ///< of a projected line's coordinate, projector px; > 0
-  double loss_scale = 3;  ///< of Cauchy's loss, in deviations of the residuals as found; > 0
-  int max_stages = 5;     ///< the deviation is found anew before each
+  double line_sigma_px = 0.05;  ///< of a projected line's coordinate, projector px; > 0
+  double loss_scale = 3;        ///< of Cauchy's loss, in deviations of the residuals as found; > 0
+  int max_stages = 5;           ///< the deviation is found anew before each
   /// Errors of neighbouring crossings are alike: their information counts as if there were so many
   /// times fewer; >= 1.
   double correlated_crossings = 4;
@@ -46,6 +46,7 @@ struct DeviceRefinement {
   bool refined = false;    ///< false: too few tracks, pose kept
   double rotation_px = 0;  ///< how far it moved
   double translation_mm = 0;
+  double translation_px = 0;  ///< the same as shift of the volume's centre in the image, at most
 };
 
 struct RefineRigReport {
