@@ -208,6 +208,16 @@ TEST_F(PipelineTest, RefinedRigIsWrittenUsedAndResumed) {
   EXPECT_TRUE(again.refinement->refined);
   EXPECT_TRUE(again.frames.front().resumed);
   EXPECT_EQ(read_file(out / "rig.json"), rigs[0]);
+  // The rig that is read is never written over.
+  options.overwrite = true;
+  EXPECT_THROW(
+      static_cast<void>(reconstruct_sequence(out / "rig.json", *folder_ / "frames", out, options)),
+      InputError);
+  options.refine_rig = false;
+  EXPECT_TRUE(reconstruct_sequence(out / "rig.json", *folder_ / "frames", out, options)
+                  .frames.front()
+                  .done);
+  EXPECT_EQ(read_file(out / "rig.json"), rigs[0]);
 }
 
 TEST_F(PipelineTest, RigOfOneProjectorIsNotRefinedAndStaysAsItIs) {

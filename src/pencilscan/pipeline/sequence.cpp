@@ -146,6 +146,17 @@ void reconstruct_frame(const Rig& rig, const FrameFiles& files, const fs::path& 
   outcome.done = true;
 }
 
+bool is_output_rig(const fs::path& rig_path, const fs::path& out) {
+  return fs::exists(out / kRigFile) && fs::equivalent(rig_path, out / kRigFile);
+}
+
+/// Removes what an earlier run refined, and nothing that anybody else wrote or that is read now.
+void remove_refined_rig(const fs::path& out, const fs::path& rig_path) {
+  if (!fs::exists(out / kRefinementFile) || is_output_rig(rig_path, out)) return;
+  fs::remove(out / kRigFile);
+  fs::remove(out / kRefinementFile);
+}
+
 /// The rig to reconstruct with: refined from the frames, or what an earlier run refined.
 Rig refined_rig(const Rig& rig, const std::vector<FrameFiles>& frames, const fs::path& out,
                 const SequenceOptions& options, const Progress& progress,
@@ -187,6 +198,10 @@ SequenceOutcome reconstruct_sequence(const fs::path& rig_path, const fs::path& f
                                      const Progress& progress) {
   Rig rig = read_rig(rig_path);
   const std::vector<FrameFiles> frames = find_frames(rig, frames_path);
+  if (options.refine_rig && is_output_rig(rig_path, out)) {
+    throw InputError("--rig", "", rig_path.string(),
+                     "must not be the rig.json in --out, where the refined rig is written");
+  }
   check_images(rig, frames, progress);
   const ordered_json inputs = describe_inputs(rig_path, frames, options.description);
   const std::vector<char> there = resumable(out, frames, inputs, options);
@@ -196,11 +211,8 @@ SequenceOutcome reconstruct_sequence(const fs::path& rig_path, const fs::path& f
   for (std::size_t i = 0; i < frames.size(); ++i) {
     if (there[i] == 0) fs::remove_all(out / frames[i].name);
   }
-  const bool any_there = std::find(there.begin(), there.end(), 1) != there.end();
-  if (!(options.refine_rig && any_there)) {
-    fs::remove(out / kRigFile);
-    fs::remove(out / kRefinementFile);
-  }
+  if (!options.refine_rig || std::find(there.begin(), there.end(), 1) == there.end())
+    remove_refined_rig(out, rig_path);
   write_json(out / kInputsFile, inputs);
 
   SequenceOutcome result;
