@@ -30,7 +30,10 @@ void print_refinement(const RefinementOutcome& refinement, nlohmann::ordered_jso
   for (const std::string& warning : refinement.warnings)
     std::cerr << "pencilscan: warning: " << warning << "\n";
   figures["rig_refined"] = refinement.refined;
-  if (!refinement.refined) return;
+  if (!refinement.refined) {
+    std::cerr << "pencilscan: warning: the rig was not refined: " << refinement.reason << "\n";
+    return;
+  }
   figures["crossing_disagreement_before_px"] = refinement.before_px;
   figures["crossing_disagreement_after_px"] = refinement.after_px;
 }
@@ -84,7 +87,7 @@ void reconstruct(const ReconstructOptions& options) {
                      " frames could not be reconstructed");
   }
   if (refinement && !refinement->refined) {
-    throw StageError("the rig could not be refined and was used as given: " + refinement->reason);
+    throw StageError("the rig could not be refined and was used as given");
   }
 }
 
