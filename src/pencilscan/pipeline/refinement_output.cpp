@@ -35,9 +35,10 @@ std::vector<std::string> warnings_of(const RigRefinement& refinement) {
     }
   }
   if (disagrees(refinement.report.after)) {
-    warnings.push_back(
-        "after refinement, crossing lines still miss each other by more than image "
-        "noise explains: lens parameters may be off, or the object moved");
+    // Assigned, not pushed from a literal: g++ 12 sees a false overflow in that.
+    std::string& warning = warnings.emplace_back();
+    warning.append("after refinement, crossing lines still miss each other by more than image ")
+        .append("noise explains: lens parameters may be off, or the object moved");
   }
   return warnings;
 }
