@@ -1,0 +1,90 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "pencilscan/calibration/tracks.h"
+#include "pencilscan/core/progress.h"
+#include "pencilscan/geometry/device.h"
+
+namespace pencilscan {
+
+/// Inner parameters of a device, in this order.
+enum Intrinsic { kFx, kFy, kCx, kCy, kK1, kK2, kP1, kP2, kK3, kIntrinsics };
+inline constexpr std::array<const char*, kIntrinsics> kIntrinsicNames{"fx", "fy", "cx", "cy", "k1",
+                                                                      "k2", "p1", "p2", "k3"};
+
+/// A device as the adjustment sees it.
+struct BundleDevice {
+  std::array<double, 6> pose{};  ///< device_from_world: angle-axis, then translation
+  std::array<double, kIntrinsics> inner{};
+  /// What is known beforehand: value and one standard deviation (0: held exactly at the value;
+  /// infinity: nothing known). fy's is on fy / fx.
+  std::array<double, kIntrinsics> prior{};
+  std::array<double, kIntrinsics> prior_sigma{};
+  bool present = false;  ///< has a pose and takes part
+};
+
+[[nodiscard]] BundleDevice bundle_device(const Device& device);
+/// Writes K, distortion and pose back.
+void set_device(const BundleDevice& from, Device& device);
+
+/// A flat board of known size seen by devices: chessboard corners.
+struct BoardView {
+  std::size_t board = 0;  ///< which placing of the board
+  Vec2 position_mm = Vec2::Zero();
+  TrackView view;
+};
+
+struct BundleProblem {
+  std::vector<BundleDevice> devices;
+  std::vector<Track> tracks;
+  std::vector<Vec3> points;  ///< of the tracks, in world
+  std::vector<char> used;    ///< per track
+  std::vector<BoardView> board_views;
+  std::vector<std::array<double, 6>> board_poses;  ///< world_from_board
+};
+
+struct BundleOptions {
+  /// Which inner parameters move (others keep their values); bit i is Intrinsic i.
+  unsigned free_inner = 0;
+  bool free_poses = true;
+  double loss_scale = 2;      ///< of Cauchy's loss, in deviations, > 0
+  double extra_sigma_px = 0;  ///< added to every view's deviation in squares, >= 0
+  int max_iterations = 50;
+  std::size_t max_tracks = 0;  ///< 0: all; else an even choice of these
+};
+
+struct BundleSummary {
+  double cost = 0;  ///< half the robust sum of squares
+  int iterations = 0;
+  std::size_t views = 0;
+  bool converged = false;
+};
+
+/// Minimises, over poses, chosen inner parameters and points,
+///   sum_views rho(|pi(X) - u|^2 / sigma^2) + sum_priors ((p - p0) / sigma_p)^2,
+/// rho Cauchy's loss, by Levenberg-Marquardt with the points eliminated (Ceres). The first present
+/// device's pose is held; scale is left to the damping. One thread: sums of more differ from run to
+/// run.
+BundleSummary adjust(BundleProblem& problem, const BundleOptions& options);
+
+/// Reprojection error of a view, pixels; nothing when the point is behind the device.
+[[nodiscard]] std::optional<Vec2> view_error(const BundleDevice& device, const Vec3& point,
+                                             const TrackView& view);
+
+/// Residual and its derivatives of one view, whitened: d / d pose (2 x 6), inner (2 x 9) and point
+/// (2 x 3), by automatic differentiation of the same code that adjust() uses.
+struct ViewLinearization {
+  Vec2 residual = Vec2::Zero();
+  Eigen::Matrix<double, 2, 6, Eigen::RowMajor> pose;
+  Eigen::Matrix<double, 2, kIntrinsics, Eigen::RowMajor> inner;
+  Eigen::Matrix<double, 2, 3, Eigen::RowMajor> point;
+};
+[[nodiscard]] ViewLinearization linearize(const BundleDevice& device, const Vec3& point,
+                                          const TrackView& view, double extra_sigma_px = 0);
+
+}  // namespace pencilscan

@@ -1,0 +1,312 @@
+#include "pencilscan/calibration/gray_decode.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <numeric>
+
+#include "pencilscan/core/check.h"
+#include "pencilscan/core/parallel.h"
+#include "pencilscan/pattern/gray_code.h"
+
+namespace pencilscan {
+namespace {
+
+/// Of 8-bit images, whose noise may hide below the rounding.
+constexpr double kRoundingNoise = 0.29 / 255;
+constexpr float kFullScale = 0.996F;
+
+/// Variance of a pixel: offset + slope * value (read and shot noise).
+struct NoiseModel {
+  double offset = 0;
+  double slope = 0;
+  [[nodiscard]] double variance(double value) const {
+    return offset + slope * std::max(value, 0.0);
+  }
+};
+
+double quantile(std::vector<float>& values, double share) {
+  if (values.empty()) return 0;
+  const auto at =
+      values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), at, values.end());
+  return *at;
+}
+
+struct LevelNoise {
+  double value = 0;
+  double deviation = 0;
+};
+
+/// Standard deviation from the second differences along both axes, which vanish on planes of grey
+/// (Immerkaer, "Fast noise variance estimation", 1996). The lower quartile instead of the mean:
+/// texture raises the rest.
+LevelNoise level_noise(const cv::Mat& image, const cv::Mat_<std::uint8_t>& mask) {
+  std::vector<float> residuals;
+  std::vector<float> values;
+  for (int v = 1; v + 1 < image.rows; v += 2) {
+    const float* a = image.ptr<float>(v - 1);
+    const float* b = image.ptr<float>(v);
+    const float* c = image.ptr<float>(v + 1);
+    for (int u = 1; u + 1 < image.cols; u += 2) {
+      if (mask(v, u) == 0 || b[u] > kFullScale) continue;
+      residuals.push_back(std::abs(a[u - 1] - 2 * a[u] + a[u + 1] - 2 * b[u - 1] + 4 * b[u] -
+                                   2 * b[u + 1] + c[u - 1] - 2 * c[u] + c[u + 1]) /
+                          6);
+      values.push_back(b[u]);
+    }
+  }
+  constexpr double kLowerQuartileOfAbsoluteNormal = 0.3186;
+  return {quantile(values, 0.5), quantile(residuals, 0.25) / kLowerQuartileOfAbsoluteNormal};
+}
+
+NoiseModel noise_model(const GrayStack& stack) {
+  cv::Mat contrast;
+  cv::absdiff(stack.white, stack.black, contrast);
+  std::vector<float> all;
+  for (int v = 0; v < contrast.rows; v += 4)
+    for (int u = 0; u < contrast.cols; u += 4) all.push_back(contrast.at<float>(v, u));
+  const double bright = quantile(all, 0.98);
+  cv::Mat_<std::uint8_t> lit;
+  cv::compare(contrast, 0.25 * bright, lit, cv::CMP_GT);
+  const cv::Mat_<std::uint8_t> everywhere(contrast.size(), 255);
+  const LevelNoise low = level_noise(stack.black, everywhere);
+  const LevelNoise high = level_noise(stack.white, lit);
+  const double floor = kRoundingNoise * kRoundingNoise;
+  const double low_variance = std::max(low.deviation * low.deviation, floor);
+  const double high_variance = std::max(high.deviation * high.deviation, low_variance);
+  NoiseModel noise;
+  if (high.value > low.value + 0.02)
+    noise.slope = (high_variance - low_variance) / (high.value - low.value);
+  noise.offset = std::max(low_variance - noise.slope * low.value, floor);
+  return noise;
+}
+
+/// Bits of one axis at one pixel.
+struct AxisBits {
+  std::uint32_t gray = 0;
+  int uncertain_coarse = 0;  ///< uncertain bits with a certain finer one
+  int uncertain_fine = 0;    ///< uncertain bits at the fine end
+};
+
+AxisBits read_bits(const std::vector<cv::Mat>& difference, int u, int v, double least) {
+  AxisBits bits;
+  for (std::size_t k = difference.size(); k-- > 0;) {
+    const double d = difference[k].at<float>(v, u);
+    if (d > 0) bits.gray |= 1U << k;
+    if (std::abs(d) < least) {
+      ++bits.uncertain_fine;
+    } else {
+      bits.uncertain_coarse += bits.uncertain_fine;
+      bits.uncertain_fine = 0;
+    }
+  }
+  return bits;
+}
+
+class PixelDecoder {
+ public:
+  PixelDecoder(const GrayStack& stack, const NoiseModel& noise, const GrayDecodeOptions& options)
+      : stack_(stack), noise_(noise), options_(options) {}
+
+  PixelState decode(int u, int v, std::array<std::int32_t, 2>& code) const {
+    const double white = stack_.white.at<float>(v, u);
+    const double black = stack_.black.at<float>(v, u);
+    const double contrast = white - black;
+    const double deviation = std::sqrt(noise_.variance(white) + noise_.variance(black));
+    if (black >= kFullScale) return PixelState::kSaturated;
+    if (contrast < options_.lit_deviations * deviation) return PixelState::kUnlit;
+    // Of 2 pattern - white - black the variance is 4 + 1 + 1 times a pixel's, of a pair 2 times.
+    const double bit_deviation = (stack_.inverses ? 1 : std::sqrt(3.0)) * deviation;
+    const double least =
+        std::max(options_.bit_deviations * bit_deviation, options_.bit_contrast * contrast);
+    // At low contrast a weaker bit must do; the neighbours tell when it errs.
+    const double wanted = std::min(least, 0.5 * contrast);
+    for (std::size_t axis = 0; axis < 2; ++axis) {
+      const AxisBits bits = read_bits(stack_.difference[axis], u, v, wanted);
+      if (bits.uncertain_fine > options_.max_blurred_bits) return PixelState::kBlurred;
+      if (bits.uncertain_coarse > 1) return PixelState::kAmbiguous;
+      code[axis] = static_cast<std::int32_t>(index_from_gray(bits.gray));
+    }
+    if (code[0] >= stack_.panel_width || code[1] >= stack_.panel_height)
+      return PixelState::kOffPanel;
+    return PixelState::kValid;
+  }
+
+ private:
+  const GrayStack& stack_;
+  NoiseModel noise_;
+  GrayDecodeOptions options_;
+};
+
+bool agrees(const DecodedView& view, int u, int v, int u2, int v2, double steepest) {
+  if (!view.valid(u2, v2)) return false;
+  const double reach = 1 + steepest * std::max(std::abs(u2 - u), std::abs(v2 - v));
+  return std::abs(view.code[0](v, u) - view.code[0](v2, u2)) <= reach &&
+         std::abs(view.code[1](v, u) - view.code[1](v2, u2)) <= reach;
+}
+
+void drop(DecodedView& view, const cv::Mat_<std::uint8_t>& wrong) {
+  for (int v = 0; v < wrong.rows; ++v) {
+    for (int u = 0; u < wrong.cols; ++u) {
+      if (wrong(v, u) == 0) continue;
+      view.state(v, u) = static_cast<std::uint8_t>(PixelState::kInconsistent);
+      view.code[0](v, u) = view.code[1](v, u) = -1;
+    }
+  }
+}
+
+void drop_unsupported(DecodedView& view, const GrayDecodeOptions& options) {
+  cv::Mat_<std::uint8_t> wrong(view.state.size(), 0);
+  parallel_for(static_cast<std::size_t>(view.state.rows), [&](std::size_t row) {
+    const int v = static_cast<int>(row);
+    for (int u = 0; u < view.state.cols; ++u) {
+      if (!view.valid(u, v)) continue;
+      int support = -1;  // itself
+      for (int y = std::max(v - 2, 0); y <= std::min(v + 2, view.state.rows - 1); ++y)
+        for (int x = std::max(u - 2, 0); x <= std::min(u + 2, view.state.cols - 1); ++x)
+          support += agrees(view, u, v, x, y, options.steepest_code) ? 1 : 0;
+      if (support < options.least_support) wrong(v, u) = 1;
+    }
+  });
+  drop(view, wrong);
+}
+
+/// Pieces connected by agreeing neighbours that are smaller than the least.
+void drop_small_pieces(DecodedView& view, const GrayDecodeOptions& options) {
+  cv::Mat_<std::uint8_t> seen(view.state.size(), 0);
+  cv::Mat_<std::uint8_t> wrong(view.state.size(), 0);
+  std::vector<cv::Point> piece;
+  for (int v = 0; v < view.state.rows; ++v) {
+    for (int u = 0; u < view.state.cols; ++u) {
+      if (!view.valid(u, v) || seen(v, u) != 0) continue;
+      piece.assign(1, {u, v});
+      seen(v, u) = 1;
+      for (std::size_t i = 0; i < piece.size(); ++i) {
+        const cv::Point at = piece[i];
+        for (const cv::Point step : {cv::Point(1, 0), {-1, 0}, {0, 1}, {0, -1}}) {
+          const cv::Point next = at + step;
+          if (!cv::Rect({0, 0}, view.state.size()).contains(next) || seen(next) != 0) continue;
+          if (!agrees(view, at.x, at.y, next.x, next.y, options.steepest_code)) continue;
+          seen(next) = 1;
+          piece.push_back(next);
+        }
+      }
+      if (piece.size() < static_cast<std::size_t>(options.least_component_px))
+        for (const cv::Point at : piece) wrong(at) = 1;
+    }
+  }
+  drop(view, wrong);
+}
+
+/// Where the panel coordinate is m + 1/2 between two pixels with codes a and b.
+cv::Vec2f crossing_between(const std::vector<cv::Mat>& difference, cv::Point p, cv::Point q,
+                           std::int32_t a, std::int32_t b, double steepest) {
+  const cv::Vec2f none(-1, 0);
+  if (a == b || std::abs(a - b) > steepest) return none;
+  cv::Vec2f best = none;
+  int best_bit = -1;
+  // The coarsest bit that changes has the widest stripes and so the steepest edge.
+  for (std::int32_t m = std::min(a, b); m < std::max(a, b); ++m) {
+    const int bit = std::countr_zero(static_cast<std::uint32_t>(m) + 1);
+    if (bit <= best_bit || static_cast<std::size_t>(bit) >= difference.size()) continue;
+    const float at_p = difference[static_cast<std::size_t>(bit)].at<float>(p);
+    const float at_q = difference[static_cast<std::size_t>(bit)].at<float>(q);
+    if ((at_p > 0) == (at_q > 0)) continue;
+    best = {at_p / (at_p - at_q), static_cast<float>(m) + 0.5F};
+    best_bit = bit;
+  }
+  return best;
+}
+
+void find_crossings(const GrayStack& stack, const GrayDecodeOptions& options, DecodedView& view) {
+  for (std::size_t axis = 0; axis < 2; ++axis) {
+    for (std::size_t direction = 0; direction < 2; ++direction) {
+      auto& crossing = view.crossing[axis][direction];
+      crossing = cv::Mat_<cv::Vec2f>(view.state.size(), cv::Vec2f(-1, 0));
+      const cv::Point step = direction == 0 ? cv::Point(1, 0) : cv::Point(0, 1);
+      parallel_for(static_cast<std::size_t>(view.state.rows - step.y), [&](std::size_t row) {
+        const int v = static_cast<int>(row);
+        for (int u = 0; u + step.x < view.state.cols; ++u) {
+          if (!view.valid(u, v) ||
+              !agrees(view, u, v, u + step.x, v + step.y, options.steepest_code))
+            continue;
+          crossing(v, u) = crossing_between(
+              stack.difference[axis], {u, v}, cv::Point(u, v) + step, view.code[axis](v, u),
+              view.code[axis](v + step.y, u + step.x), options.steepest_code);
+        }
+      });
+    }
+  }
+}
+
+double inverted_share(const GrayStack& stack, double noise) {
+  std::size_t below = 0;
+  std::size_t above = 0;
+  for (int v = 0; v < stack.white.rows; v += 2) {
+    for (int u = 0; u < stack.white.cols; u += 2) {
+      const float d = stack.white.at<float>(v, u) - stack.black.at<float>(v, u);
+      above += d > 10 * noise ? 1U : 0U;
+      below += d < -10 * noise ? 1U : 0U;
+    }
+  }
+  return above + below == 0 ? 0 : static_cast<double>(below) / static_cast<double>(above + below);
+}
+
+}  // namespace
+
+std::string to_string(PixelState state) {
+  switch (state) {
+    case PixelState::kValid:
+      return "valid";
+    case PixelState::kUnlit:
+      return "unlit";
+    case PixelState::kSaturated:
+      return "saturated";
+    case PixelState::kAmbiguous:
+      return "ambiguous";
+    case PixelState::kBlurred:
+      return "blurred";
+    case PixelState::kOffPanel:
+      return "off_panel";
+    case PixelState::kInconsistent:
+      return "inconsistent";
+  }
+  return "unknown";
+}
+
+double DecodedView::valid_share() const {
+  const std::size_t all = std::accumulate(counts.begin(), counts.end(), std::size_t{0});
+  const std::size_t lit = all - counts[static_cast<std::size_t>(PixelState::kUnlit)];
+  return lit == 0 ? 0 : static_cast<double>(counts[0]) / static_cast<double>(lit);
+}
+
+DecodedView decode_gray_stack(const GrayStack& stack, const GrayDecodeOptions& options) {
+  PENCILSCAN_CHECK(stack.white.type() == CV_32FC1 && stack.black.size() == stack.white.size());
+  DecodedView view;
+  const cv::Size size = stack.white.size();
+  view.state = cv::Mat_<std::uint8_t>(size, 0);
+  for (auto& code : view.code) code = cv::Mat_<std::int32_t>(size, -1);
+  const NoiseModel noise = noise_model(stack);
+  view.noise = std::sqrt(noise.variance(0.3));
+  view.inverted_share = inverted_share(stack, view.noise);
+  const PixelDecoder decoder(stack, noise, options);
+  parallel_for(static_cast<std::size_t>(size.height), [&](std::size_t row) {
+    const int v = static_cast<int>(row);
+    for (int u = 0; u < size.width; ++u) {
+      std::array<std::int32_t, 2> code{-1, -1};
+      const PixelState state = decoder.decode(u, v, code);
+      view.state(v, u) = static_cast<std::uint8_t>(state);
+      if (state != PixelState::kValid) continue;
+      view.code[0](v, u) = code[0];
+      view.code[1](v, u) = code[1];
+    }
+  });
+  drop_unsupported(view, options);
+  drop_small_pieces(view, options);
+  find_crossings(stack, options, view);
+  for (const std::uint8_t state : view.state) ++view.counts[state];
+  return view;
+}
+
+}  // namespace pencilscan

@@ -1,0 +1,207 @@
+#include "pencilscan/calibration/pair_geometry.h"
+
+#include <Eigen/LU>
+#include <Eigen/SVD>
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <opencv2/calib3d.hpp>
+#include <opencv2/core/eigen.hpp>
+
+#include "pencilscan/core/parallel.h"
+
+namespace pencilscan {
+namespace {
+
+struct Match {
+  Vec2 in_camera;
+  Vec2 in_projector;
+};
+
+using PairKey = std::array<std::size_t, 3>;  ///< capture, camera, projector
+
+PairKey key_of(const Track& track, const TrackView& view) {
+  const std::size_t hub = track.views[0].device;
+  return {track.capture, std::min(hub, view.device), std::max(hub, view.device)};
+}
+
+Match match_of(const Track& track, const TrackView& view) {
+  const bool hub_is_camera = track.views[0].device < view.device;
+  return hub_is_camera ? Match{track.views[0].pixel, view.pixel}
+                       : Match{view.pixel, track.views[0].pixel};
+}
+
+/// Distance of a match to its epipolar lines as the share of each image's width, the larger one.
+double epipolar_distance(const Rig& rig, const PairGeometry& pair, const Match& match) {
+  const Vec3 line_p = pair.fundamental * match.in_camera.homogeneous();
+  const Vec3 line_c = pair.fundamental.transpose() * match.in_projector.homogeneous();
+  const double error = std::abs(match.in_projector.homogeneous().dot(line_p));
+  return std::max(error / line_p.head<2>().norm() / calibrated_device(rig, pair.projector).width,
+                  error / line_c.head<2>().norm() / calibrated_device(rig, pair.camera).width);
+}
+
+double planar_share(const std::vector<cv::Point2d>& a, const std::vector<cv::Point2d>& b,
+                    double tolerance) {
+  if (a.size() < 8) return 1;
+  std::vector<std::uint8_t> mask;
+  const cv::Mat H = cv::findHomography(a, b, cv::RANSAC, tolerance, mask, 2000, 0.999);
+  if (H.empty()) return 0;
+  return static_cast<double>(cv::countNonZero(mask)) / static_cast<double>(a.size());
+}
+
+void solve_pair(const Rig& rig, const std::vector<Match>& matches, PairGeometry& pair,
+                const PairGeometryOptions& options) {
+  pair.matches = matches.size();
+  if (matches.size() < options.least_matches) return;
+  const double width_c = calibrated_device(rig, pair.camera).width;
+  const double width_p = calibrated_device(rig, pair.projector).width;
+  // Widths alike, so that one tolerance holds on both sides.
+  std::vector<cv::Point2d> a;
+  std::vector<cv::Point2d> b;
+  for (const Match& m : matches) {
+    a.emplace_back(m.in_camera.x() * 1000 / width_c, m.in_camera.y() * 1000 / width_c);
+    b.emplace_back(m.in_projector.x() * 1000 / width_p, m.in_projector.y() * 1000 / width_p);
+  }
+  std::vector<std::uint8_t> mask;
+  const cv::Mat found =
+      cv::findFundamentalMat(a, b, cv::FM_RANSAC, 1000 * options.tolerance, 0.9999, 2000, mask);
+  if (found.rows != 3 || found.cols != 3) return;
+  Mat3 F;
+  cv::cv2eigen(found, F);
+  const Vec3 to_c(1000 / width_c, 1000 / width_c, 1);
+  const Vec3 to_p(1000 / width_p, 1000 / width_p, 1);
+  pair.fundamental = to_p.asDiagonal() * F * to_c.asDiagonal();
+  std::vector<cv::Point2d> inlier_a;
+  std::vector<cv::Point2d> inlier_b;
+  for (std::size_t i = 0; i < matches.size(); ++i) {
+    if (epipolar_distance(rig, pair, matches[i]) > options.tolerance) continue;
+    inlier_a.push_back(a[i]);
+    inlier_b.push_back(b[i]);
+  }
+  pair.inliers = inlier_a.size();
+  pair.planar_share = planar_share(inlier_a, inlier_b, 1000 * options.planar_tolerance);
+}
+
+std::map<PairKey, std::vector<Match>> matches_by_pair(std::span<const Track> tracks) {
+  std::map<PairKey, std::vector<Match>> matches;
+  for (const Track& track : tracks)
+    for (std::size_t i = 1; i < track.views.size(); ++i)
+      matches[key_of(track, track.views[i])].push_back(match_of(track, track.views[i]));
+  return matches;
+}
+
+/// How unequal the two large singular values of an almost essential matrix are, in [0, 1].
+double inequality(const Mat3& E) {
+  const Vec3 s = Eigen::JacobiSVD<Mat3>(E).singularValues();
+  return (s[0] - s[1]) / s[0];
+}
+
+Mat3 camera_matrix(double focal, double cx, double cy) {
+  Mat3 K = Mat3::Identity();
+  K(0, 0) = K(1, 1) = focal;
+  K(0, 2) = cx;
+  K(1, 2) = cy;
+  return K;
+}
+
+}  // namespace
+
+std::vector<PairGeometry> pair_geometries(const Rig& rig, std::span<const Track> tracks,
+                                          const PairGeometryOptions& options) {
+  const auto matches = matches_by_pair(tracks);
+  std::vector<PairGeometry> pairs;
+  std::vector<const std::vector<Match>*> lists;
+  for (const auto& [key, list] : matches) {
+    pairs.push_back({key[0], key[1], key[2]});
+    lists.push_back(&list);
+  }
+  parallel_for(pairs.size(), [&](std::size_t i) { solve_pair(rig, *lists[i], pairs[i], options); });
+  return pairs;
+}
+
+void drop_epipolar_outliers(const Rig& rig, std::span<const PairGeometry> pairs, double least_share,
+                            std::vector<Track>& tracks, const PairGeometryOptions& options) {
+  std::map<PairKey, const PairGeometry*> by_key;
+  for (const PairGeometry& pair : pairs)
+    by_key[{pair.capture, pair.camera, pair.projector}] = &pair;
+  std::vector<Track> kept;
+  for (Track& track : tracks) {
+    Track cleaned{{track.views[0]}, track.capture};
+    for (std::size_t i = 1; i < track.views.size(); ++i) {
+      const auto found = by_key.find(key_of(track, track.views[i]));
+      if (found == by_key.end()) continue;
+      const PairGeometry& pair = *found->second;
+      if (pair.inliers < options.least_matches || pair.inlier_share() < least_share) continue;
+      if (epipolar_distance(rig, pair, match_of(track, track.views[i])) > options.tolerance)
+        continue;
+      cleaned.views.push_back(track.views[i]);
+    }
+    if (cleaned.views.size() > 1) kept.push_back(std::move(cleaned));
+  }
+  tracks = std::move(kept);
+}
+
+Rig rig_with_guess(const Rig& rig, const FocalGuess& guess, const std::vector<char>& known) {
+  Rig result = rig;
+  for (std::size_t d = 0; d < device_total(rig); ++d) {
+    if (known[d] != 0) continue;
+    Device& device = calibrated_device(result, d);
+    const bool is_camera = d < rig.cameras.size();
+    const double focal = (is_camera ? guess.camera_scale : guess.projector_scale) * device.width;
+    device.K = camera_matrix(
+        focal, (device.width - 1) / 2.0,
+        (device.height - 1) / 2.0 + (is_camera ? 0 : guess.lens_shift * device.height));
+    device.distortion = {};
+  }
+  return result;
+}
+
+std::vector<FocalGuess> guess_focal_lengths(const Rig& rig, std::span<const PairGeometry> pairs,
+                                            const std::vector<char>& known) {
+  constexpr std::array<double, 7> kScales{0.7, 1.0, 1.4, 1.8, 2.3, 3.0, 4.0};
+  constexpr std::array<double, 5> kShifts{0, 0.3, 0.6, -0.3, -0.6};
+  constexpr double kUsualScale = 1.6;   // of cameras and projectors: a field of view of 35 degrees
+  constexpr double kScaleSpread = 0.6;  // natural logarithm
+  constexpr double kShiftSpread = 0.4;
+  constexpr double kPriorWeight = 0.003;
+  const std::size_t cameras = rig.cameras.size();
+  const bool all_cameras = std::all_of(known.begin(), known.begin() + std::ptrdiff_t(cameras),
+                                       [](char k) { return k != 0; });
+  const bool all_projectors = std::all_of(known.begin() + std::ptrdiff_t(cameras), known.end(),
+                                          [](char k) { return k != 0; });
+  std::vector<FocalGuess> guesses;
+  for (std::size_t a = 0; a < (all_cameras ? 1 : kScales.size()); ++a) {
+    for (std::size_t b = 0; b < (all_projectors ? 1 : kScales.size()); ++b) {
+      for (std::size_t s = 0; s < (all_projectors ? 1 : kShifts.size()); ++s) {
+        FocalGuess guess{kScales[a], kScales[b], kShifts[s], 0};
+        const auto unusual = [&](double scale) {
+          const double z = std::log(scale / kUsualScale) / kScaleSpread;
+          return z * z;
+        };
+        if (!all_cameras) guess.cost += kPriorWeight * unusual(guess.camera_scale);
+        if (!all_projectors)
+          guess.cost += kPriorWeight * (unusual(guess.projector_scale) +
+                                        std::pow(guess.lens_shift / kShiftSpread, 2));
+        guesses.push_back(guess);
+      }
+    }
+  }
+  parallel_for(guesses.size(), [&](std::size_t g) {
+    const Rig guessed = rig_with_guess(rig, guesses[g], known);
+    double sum = 0;
+    double weights = 0;
+    for (const PairGeometry& pair : pairs) {
+      if (pair.inliers < 50) continue;
+      const Mat3 E = calibrated_device(guessed, pair.projector).K.transpose() * pair.fundamental *
+                     calibrated_device(guessed, pair.camera).K;
+      sum += std::min(inequality(E), 0.5);
+      weights += 1;
+    }
+    if (weights > 0) guesses[g].cost += sum / weights;
+  });
+  std::stable_sort(guesses.begin(), guesses.end(),
+                   [](const FocalGuess& x, const FocalGuess& y) { return x.cost < y.cost; });
+  return guesses;
+}
+
+}  // namespace pencilscan

@@ -1,0 +1,269 @@
+#include "pencilscan/calibration/structure.h"
+
+#include <ceres/rotation.h>
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <opencv2/calib3d.hpp>
+#include <opencv2/core/eigen.hpp>
+
+namespace pencilscan {
+namespace {
+
+constexpr double kEarlySigmaPx = 2;  ///< lenses and focal lengths are not known yet
+
+const TrackView* view_in(const Track& track, std::size_t device) {
+  for (const TrackView& view : track.views)
+    if (view.device == device) return &view;
+  return nullptr;
+}
+
+void set_pose(BundleDevice& device, const Mat3& rotation, const Vec3& translation) {
+  ceres::RotationMatrixToAngleAxis(rotation.data(), device.pose.data());
+  for (Eigen::Index i = 0; i < 3; ++i)
+    device.pose[static_cast<std::size_t>(3 + i)] = translation[i];
+}
+
+std::vector<cv::Point2d> normalized(const BundleDevice& device, const std::vector<Vec2>& pixels) {
+  std::vector<cv::Point2d> result;
+  for (const Vec2& p : pixels) {
+    const Vec3 ray = device_ray(device, p);
+    result.emplace_back(ray.x(), ray.y());
+  }
+  return result;
+}
+
+struct Seed {
+  std::size_t a = 0, b = 0;
+  double score = 0;
+  Mat3 rotation = Mat3::Identity();
+  Vec3 translation = Vec3::Zero();
+};
+
+/// b_from_a by the five-point method; score: points in front of both, weighted by their angle.
+Seed solve_seed(const BundleProblem& problem, std::size_t a, std::size_t b,
+                const std::vector<std::size_t>& tracks) {
+  std::vector<Vec2> pixels_a;
+  std::vector<Vec2> pixels_b;
+  for (const std::size_t t : tracks) {
+    const TrackView* in_a = view_in(problem.tracks[t], a);
+    const TrackView* in_b = view_in(problem.tracks[t], b);
+    if (in_a == nullptr || in_b == nullptr) continue;
+    pixels_a.push_back(in_a->pixel);
+    pixels_b.push_back(in_b->pixel);
+  }
+  Seed seed{a, b};
+  if (pixels_a.size() < 15) return seed;
+  const auto points_a = normalized(problem.devices[a], pixels_a);
+  const auto points_b = normalized(problem.devices[b], pixels_b);
+  const double tolerance = 4 / problem.devices[a].inner[kFx];
+  cv::Mat mask;
+  const cv::Mat E = cv::findEssentialMat(points_a, points_b, cv::Mat::eye(3, 3, CV_64F), cv::RANSAC,
+                                         0.999, tolerance, 1000, mask);
+  if (E.rows != 3 || E.cols != 3) return seed;
+  cv::Mat R;
+  cv::Mat t;
+  const int front = cv::recoverPose(E, points_a, points_b, cv::Mat::eye(3, 3, CV_64F), R, t, mask);
+  cv::cv2eigen(R, seed.rotation);
+  cv::cv2eigen(t, seed.translation);
+  // The median angle between rays: small ones fix no depth, wide ones share little surface.
+  std::vector<double> angles;
+  for (std::size_t i = 0; i < points_a.size(); ++i) {
+    const Vec3 ray_a = seed.rotation * Vec3(points_a[i].x, points_a[i].y, 1);
+    const Vec3 ray_b(points_b[i].x, points_b[i].y, 1);
+    angles.push_back(std::acos(std::clamp(ray_a.normalized().dot(ray_b.normalized()), -1.0, 1.0)));
+  }
+  std::nth_element(angles.begin(), angles.begin() + std::ptrdiff_t(angles.size() / 2),
+                   angles.end());
+  seed.score = front * std::min(angles[angles.size() / 2], 0.5);
+  return seed;
+}
+
+std::vector<std::size_t> chosen_tracks(const BundleProblem& problem, std::size_t count) {
+  std::vector<std::size_t> order;
+  for (const bool is_long : {true, false}) {
+    std::vector<std::size_t> pool;
+    for (std::size_t t = 0; t < problem.tracks.size(); ++t)
+      if ((problem.tracks[t].views.size() > 2) == is_long) pool.push_back(t);
+    const std::size_t take = std::min(pool.size(), is_long ? count : count / 2);
+    for (std::size_t i = 0; i < take; ++i) order.push_back(pool[i * pool.size() / take]);
+  }
+  std::sort(order.begin(), order.end());
+  return order;
+}
+
+Seed best_seed(const BundleProblem& problem, const std::vector<std::size_t>& tracks) {
+  std::map<std::pair<std::size_t, std::size_t>, std::size_t> shared;
+  for (const std::size_t t : tracks) {
+    const auto& views = problem.tracks[t].views;
+    for (std::size_t i = 0; i < views.size(); ++i)
+      for (std::size_t j = i + 1; j < views.size(); ++j)
+        ++shared[std::minmax(views[i].device, views[j].device)];
+  }
+  std::vector<std::pair<std::size_t, std::pair<std::size_t, std::size_t>>> ranked;
+  for (const auto& [pair, count] : shared) ranked.push_back({count, pair});
+  std::stable_sort(ranked.begin(), ranked.end(),
+                   [](const auto& x, const auto& y) { return x.first > y.first; });
+  Seed best;
+  for (std::size_t i = 0; i < std::min<std::size_t>(ranked.size(), 8); ++i) {
+    const Seed seed = solve_seed(problem, ranked[i].second.first, ranked[i].second.second, tracks);
+    if (seed.score > best.score) best = seed;
+  }
+  return best;
+}
+
+/// Pose of an absent device against the points of `tracks`; false when too few agree.
+bool join_device(BundleProblem& problem, std::size_t d, const std::vector<std::size_t>& tracks,
+                 const StructureOptions& options) {
+  std::vector<cv::Point3d> points;
+  std::vector<Vec2> pixels;
+  for (const std::size_t t : tracks) {
+    const TrackView* view = view_in(problem.tracks[t], d);
+    if (view == nullptr || problem.used[t] == 0) continue;
+    const Vec3& x = problem.points[t];
+    points.emplace_back(x.x(), x.y(), x.z());
+    pixels.push_back(view->pixel);
+  }
+  if (points.size() < options.least_matches) return false;
+  BundleDevice& device = problem.devices[d];
+  const auto rays = normalized(device, pixels);
+  const double width = 2 * device.prior[kCx] + 1;
+  const auto tolerance = static_cast<float>(options.pose_tolerance * width / device.inner[kFx]);
+  cv::Mat rotation_vector;
+  cv::Mat translation;
+  std::vector<int> inliers;
+  const bool found =
+      cv::solvePnPRansac(points, rays, cv::Mat::eye(3, 3, CV_64F), cv::noArray(), rotation_vector,
+                         translation, false, 500, tolerance, 0.999, inliers, cv::SOLVEPNP_EPNP);
+  if (!found || inliers.size() < std::max(options.least_matches / 2, points.size() / 4))
+    return false;
+  cv::Mat R;
+  cv::Rodrigues(rotation_vector, R);
+  Mat3 rotation;
+  Vec3 t;
+  cv::cv2eigen(R, rotation);
+  cv::cv2eigen(translation, t);
+  if (!rotation.allFinite() || !t.allFinite()) return false;
+  set_pose(device, rotation, t);
+  device.present = true;
+  return true;
+}
+
+void triangulate_tracks(BundleProblem& problem, const std::vector<std::size_t>& tracks,
+                        double least_angle) {
+  for (const std::size_t t : tracks) {
+    if (problem.used[t] != 0) continue;
+    const auto point = triangulate(problem, problem.tracks[t], least_angle);
+    if (!point) continue;
+    problem.points[t] = *point;
+    problem.used[t] = 1;
+  }
+}
+
+}  // namespace
+
+Mat3 rotation_of(const BundleDevice& device) {
+  Mat3 R;
+  ceres::AngleAxisToRotationMatrix(device.pose.data(), R.data());
+  return R;
+}
+
+Vec3 center_of(const BundleDevice& device) {
+  return -rotation_of(device).transpose() * Vec3(device.pose[3], device.pose[4], device.pose[5]);
+}
+
+Vec3 device_ray(const BundleDevice& device, const Vec2& pixel) {
+  const Vec2 bent((pixel.x() - device.inner[kCx]) / device.inner[kFx],
+                  (pixel.y() - device.inner[kCy]) / device.inner[kFy]);
+  const std::array<double, 5> distortion{device.inner[kK1], device.inner[kK2], device.inner[kP1],
+                                         device.inner[kP2], device.inner[kK3]};
+  const Vec2 straight = undistort(distortion, bent);
+  return straight.allFinite() && straight.norm() < 10 ? straight.homogeneous() : bent.homogeneous();
+}
+
+std::optional<Vec3> triangulate(const BundleProblem& problem, const Track& track,
+                                double least_angle_rad) {
+  Mat3 normal = Mat3::Zero();
+  Vec3 right = Vec3::Zero();
+  std::vector<std::pair<Vec3, Vec3>> rays;
+  for (const TrackView& view : track.views) {
+    const BundleDevice& device = problem.devices[view.device];
+    if (!device.present) continue;
+    const Mat3 R = rotation_of(device);
+    const Vec3 direction = (R.transpose() * device_ray(device, view.pixel)).normalized();
+    const Vec3 center = -R.transpose() * Vec3(device.pose[3], device.pose[4], device.pose[5]);
+    const Mat3 across = Mat3::Identity() - direction * direction.transpose();
+    normal += across;
+    right += across * center;
+    rays.emplace_back(center, direction);
+  }
+  if (rays.size() < 2) return std::nullopt;
+  double widest = 0;
+  for (std::size_t i = 1; i < rays.size(); ++i)
+    widest = std::max(widest, rays[0].second.cross(rays[i].second).norm());
+  if (widest < std::sin(least_angle_rad)) return std::nullopt;
+  const Vec3 point = normal.ldlt().solve(right);
+  for (const auto& [center, direction] : rays)
+    if (!(direction.dot(point - center) > 0)) return std::nullopt;
+  return point;
+}
+
+void triangulate_all(BundleProblem& problem, double least_angle_rad) {
+  problem.used.assign(problem.tracks.size(), 0);
+  problem.points.resize(problem.tracks.size(), Vec3::Zero());
+  for (std::size_t t = 0; t < problem.tracks.size(); ++t) {
+    const auto point = triangulate(problem, problem.tracks[t], least_angle_rad);
+    if (!point) continue;
+    problem.points[t] = *point;
+    problem.used[t] = 1;
+  }
+}
+
+double build_structure(BundleProblem& problem, unsigned free_inner,
+                       const StructureOptions& options) {
+  problem.used.assign(problem.tracks.size(), 0);
+  problem.points.assign(problem.tracks.size(), Vec3::Zero());
+  const auto tracks = chosen_tracks(problem, options.tracks);
+  BundleOptions bundle;
+  bundle.free_inner = free_inner;
+  bundle.extra_sigma_px = kEarlySigmaPx;
+  bundle.max_iterations = 15;
+  const auto present = std::count_if(problem.devices.begin(), problem.devices.end(),
+                                     [](const BundleDevice& d) { return d.present; });
+  if (present < 2) {
+    const Seed seed = best_seed(problem, tracks);
+    if (seed.score == 0) return std::numeric_limits<double>::infinity();
+    set_pose(problem.devices[seed.a], Mat3::Identity(), Vec3::Zero());
+    set_pose(problem.devices[seed.b], seed.rotation, seed.translation);
+    problem.devices[seed.a].present = problem.devices[seed.b].present = true;
+  }
+  triangulate_tracks(problem, tracks, options.least_angle_rad);
+  BundleSummary summary = adjust(problem, bundle);
+  std::vector<char> failed(problem.devices.size(), 0);
+  for (;;) {
+    std::vector<std::size_t> seen(problem.devices.size(), 0);
+    for (const std::size_t t : tracks)
+      if (problem.used[t] != 0)
+        for (const TrackView& view : problem.tracks[t].views) ++seen[view.device];
+    std::size_t next = problem.devices.size();
+    for (std::size_t d = 0; d < problem.devices.size(); ++d) {
+      if (problem.devices[d].present || failed[d] != 0) continue;
+      if (next == problem.devices.size() || seen[d] > seen[next]) next = d;
+    }
+    if (next == problem.devices.size()) break;
+    if (!join_device(problem, next, tracks, options)) {
+      failed[next] = 1;
+      continue;
+    }
+    std::fill(failed.begin(), failed.end(), 0);  // new points may join those that failed
+    triangulate_tracks(problem, tracks, options.least_angle_rad);
+    summary = adjust(problem, bundle);
+  }
+  bundle.max_iterations = 60;
+  summary = adjust(problem, bundle);
+  return summary.cost / static_cast<double>(std::max<std::size_t>(summary.views, 1));
+}
+
+}  // namespace pencilscan

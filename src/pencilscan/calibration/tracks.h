@@ -1,0 +1,82 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "pencilscan/calibration/gray_decode.h"
+#include "pencilscan/geometry/types.h"
+#include "pencilscan/rig/rig.h"
+
+namespace pencilscan {
+
+/// One device's view of a surface point. Devices are numbered cameras first, then projectors.
+struct TrackView {
+  std::size_t device = 0;
+  Vec2 pixel = Vec2::Zero();
+  double sigma_px = 0;  ///< of each coordinate, one standard deviation, > 0
+};
+
+/// A surface point seen by two or more devices. All views but the hub are measured at the hub's
+/// pixel, which is exact by definition: a camera pixel that several projectors light, or a panel
+/// pixel that several cameras see. So camera-projector, camera-camera (through a panel pixel) and
+/// projector-projector correspondences (through a camera pixel) come together.
+struct Track {
+  std::vector<TrackView> views;  ///< views[0] is the hub
+  std::size_t capture = 0;       ///< object pose; pieces of one capture do not move
+};
+
+[[nodiscard]] inline std::size_t device_total(const Rig& rig) {
+  return rig.cameras.size() + rig.projectors.size();
+}
+[[nodiscard]] inline const Device& calibrated_device(const Rig& rig, std::size_t device) {
+  if (device < rig.cameras.size()) return rig.cameras[device];
+  return rig.projectors[device - rig.cameras.size()];
+}
+[[nodiscard]] inline Device& calibrated_device(Rig& rig, std::size_t device) {
+  if (device < rig.cameras.size()) return rig.cameras[device];
+  return rig.projectors[device - rig.cameras.size()];
+}
+
+struct TrackOptions {
+  int spacing_px = 16;             ///< of the lattices of hub pixels, >= 8: windows do not overlap
+  double hub_sigma_px = 0.02;      ///< stands for "exact", > 0
+  double least_sigma_px = 0.03;    ///< of a measured view: what the window's fit cannot know, > 0
+  double largest_sigma_px = 0.5;   ///< worse views are left out, > 0
+  std::size_t max_tracks = 20000;  ///< of all captures together, >= 1
+};
+
+/// Collects what the pairs of one capture contribute, then joins views of the same hub pixel.
+class TrackBuilder {
+ public:
+  TrackBuilder(const Rig& rig, const TrackOptions& options);
+
+  /// Adds the views of one camera-projector pair. Not for several threads at once.
+  void add(std::size_t capture, std::size_t camera, std::size_t projector,
+           const DecodedView& decoded);
+  /// All tracks with two views or more, at most max_tracks, spread evenly over captures, hubs and
+  /// images. Those with more views go first.
+  [[nodiscard]] std::vector<Track> tracks() const;
+  [[nodiscard]] std::size_t samples() const { return samples_.size(); }
+
+ private:
+  struct Sample {
+    std::size_t capture;
+    std::size_t hub;     ///< device
+    std::uint32_t cell;  ///< lattice cell of the hub, row by row
+    Vec2 hub_pixel;
+    TrackView view;
+  };
+  void add_camera_hubs(std::size_t capture, std::size_t camera, std::size_t projector,
+                       const DecodedView& decoded);
+  void add_projector_hubs(std::size_t capture, std::size_t camera, std::size_t projector,
+                          const DecodedView& decoded);
+
+  TrackOptions options_;
+  std::size_t cameras_;
+  std::vector<int> columns_;  ///< of each device's lattice
+  std::vector<Vec2> size_;    ///< of each device's image
+  std::vector<Sample> samples_;
+};
+
+}  // namespace pencilscan
