@@ -4,6 +4,7 @@
 #include <cmath>
 #include <opencv2/core.hpp>
 
+#include "pencilscan/core/median.h"
 #include "pencilscan/depth/seeds.h"
 
 namespace pencilscan {
@@ -124,9 +125,7 @@ CameraLight measure_light(const Rig& rig, int camera, const std::vector<ColorFam
       if (fit) values.push_back(fit->misfit);
     }
     if (values.empty()) return 1e9F;
-    std::nth_element(values.begin(),
-                     values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
-    return values[values.size() / 2];
+    return upper_median(std::move(values));
   };
   // Golden section for the blur.
   float low = 0.3F, high = 2.5F;
@@ -160,8 +159,7 @@ CameraLight measure_light(const Rig& rig, int camera, const std::vector<ColorFam
     const auto half_median = [&](std::size_t from, std::size_t to) {
       std::vector<float> v;
       for (std::size_t k = from; k < to; ++k) v.push_back(samples[k].second);
-      std::nth_element(v.begin(), v.begin() + static_cast<std::ptrdiff_t>(v.size() / 2), v.end());
-      return std::pair(samples[(from + to) / 2].first, v[v.size() / 2]);
+      return std::pair(samples[(from + to) / 2].first, upper_median(std::move(v)));
     };
     const auto dark = half_median(0, samples.size() / 2);
     const auto bright = half_median(samples.size() / 2, samples.size());

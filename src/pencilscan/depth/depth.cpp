@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "pencilscan/core/check.h"
+#include "pencilscan/core/median.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/core/stopwatch.h"
 
@@ -31,10 +32,7 @@ CameraDepthReport camera_report(const DepthMap& map, double blur_px) {
     if (node.measured()) sigmas.push_back(node.sigma);
   }
   report.measured = sigmas.size();
-  if (sigmas.empty()) return report;
-  const auto middle = sigmas.begin() + static_cast<std::ptrdiff_t>(sigmas.size() / 2);
-  std::nth_element(sigmas.begin(), middle, sigmas.end());
-  report.sigma_median_mm = static_cast<double>(*middle);
+  report.sigma_median_mm = static_cast<double>(upper_median(std::move(sigmas)));
   return report;
 }
 

@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 
-#include "pencilscan/core/parallel.h"
+#include "pencilscan/core/chunks.h"
 #include "pencilscan/surface/mesh_parts.h"
 #include "pencilscan/surface/point_grid.h"
 
@@ -54,55 +54,50 @@ void attribute_vertices(std::span<const SurfaceSample> samples, double reach_spa
   std::vector<char> fringe(mesh.vertices.size(), 0);
   mesh.sigma.assign(mesh.vertices.size(), 0.0F);
   mesh.confidence.assign(mesh.vertices.size(), 0.0F);
-  const std::size_t chunks = (mesh.vertices.size() + kChunk - 1) / kChunk;
-  parallel_for(chunks, [&](std::size_t chunk) {
-    const std::size_t end = std::min(mesh.vertices.size(), (chunk + 1) * kChunk);
-    for (std::size_t v = chunk * kChunk; v < end; ++v) {
-      double nearest = radius;  // mm, to any sample of this side
-      double best = 1;          // distance / reach of the best sample
-      double weight_sum = 0;
-      double variance_sum = 0;
-      double confidence_sum = 0;
-      Vec3 pull =
-          Vec3::Zero();  // sum of the offsets: cancels out where samples surround the vertex
-      double pull_length = 0;
-      std::array<bool, 256> seen{};
-      int cameras = 0;
-      grid.for_each_within(mesh.vertices[v], radius, [&](std::size_t i, double d2) {
-        const SurfaceSample& s = samples[i];
-        const Vec3 d = s.position - mesh.vertices[v];
-        if (s.normal.dot(normals[v]) < 0.5) return;
-        if (std::abs(d.dot(normals[v])) > 0.5 * spacing) return;
-        const double distance = std::sqrt(d2);
-        nearest = std::min(nearest, distance);
-        const double tilt = s.sheet_normal.dot(s.normal);
-        const double stretch = 1 / std::sqrt(std::max(1 - tilt * tilt, 1e-6));
-        const double reach = reach_spacings * s.spacing * std::min(stretch, kMaxStretch);
-        if (distance > reach) return;
-        best = std::min(best, distance / reach);
-        pull += d;
-        pull_length += distance;
-        const double across = s.sigma * std::max(std::abs(s.to_camera.dot(s.normal)), 0.2);
-        const double w = std::exp(-2 * d2 / (spacing * spacing));
-        weight_sum += w;
-        variance_sum += w * (across * across + s.residual * s.residual);
-        confidence_sum += w * s.confidence;
-        if (!seen[s.camera]) ++cameras;
-        seen[s.camera] = true;
-      });
-      double variance = kInterpolation * kInterpolation * nearest * nearest;
-      // Samples that fill a half plane pull with 2 / pi of their summed distance.
-      fringe[v] = pull.norm() > 0.55 * pull_length && best > kOutsideReach;
-      if (weight_sum > 0) {
-        // Samples of one camera share their errors; cameras are independent.
-        variance += variance_sum / weight_sum / std::max(cameras, 1);
-        const double certainty = confidence_sum / weight_sum * (1 - 0.5 * best * best);
-        mesh.confidence[v] = static_cast<float>(std::clamp(certainty, 0.01, 1.0));
-      } else {
-        variance = nearest * nearest;  // a guess: at least as far off as the nearest sample is away
-      }
-      mesh.sigma[v] = static_cast<float>(std::sqrt(variance));
+  parallel_chunks(mesh.vertices.size(), kChunk, [&](std::size_t v) {
+    double nearest = radius;  // mm, to any sample of this side
+    double best = 1;          // distance / reach of the best sample
+    double weight_sum = 0;
+    double variance_sum = 0;
+    double confidence_sum = 0;
+    Vec3 pull = Vec3::Zero();  // sum of the offsets: cancels out where samples surround the vertex
+    double pull_length = 0;
+    std::array<bool, 256> seen{};
+    int cameras = 0;
+    grid.for_each_within(mesh.vertices[v], radius, [&](std::size_t i, double d2) {
+      const SurfaceSample& s = samples[i];
+      const Vec3 d = s.position - mesh.vertices[v];
+      if (s.normal.dot(normals[v]) < 0.5) return;
+      if (std::abs(d.dot(normals[v])) > 0.5 * spacing) return;
+      const double distance = std::sqrt(d2);
+      nearest = std::min(nearest, distance);
+      const double tilt = s.sheet_normal.dot(s.normal);
+      const double stretch = 1 / std::sqrt(std::max(1 - tilt * tilt, 1e-6));
+      const double reach = reach_spacings * s.spacing * std::min(stretch, kMaxStretch);
+      if (distance > reach) return;
+      best = std::min(best, distance / reach);
+      pull += d;
+      pull_length += distance;
+      const double across = s.sigma * std::max(std::abs(s.to_camera.dot(s.normal)), 0.2);
+      const double w = std::exp(-2 * d2 / (spacing * spacing));
+      weight_sum += w;
+      variance_sum += w * (across * across + s.residual * s.residual);
+      confidence_sum += w * s.confidence;
+      if (!seen[s.camera]) ++cameras;
+      seen[s.camera] = true;
+    });
+    double variance = kInterpolation * kInterpolation * nearest * nearest;
+    // Samples that fill a half plane pull with 2 / pi of their summed distance.
+    fringe[v] = pull.norm() > 0.55 * pull_length && best > kOutsideReach;
+    if (weight_sum > 0) {
+      // Samples of one camera share their errors; cameras are independent.
+      variance += variance_sum / weight_sum / std::max(cameras, 1);
+      const double certainty = confidence_sum / weight_sum * (1 - 0.5 * best * best);
+      mesh.confidence[v] = static_cast<float>(std::clamp(certainty, 0.01, 1.0));
+    } else {
+      variance = nearest * nearest;  // a guess: at least as far off as the nearest sample is away
     }
+    mesh.sigma[v] = static_cast<float>(std::sqrt(variance));
   });
   cut_fringe(fringe, mesh);
 }

@@ -6,7 +6,7 @@
 #include <tuple>
 #include <unordered_map>
 
-#include "pencilscan/core/parallel.h"
+#include "pencilscan/core/chunks.h"
 
 namespace pencilscan {
 namespace {
@@ -45,13 +45,6 @@ double tally(const std::vector<Vote>& votes, const std::vector<double>& belief) 
   return total + best;
 }
 
-template <typename Body>
-void parallel_samples(std::size_t count, const Body& body) {
-  parallel_for((count + kChunk - 1) / kChunk, [&](std::size_t chunk) {
-    for (std::size_t i = chunk * kChunk; i < std::min(count, (chunk + 1) * kChunk); ++i) body(i);
-  });
-}
-
 /// Keeps, for each group, the nearest (smallest d2) candidates only, to bound the work.
 struct Candidate {
   std::uint32_t group;
@@ -78,7 +71,7 @@ std::vector<Vote> nearest_per_group(std::vector<Candidate>& candidates, std::siz
 Votes collect_support(std::span<const SurfaceSample> samples, const PointGrid& grid,
                       double spacing) {
   Votes support(samples.size());
-  parallel_samples(samples.size(), [&](std::size_t i) {
+  parallel_chunks(samples.size(), kChunk, [&](std::size_t i) {
     const SurfaceSample& p = samples[i];
     std::vector<Candidate> candidates;
     grid.for_each_within(p.position, kSupportRadius * spacing, [&](std::size_t j, double d2) {
@@ -176,7 +169,7 @@ Votes collect_contradictions(const Rig& rig, std::span<const SurfaceSample> samp
                                      : rig.projectors[view - rig.cameras.size()].center();
   };
   Votes contradictions(samples.size());
-  parallel_samples(samples.size(), [&](std::size_t i) {
+  parallel_chunks(samples.size(), kChunk, [&](std::size_t i) {
     const SurfaceSample& p = samples[i];
     std::vector<Candidate> candidates;
     for (std::size_t view = 0; view < views.size(); ++view) {
@@ -212,7 +205,7 @@ Votes collect_contradictions(const Rig& rig, std::span<const SurfaceSample> samp
 std::vector<std::vector<std::uint32_t>> collect_along(std::span<const SurfaceSample> samples,
                                                       const PointGrid& grid, double spacing) {
   std::vector<std::vector<std::uint32_t>> along(samples.size());
-  parallel_samples(samples.size(), [&](std::size_t i) {
+  parallel_chunks(samples.size(), kChunk, [&](std::size_t i) {
     grid.for_each_within(samples[i].position, kAlongRadius * spacing, [&](std::size_t j, double) {
       if (samples[j].curve == samples[i].curve) along[i].push_back(static_cast<std::uint32_t>(j));
     });
@@ -231,11 +224,11 @@ std::vector<double> vote(const Rig& rig, std::span<const SurfaceSample> samples,
   std::vector<double> s(samples.size());
   std::vector<double> c(samples.size());
   for (int round = 0; round < kRounds; ++round) {
-    parallel_samples(samples.size(), [&](std::size_t i) {
+    parallel_chunks(samples.size(), kChunk, [&](std::size_t i) {
       s[i] = tally(support[i], belief);
       c[i] = tally(contradictions[i], belief);
     });
-    parallel_samples(samples.size(), [&](std::size_t i) {
+    parallel_chunks(samples.size(), kChunk, [&](std::size_t i) {
       double s_mean = 0;
       double c_mean = 0;
       for (const std::uint32_t j : along[i]) {

@@ -3,7 +3,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 
-#include "pencilscan/core/parallel.h"
+#include "pencilscan/core/chunks.h"
 #include "pencilscan/depth/pattern_view.h"
 #include "pencilscan/geometry/ray_scene.h"
 #include "pencilscan/surface/mesh_parts.h"
@@ -93,21 +93,18 @@ bool found_by_depth(HoleReason reason) {
 void explain_nodes(const Rig& rig, const Visibility& visibility,
                    const std::vector<Vec3>& face_normals, DepthMap& map) {
   const auto c = static_cast<std::size_t>(map.camera);
-  parallel_for((map.nodes.size() + kChunk - 1) / kChunk, [&](std::size_t chunk) {
-    const std::size_t end = std::min(map.nodes.size(), (chunk + 1) * kChunk);
-    for (std::size_t i = chunk * kChunk; i < end; ++i) {
-      DepthNode& node = map.nodes[i];
-      if (node.measured() || found_by_depth(node.reason)) continue;
-      const auto hit = visibility.scene().first_hit(rig.cameras[c].ray(map.pixel(i)));
-      if (!hit) {
-        node.reason = HoleReason::kBackground;
-        continue;
-      }
-      const Vec3& normal = face_normals[hit->face];
-      const std::uint64_t lit = visibility.lighting(hit->point, normal);
-      if (node.reason == HoleReason::kOneProjector && lit != 0) continue;  // the depth stage knows
-      node.reason = visibility.reason(c, hit->point, normal, lit);
+  parallel_chunks(map.nodes.size(), kChunk, [&](std::size_t i) {
+    DepthNode& node = map.nodes[i];
+    if (node.measured() || found_by_depth(node.reason)) return;
+    const auto hit = visibility.scene().first_hit(rig.cameras[c].ray(map.pixel(i)));
+    if (!hit) {
+      node.reason = HoleReason::kBackground;
+      return;
     }
+    const Vec3& normal = face_normals[hit->face];
+    const std::uint64_t lit = visibility.lighting(hit->point, normal);
+    if (node.reason == HoleReason::kOneProjector && lit != 0) return;  // the depth stage knows
+    node.reason = visibility.reason(c, hit->point, normal, lit);
   });
 }
 
@@ -169,12 +166,9 @@ HoleReport explain_holes(const Rig& rig, const TriangleMesh& mesh, std::span<Dep
   }
   const std::vector<Vec3> normals = vertex_normals(mesh);
   report.vertices.assign(mesh.vertices.size(), HoleReason::kMeasured);
-  parallel_for((mesh.vertices.size() + kChunk - 1) / kChunk, [&](std::size_t chunk) {
-    const std::size_t end = std::min(mesh.vertices.size(), (chunk + 1) * kChunk);
-    for (std::size_t v = chunk * kChunk; v < end; ++v) {
-      if (mesh.confidence.empty() || mesh.confidence[v] > 0) continue;
-      report.vertices[v] = explain_vertex(rig, visibility, maps, mesh.vertices[v], normals[v]);
-    }
+  parallel_chunks(mesh.vertices.size(), kChunk, [&](std::size_t v) {
+    if (mesh.confidence.empty() || mesh.confidence[v] > 0) return;
+    report.vertices[v] = explain_vertex(rig, visibility, maps, mesh.vertices[v], normals[v]);
   });
   // A face belongs to the reason of its first invented vertex.
   for (std::size_t f = 0; f < mesh.faces.size(); ++f) {

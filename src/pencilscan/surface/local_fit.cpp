@@ -4,20 +4,13 @@
 #include <algorithm>
 #include <cmath>
 
-#include "pencilscan/core/parallel.h"
+#include "pencilscan/core/chunks.h"
 
 namespace pencilscan {
 namespace {
 
 /// Samples per unit of a parallel loop: enough work to hide the scheduling.
 constexpr std::size_t kChunk = 256;
-
-template <typename Body>
-void parallel_samples(std::size_t count, const Body& body) {
-  parallel_for((count + kChunk - 1) / kChunk, [&](std::size_t chunk) {
-    for (std::size_t i = chunk * kChunk; i < std::min(count, (chunk + 1) * kChunk); ++i) body(i);
-  });
-}
 
 struct PlaneFit {
   Vec3 normal = Vec3::Zero();
@@ -108,7 +101,7 @@ bool fit_quadric(std::span<const SurfaceSample> samples, const PointGrid& grid, 
 std::vector<Vec3> initial_normals(std::span<const SurfaceSample> samples, const PointGrid& grid,
                                   double radius) {
   std::vector<Vec3> normals(samples.size());
-  parallel_samples(samples.size(), [&](std::size_t i) {
+  parallel_chunks(samples.size(), kChunk, [&](std::size_t i) {
     const SurfaceSample& s = samples[i];
     std::vector<Vec3> points;
     std::vector<double> base;
@@ -142,8 +135,8 @@ void fit_local_surfaces(std::vector<SurfaceSample>& samples, double radius) {
     for (std::size_t i = 0; i < samples.size(); ++i) positions[i] = samples[i].position;
     const PointGrid grid(positions, radius);
     std::vector<SurfaceSample> fitted = samples;
-    parallel_samples(samples.size(),
-                     [&](std::size_t i) { fit_quadric(samples, grid, radius, fitted[i]); });
+    parallel_chunks(samples.size(), kChunk,
+                    [&](std::size_t i) { fit_quadric(samples, grid, radius, fitted[i]); });
     if (round + 1 < kRounds) {
       for (std::size_t i = 0; i < samples.size(); ++i) samples[i].normal = fitted[i].normal;
     } else {

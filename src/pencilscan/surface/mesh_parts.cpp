@@ -1,6 +1,9 @@
 #include "pencilscan/surface/mesh_parts.h"
 
+#include <algorithm>
+#include <cstdint>
 #include <numeric>
+#include <unordered_map>
 
 #include "pencilscan/core/check.h"
 
@@ -60,6 +63,42 @@ double face_area(const TriangleMesh& mesh, std::size_t face) {
   const Vec3& b = mesh.vertices[static_cast<std::size_t>(f[1])];
   const Vec3& c = mesh.vertices[static_cast<std::size_t>(f[2])];
   return 0.5 * (b - a).cross(c - a).norm();
+}
+
+TriangleMesh subdivided(const TriangleMesh& mesh) {
+  TriangleMesh fine = mesh;
+  fine.faces.clear();
+  fine.faces.reserve(4 * mesh.faces.size());
+  std::unordered_map<std::uint64_t, int> middles;
+  middles.reserve(2 * mesh.faces.size());
+  const auto middle = [&](int a, int b) {
+    const auto low = static_cast<std::uint64_t>(std::min(a, b));
+    const auto high = static_cast<std::uint64_t>(std::max(a, b));
+    const auto [it, is_new] =
+        middles.try_emplace(low << 32 | high, static_cast<int>(fine.vertices.size()));
+    if (is_new) {
+      const auto i = static_cast<std::size_t>(a);
+      const auto j = static_cast<std::size_t>(b);
+      fine.vertices.push_back(0.5 * (mesh.vertices[i] + mesh.vertices[j]));
+      if (!mesh.sigma.empty()) fine.sigma.push_back(0.5F * (mesh.sigma[i] + mesh.sigma[j]));
+      // Between a measured and an invented vertex nothing was measured.
+      if (!mesh.confidence.empty()) {
+        const bool both = mesh.confidence[i] > 0 && mesh.confidence[j] > 0;
+        fine.confidence.push_back(both ? 0.5F * (mesh.confidence[i] + mesh.confidence[j]) : 0.F);
+      }
+    }
+    return it->second;
+  };
+  for (const auto& face : mesh.faces) {
+    const int a = middle(face[0], face[1]);
+    const int b = middle(face[1], face[2]);
+    const int c = middle(face[2], face[0]);
+    fine.faces.push_back({face[0], a, c});
+    fine.faces.push_back({a, face[1], b});
+    fine.faces.push_back({c, b, face[2]});
+    fine.faces.push_back({a, b, c});
+  }
+  return fine;
 }
 
 }  // namespace pencilscan

@@ -16,4 +16,7 @@ namespace pencilscan {
 /// Area of one face, mm^2.
 [[nodiscard]] double face_area(const TriangleMesh& mesh, std::size_t face);
 
+/// Every face cut into four at the middles of its edges; properties are averaged.
+[[nodiscard]] TriangleMesh subdivided(const TriangleMesh& mesh);
+
 }  // namespace pencilscan

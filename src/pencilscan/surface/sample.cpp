@@ -7,6 +7,7 @@
 #include <tuple>
 
 #include "pencilscan/core/error.h"
+#include "pencilscan/core/median.h"
 
 namespace pencilscan {
 namespace {
@@ -47,13 +48,6 @@ std::pair<double, Vec3> light_sheet_at(const Projector& projector, std::size_t p
   return {spacing, pose.rotation.transpose() * normal.normalized()};
 }
 
-double median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 constexpr double kFarthest = 1e7;  // mm; 10 km off is a ray that missed its sheet
 
 using CurveKey = std::array<int, 4>;
@@ -75,7 +69,7 @@ SampleSet sample_curves(const Rig& rig, std::span<const MeasuredPoint> points,
         light_sheet_at(rig.projectors[points[i].projector], points[i].pattern, position(points[i]))
             .first);
   }
-  set.spacing = median(spacings);
+  set.spacing = upper_median(spacings);
   if (order.empty() || !(set.spacing > 0)) return set;
 
   const double cell = sample_spacings * set.spacing;

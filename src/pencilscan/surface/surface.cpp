@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "pencilscan/core/check.h"
-#include "pencilscan/core/parallel.h"
+#include "pencilscan/core/median.h"
 #include "pencilscan/core/stopwatch.h"
 #include "pencilscan/depth/consistency.h"
 #include "pencilscan/surface/attributes.h"
@@ -12,8 +12,8 @@
 #include "pencilscan/surface/filter.h"
 #include "pencilscan/surface/local_fit.h"
 #include "pencilscan/surface/mesh_parts.h"
+#include "pencilscan/surface/node_surface.h"
 #include "pencilscan/surface/sample.h"
-#include "pencilscan/surface/vertex_fit.h"
 
 namespace pencilscan {
 namespace {
@@ -22,7 +22,6 @@ constexpr std::size_t kLeastSamples = 30;  // fewer give no surface worth the na
 constexpr double kFitRadius = 1.6;         // spacings, neighbourhood of a local surface
 constexpr double kClusterGap = 2;          // spacings; one missing line does not split an object
 constexpr double kLeastCluster = 0.01;     // of the largest cluster's samples
-constexpr std::size_t kChunk = 256;
 
 std::vector<Vec3> positions_of(std::span<const SurfaceSample> samples) {
   std::vector<Vec3> positions;
@@ -84,11 +83,7 @@ std::vector<SurfaceSample> dense_samples(const Rig& rig, std::span<const DepthMa
       samples.push_back(s);
     }
   }
-  if (!spacings.empty()) {
-    const auto middle = spacings.begin() + static_cast<std::ptrdiff_t>(spacings.size() / 2);
-    std::nth_element(spacings.begin(), middle, spacings.end());
-    spacing = *middle;
-  }
+  spacing = upper_median(std::move(spacings));
   return samples;
 }
 
@@ -238,7 +233,7 @@ SurfaceResult fuse_depth(const Rig& rig, std::span<const MeasuredPoint> points,
   tell(0.8);
   if (!result.mesh.faces.empty()) {
     for (int i = 0; i < options.subdivisions; ++i) result.mesh = subdivided(result.mesh);
-    fit_vertices(samples, options.fit_spacings * spacing, result.mesh);
+    follow_nodes(rig, maps, options.follow, result.mesh);
     attribute_vertices(samples, options.reach_spacings, spacing, result.mesh);
   }
   result.measured = measured_part(result.mesh, options.least_island_spacings2 * spacing * spacing);

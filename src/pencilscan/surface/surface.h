@@ -10,6 +10,7 @@
 #include "pencilscan/geometry/mesh.h"
 #include "pencilscan/io/point_file.h"
 #include "pencilscan/rig/rig.h"
+#include "pencilscan/surface/node_surface.h"
 
 namespace pencilscan {
 
@@ -80,15 +81,16 @@ struct FusionOptions {
   double cell_spacings = 0.9;          ///< wished octree cell in node spacings, > 0
   double fit_spacings = 1.5;           ///< radius of local quadrics in node spacings, > 0
   int subdivisions = 1;                ///< of the octree's triangles, before they follow the depth
-  double reach_spacings = 1.5;         ///< a vertex farther from all nodes was not measured, > 0
+  FollowOptions follow;                ///< how vertices follow the depth
+  double reach_spacings = 2;           ///< a vertex farther from all nodes was not measured, > 0
   double min_component_share = 0.05;   ///< of the largest component's measured area, in [0, 1]
   double least_island_spacings2 = 16;  ///< area of a measured island that is kept, spacings^2
 };
 
 /// The nodes of all depth maps, each weighted by its variance, move onto local quadrics through the
 /// nodes of all cameras (local_fit.h); screened Poisson closes them; its triangles are cut finer
-/// and follow the quadrics where there is depth (vertex_fit.h). `points` only learn whether the
-/// surface bears them out.
+/// and follow the nodes' quadrics where there is depth (node_surface.h). `points` only learn
+/// whether the surface bears them out.
 [[nodiscard]] SurfaceResult fuse_depth(const Rig& rig, std::span<const MeasuredPoint> points,
                                        std::span<const DepthMap> maps,
                                        const FusionOptions& options = {},

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "pencilscan/depth/depth_map.h"
+#include "pencilscan/geometry/mesh.h"
+#include "pencilscan/rig/rig.h"
+
+namespace pencilscan {
+
+struct FollowOptions {
+  double width_nodes = 0.9;   ///< standard deviation of a node's say over the image, nodes, > 0
+  double farthest_mm = 1;     ///< nodes farther off along the normal are another surface, > 0
+  double robust_mm = 0.3;     ///< so far from the others a prediction counts a quarter, > 0
+  double least_weight = 0.6;  ///< sum of the nodes' bells below which a vertex has no depth, > 0
+  int rounds = 3;             ///< normals settle as vertices move
+};
+
+/// Moves each vertex along its normal to where the nodes of all cameras around its pixels say the
+/// surface is. Every node predicts it with its own quadric of inverse depth: a mean of such
+/// predictions keeps the curvature that a fit to the nodes' positions flattens. Predictions weigh
+/// by their variance and by a bell over the distance in the image. Vertices without depth follow
+/// their neighbours, less with every edge, so that no step remains where depth ends.
+void follow_nodes(const Rig& rig, std::span<const DepthMap> maps, const FollowOptions& options,
+                  TriangleMesh& mesh);
+
+}  // namespace pencilscan
