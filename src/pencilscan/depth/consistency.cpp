@@ -334,16 +334,20 @@ std::size_t drop_islands(const ConsistencyOptions& options, std::span<const char
     component.assign(1, i);
     seen[i] = 1;
     std::size_t supports = 0;
+    std::size_t seeds = 0;
     for (std::size_t k = 0; k < component.size(); ++k) {
       const std::int32_t id = comparison.id(map_index, component[k]);
       supports += supported[static_cast<std::size_t>(id)] ? 1 : 0;
+      seeds += map.nodes[component[k]].seeded ? 1 : 0;
       for_each_neighbor(map, component[k], 1, [&](std::size_t j) {
         if (!seen[j]) component.push_back(j);
         seen[j] = 1;
       });
     }
-    if (component.size() >= static_cast<std::size_t>(options.min_component)) continue;
-    if (2 * supports >= component.size()) continue;
+    // Growth keeps to one surface: an island without a labelled curve was reached by a slip.
+    const bool slipped = seeds == 0 && supports == 0;
+    const bool large = component.size() >= static_cast<std::size_t>(options.min_component);
+    if (!slipped && (large || 2 * supports >= component.size())) continue;
     dropped += component.size();
     for (const std::size_t k : component) {
       map.nodes[k].w = 0;

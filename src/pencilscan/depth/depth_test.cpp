@@ -334,5 +334,31 @@ TEST(Consistency, FloatingPatchIsRemovedAndUnconfirmedDepthStays) {
   EXPECT_LT(check_consistency(scene.rig, projectors, alone).contradicted, 5u);
 }
 
+TEST(Consistency, IslandsThatOnlyGrewAreRemoved) {
+  const BallScene& scene = ball_scene();
+  // One camera alone, so that nobody contradicts: a patch 6 mm behind the rest is a surface of its
+  // own. It may stay where a labelled curve started it, and not where growth slipped there.
+  for (const bool seeded : {true, false}) {
+    std::vector<DepthMap> maps = {scene.measure().maps[0]};
+    std::vector<std::size_t> patch;
+    for (std::size_t i = 0; i < maps[0].nodes.size(); ++i) {
+      DepthNode& node = maps[0].nodes[i];
+      if (!node.measured() || (maps[0].pixel(i) - Vec2(125, 100)).norm() > 20) continue;
+      node.w = static_cast<float>(1 / (1 / static_cast<double>(node.w) + 6));
+      node.seeded = seeded;
+      patch.push_back(i);
+    }
+    const std::vector<int> projectors = {0, 1};
+    static_cast<void>(check_consistency(scene.rig, projectors, maps));
+    std::size_t left = 0;
+    for (const std::size_t i : patch) left += maps[0].nodes[i].measured() ? 1 : 0;
+    if (seeded) {
+      EXPECT_GT(left, patch.size() * 9 / 10);
+    } else {
+      EXPECT_EQ(left, 0U);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace pencilscan

@@ -11,11 +11,12 @@ namespace pencilscan {
 /// Triangle mesh as a value. Invariant kept by its makers: indices lie in [0, vertices.size()).
 /// Optional per-vertex properties are empty or as long as `vertices`.
 struct TriangleMesh {
-  std::vector<Vec3> vertices;             ///< mm
-  std::vector<std::array<int, 3>> faces;  ///< counter-clockwise seen from outside
-  std::vector<float> sigma;               ///< mm along the normal
-  std::vector<float> confidence;          ///< 0..1
-  std::vector<std::uint8_t> hole;         ///< why nobody measured it (HoleReason of depth)
+  std::vector<Vec3> vertices;               ///< mm
+  std::vector<std::array<int, 3>> faces;    ///< counter-clockwise seen from outside
+  std::vector<float> sigma;                 ///< mm along the normal
+  std::vector<float> confidence;            ///< 0..1
+  std::vector<std::array<float, 3>> color;  ///< albedo, linear red, green, blue in [0, 1]
+  std::vector<std::uint8_t> hole;           ///< why nobody measured it (HoleReason of depth)
 };
 
 struct BoundingBox {

@@ -1,5 +1,7 @@
 #include <algorithm>
 #include <cctype>
+#include <cmath>
+#include <cstdint>
 #include <cstdio>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -8,16 +10,25 @@
 #include "pencilscan/io/file.h"
 #include "pencilscan/io/little_endian.h"
 #include "pencilscan/io/mesh_file.h"
+#include "pencilscan/io/srgb.h"
 
 namespace pencilscan {
 namespace {
 
 std::string obj_text(const TriangleMesh& mesh) {
   std::string text = "# unit mm\n";
-  char line[96];
-  for (const Vec3& v : mesh.vertices) {
-    std::snprintf(line, sizeof line, "v %.5f %.5f %.5f\n", v[0], v[1], v[2]);
+  char line[128];
+  for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
+    const Vec3& v = mesh.vertices[i];
+    std::snprintf(line, sizeof line, "v %.5f %.5f %.5f", v[0], v[1], v[2]);
     text += line;
+    if (!mesh.color.empty()) {
+      const auto& c = mesh.color[i];
+      std::snprintf(line, sizeof line, " %.4f %.4f %.4f", to_srgb(c[0]), to_srgb(c[1]),
+                    to_srgb(c[2]));
+      text += line;
+    }
+    text += '\n';
   }
   for (const auto& f : mesh.faces) {
     std::snprintf(line, sizeof line, "f %d %d %d\n", f[0] + 1, f[1] + 1, f[2] + 1);
@@ -46,6 +57,10 @@ std::string stl_bytes(const TriangleMesh& mesh) {
 /// World z up in mm -> glTF's y up in m: (x, z, -y) / 1000.
 Vec3 gltf_position(const Vec3& v) { return Vec3(v[0], v[2], -v[1]) / 1000; }
 
+std::uint16_t unorm16(float value) {
+  return static_cast<std::uint16_t>(std::lround(65535 * std::clamp(value, 0.F, 1.F)));
+}
+
 /// glTF 2.0, "GLB File Format Specification": a header, a chunk of JSON padded with spaces and one
 /// of binary data padded with zeros, each to four bytes.
 std::string glb_bytes(const TriangleMesh& mesh) {
@@ -65,6 +80,13 @@ std::string glb_bytes(const TriangleMesh& mesh) {
     // Validators want unit normals, also of a vertex without area.
     const Vec3 up(n[0], n[2], -n[1]);
     append_vector(data, up.squaredNorm() > 0.5 ? up : Vec3::UnitY());
+  }
+  // glTF wants linear colours; 16 bits keep dark ones apart. Four channels, as rows align to four
+  // bytes.
+  const std::size_t color_start = data.size();
+  for (const auto& color : mesh.color) {
+    for (const float c : color) append_little_endian(data, unorm16(c));
+    append_little_endian(data, unorm16(1));
   }
   const std::size_t index_start = data.size();
   for (const auto& f : mesh.faces) {
@@ -110,6 +132,19 @@ std::string glb_bytes(const TriangleMesh& mesh) {
                                     {"componentType", kUnsignedInt},
                                     {"count", 3 * mesh.faces.size()},
                                     {"type", "SCALAR"}}});
+  if (!mesh.color.empty()) {
+    constexpr int kUnsignedShort = 5123;
+    root["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = 3;
+    root["bufferViews"].push_back({{"buffer", 0},
+                                   {"byteOffset", color_start},
+                                   {"byteLength", index_start - color_start},
+                                   {"target", kArrayBuffer}});
+    root["accessors"].push_back({{"bufferView", 3},
+                                 {"componentType", kUnsignedShort},
+                                 {"normalized", true},
+                                 {"count", mesh.vertices.size()},
+                                 {"type", "VEC4"}});
+  }
   std::string text = root.dump();
   text.resize((text.size() + 3) / 4 * 4, ' ');
   data.resize((data.size() + 3) / 4 * 4, '\0');

@@ -16,6 +16,7 @@
 #include "pencilscan/io/file.h"
 #include "pencilscan/io/little_endian.h"
 #include "pencilscan/io/ply.h"
+#include "pencilscan/io/srgb.h"
 
 namespace pencilscan {
 namespace {
@@ -164,6 +165,8 @@ void write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh) {
   PENCILSCAN_CHECK(!has_confidence || mesh.confidence.size() == mesh.vertices.size());
   const bool has_hole = !mesh.hole.empty();
   PENCILSCAN_CHECK(!has_hole || mesh.hole.size() == mesh.vertices.size());
+  const bool has_color = !mesh.color.empty();
+  PENCILSCAN_CHECK(!has_color || mesh.color.size() == mesh.vertices.size());
   std::string bytes;
   for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
     for (int axis = 0; axis < 3; ++axis) {
@@ -172,6 +175,10 @@ void write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh) {
     if (has_sigma) append_little_endian(bytes, mesh.sigma[i]);
     if (has_confidence) append_little_endian(bytes, mesh.confidence[i]);
     if (has_hole) append_little_endian(bytes, mesh.hole[i]);
+    if (has_color) {
+      for (const float linear : mesh.color[i])
+        append_little_endian(bytes, static_cast<std::uint8_t>(std::lround(255 * to_srgb(linear))));
+    }
   }
   for (const auto& face : mesh.faces) {
     append_little_endian(bytes, std::uint8_t{3});
@@ -184,6 +191,7 @@ void write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh) {
     if (has_sigma) stream << "property float sigma\n";
     if (has_confidence) stream << "property float confidence\n";
     if (has_hole) stream << "property uchar hole\n";
+    if (has_color) stream << "property uchar red\nproperty uchar green\nproperty uchar blue\n";
     stream << "element face " << mesh.faces.size()
            << "\nproperty list uchar int vertex_indices\nend_header\n"
            << bytes;

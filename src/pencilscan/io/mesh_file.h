@@ -16,7 +16,7 @@ namespace pencilscan {
 void write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh);
 
 /// Writes for other programs, by the ending: .obj (text, mm), .stl (binary, mm) or .glb (glTF 2.0
-/// binary: metres, y up, as glTF wants it), positions and triangles only. Whole or not at all.
+/// binary: metres, y up, as glTF wants it), positions, triangles and colours. Whole or not at all.
 /// InputError for another ending.
 void export_mesh(const std::filesystem::path& path, const TriangleMesh& mesh);
 

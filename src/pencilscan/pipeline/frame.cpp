@@ -1,11 +1,15 @@
 #include "pencilscan/pipeline/frame.h"
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdio>
 #include <utility>
 
+#include "pencilscan/core/check.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/core/stopwatch.h"
+#include "pencilscan/surface/vertex_color.h"
 
 namespace pencilscan {
 namespace {
@@ -50,6 +54,45 @@ std::string disagreement_warning(const CrossingDisagreement& crossings) {
       "explains %.2f: the rig's calibration is off; --refine-rig can correct it",
       crossings.median_px, crossings.expected_px);
   return text.data();
+}
+
+/// Images as vertex_colors() wants them; overexposed pixels are NaN.
+std::vector<ColorView> color_views(const Rig& rig, const Frame& frame, const PointResult& points,
+                                   const DepthReport& depth) {
+  std::vector<ColorView> views;
+  for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
+    if (frame.images[c].empty()) continue;
+    ColorView view;
+    view.camera = static_cast<int>(c);
+    view.image = linearized(frame.images[c], rig.cameras[c].gamma);
+    if (!rig.cameras[c].sees_texture_only)
+      view.image = unmixed(view.image, points.detections[c].unmixing);
+    view.image = view.image.clone();
+    constexpr float kFull = 0.998F;
+    for (int v = 0; v < view.image.rows; ++v) {
+      for (int u = 0; u < view.image.cols; ++u) {
+        const auto& raw = frame.images[c].at<cv::Vec3f>(v, u);
+        if (std::max({raw[0], raw[1], raw[2]}) >= kFull)
+          view.image.at<cv::Vec3f>(v, u) = cv::Vec3f::all(std::nanf(""));
+      }
+    }
+    for (const CameraDepthReport& of_camera : depth.cameras) {
+      if (of_camera.camera == view.camera) view.blur_px = of_camera.blur_px;
+    }
+    views.push_back(std::move(view));
+  }
+  return views;
+}
+
+/// The measured mesh has vertices of the closed one, in the same order.
+void copy_colors(const TriangleMesh& mesh, TriangleMesh& measured) {
+  std::size_t v = 0;
+  for (const Vec3& x : measured.vertices) {
+    while (v < mesh.vertices.size() && mesh.vertices[v] != x) ++v;
+    if (v == mesh.vertices.size()) break;
+    measured.color.push_back(mesh.color[v]);
+  }
+  PENCILSCAN_CHECK(measured.color.size() == measured.vertices.size());
 }
 
 }  // namespace
@@ -132,6 +175,11 @@ ShapeResult measure_shape(const Rig& rig, const Frame& frame, const PointResult&
       for (const HoleReason reason : result.holes.vertices)
         result.surface.mesh.hole.push_back(static_cast<std::uint8_t>(reason));
       result.times.push_back({"holes", hole_watch.seconds()});
+      const Stopwatch color_watch;
+      TriangleMesh& mesh = result.surface.mesh;
+      mesh.color = vertex_colors(rig, mesh, color_views(rig, frame, points, result.depth.report));
+      if (!mesh.color.empty()) copy_colors(mesh, result.surface.measured);
+      result.times.push_back({"color", color_watch.seconds()});
       return result;
     }
   }

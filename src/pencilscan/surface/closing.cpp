@@ -55,23 +55,23 @@ TriangleMesh without_floaters(const TriangleMesh& mesh, double min_share, std::s
 ClosedSurface closed_surface(std::span<const SurfaceSample> samples,
                              const ClosingOptions& options) {
   constexpr int kProbeDepth = 6;  // half a second, against several at the full depth
-  ClosedSurface result;
-  for (const double scale : {1.5, 2.0, 3.0}) {
-    result.scale = scale;
-    result.depth = octree_depth(samples, options, scale);
-    if (result.depth > kProbeDepth && scale < 3) {
-      const EdgeCounts probe = count_edges(poisson_surface(samples, kProbeDepth, scale));
-      if (probe.boundary > 0) continue;  // a coarse surface leaves the cube where a fine one does
-    }
-    result.mesh = poisson_surface(samples, result.depth, scale);
-    if (result.mesh.faces.empty()) continue;
-    attribute_vertices(samples, options.reach_spacings, options.spacing_mm, result.mesh);
-    result.components_removed = 0;
-    result.mesh =
-        without_floaters(result.mesh, options.min_component_share, result.components_removed);
-    result.edges = count_edges(result.mesh);
-    if (result.edges.boundary == 0 && result.edges.non_manifold == 0) break;
+  // The smallest cube that the surface does not leave. A coarse surface leaves it where a fine one
+  // does. What few cameras saw may leave any cube: it is cut by the smallest one and capped there.
+  constexpr double kSmallest = 1.5;
+  double scale = kSmallest;
+  for (const double wider : {kSmallest, 2.0, 3.0}) {
+    if (count_edges(poisson_surface(samples, kProbeDepth, wider)).boundary > 0) continue;
+    scale = wider;
+    break;
   }
+  ClosedSurface result;
+  result.scale = scale;
+  result.depth = octree_depth(samples, options, scale);
+  result.mesh = with_caps(poisson_surface(samples, result.depth, scale));
+  attribute_vertices(samples, options.reach_spacings, options.spacing_mm, result.mesh);
+  result.mesh =
+      without_floaters(result.mesh, options.min_component_share, result.components_removed);
+  result.edges = count_edges(result.mesh);
   return result;
 }
 

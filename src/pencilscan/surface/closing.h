@@ -23,8 +23,8 @@ struct ClosedSurface {
   std::size_t components_removed = 0;
 };
 
-/// Screened Poisson surface of the samples, in a growing cube until it closes inside, without
-/// components that hardly anything measured.
+/// Screened Poisson surface of the samples in a cube within which it closes, or else capped where
+/// it leaves the cube, without components that hardly anything measured.
 [[nodiscard]] ClosedSurface closed_surface(std::span<const SurfaceSample> samples,
                                            const ClosingOptions& options);
 

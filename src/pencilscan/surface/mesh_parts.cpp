@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <map>
 #include <numeric>
 #include <unordered_map>
+#include <utility>
 
 #include "pencilscan/core/check.h"
 
@@ -46,6 +48,7 @@ TriangleMesh submesh(const TriangleMesh& mesh, std::span<const char> keep_face) 
     part.vertices.push_back(mesh.vertices[v]);
     if (!mesh.sigma.empty()) part.sigma.push_back(mesh.sigma[v]);
     if (!mesh.confidence.empty()) part.confidence.push_back(mesh.confidence[v]);
+    if (!mesh.color.empty()) part.color.push_back(mesh.color[v]);
     if (!mesh.hole.empty()) part.hole.push_back(mesh.hole[v]);
   }
   for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
@@ -99,6 +102,40 @@ TriangleMesh subdivided(const TriangleMesh& mesh) {
     fine.faces.push_back({a, b, c});
   }
   return fine;
+}
+
+TriangleMesh with_caps(TriangleMesh mesh) {
+  PENCILSCAN_CHECK(mesh.sigma.empty() && mesh.confidence.empty() && mesh.hole.empty() &&
+                   mesh.color.empty());
+  std::vector<std::pair<int, int>> edges;
+  edges.reserve(3 * mesh.faces.size());
+  for (const auto& face : mesh.faces) {
+    for (std::size_t k = 0; k < 3; ++k) edges.emplace_back(face[k], face[(k + 1) % 3]);
+  }
+  std::sort(edges.begin(), edges.end());
+  // Open edges by their start; where two loops touch in a vertex there are several.
+  std::multimap<int, int> open;
+  for (const auto& [a, b] : edges) {
+    if (!std::binary_search(edges.begin(), edges.end(), std::pair(b, a))) open.emplace(a, b);
+  }
+  while (!open.empty()) {
+    std::vector<int> loop;
+    for (auto edge = open.begin(); edge != open.end(); edge = open.find(loop.back())) {
+      if (loop.empty()) loop.push_back(edge->first);
+      loop.push_back(edge->second);
+      open.erase(edge);
+      if (loop.back() == loop.front()) break;
+    }
+    if (loop.size() < 4 || loop.back() != loop.front()) continue;
+    Vec3 mean = Vec3::Zero();
+    for (std::size_t k = 1; k < loop.size(); ++k)
+      mean += mesh.vertices[static_cast<std::size_t>(loop[k])];
+    const int center = static_cast<int>(mesh.vertices.size());
+    mesh.vertices.emplace_back(mean / static_cast<double>(loop.size() - 1));
+    for (std::size_t k = 1; k < loop.size(); ++k)
+      mesh.faces.push_back({loop[k], loop[k - 1], center});
+  }
+  return mesh;
 }
 
 }  // namespace pencilscan

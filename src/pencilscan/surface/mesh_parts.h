@@ -19,4 +19,8 @@ namespace pencilscan {
 /// Every face cut into four at the middles of its edges; properties are averaged.
 [[nodiscard]] TriangleMesh subdivided(const TriangleMesh& mesh);
 
+/// The mesh with a fan over every loop of boundary edges, from a new vertex at the loop's mean.
+/// Only for meshes without vertex properties.
+[[nodiscard]] TriangleMesh with_caps(TriangleMesh mesh);
+
 }  // namespace pencilscan

@@ -1,0 +1,14 @@
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+namespace pencilscan {
+
+/// Linear light in [0, 1] -> the values that screens and mesh viewers expect (IEC 61966-2-1).
+[[nodiscard]] inline double to_srgb(double linear) {
+  const double x = std::clamp(linear, 0.0, 1.0);
+  return x <= 0.0031308 ? 12.92 * x : 1.055 * std::pow(x, 1 / 2.4) - 0.055;
+}
+
+}  // namespace pencilscan

@@ -1,0 +1,321 @@
+#include "pencilscan/surface/vertex_color.h"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <numbers>
+
+#include "pencilscan/core/chunks.h"
+#include "pencilscan/depth/pattern_view.h"
+#include "pencilscan/geometry/ray_scene.h"
+
+namespace pencilscan {
+namespace {
+
+constexpr std::size_t kChunk = 256;
+constexpr double kOffSurface = 0.5;  // mm; keeps a ray's end off the surface it lies on
+
+using Channels = Eigen::Array3f;
+
+/// What one camera says of one vertex: image = albedo * (light + ambient).
+struct Sample {
+  Channels light = Channels::Zero();
+  Channels image = Channels::Zero();
+  float weight = 0;  ///< 0: not seen
+};
+
+/// Share of a pixel's light at line coordinate l under lines of half width h (lines), blurred by a
+/// Gaussian of deviation s (lines).
+double line_profile(double l, double h, double s) {
+  const double a = std::abs(l - std::round(l));
+  const double k = 1 / (std::numbers::sqrt2 * std::max(s, 1e-3));
+  const auto box = [&](double x) { return 0.5 * (std::erf((h - x) * k) + std::erf((h + x) * k)); };
+  return box(a) + box(1 - a);
+}
+
+/// Value between pixels, or NaN at the border.
+Channels bilinear(const cv::Mat& image, const Vec2& pixel) {
+  const int u = static_cast<int>(std::floor(pixel[0]));
+  const int v = static_cast<int>(std::floor(pixel[1]));
+  if (u < 0 || v < 0 || u + 1 >= image.cols || v + 1 >= image.rows)
+    return Channels::Constant(std::nanf(""));
+  const auto fx = static_cast<float>(pixel[0] - u);
+  const auto fy = static_cast<float>(pixel[1] - v);
+  Channels sum = Channels::Zero();
+  for (int dy = 0; dy < 2; ++dy) {
+    for (int dx = 0; dx < 2; ++dx) {
+      const auto& value = image.at<cv::Vec3f>(v + dy, u + dx);
+      const float weight = (dx == 1 ? fx : 1 - fx) * (dy == 1 ? fy : 1 - fy);
+      sum += weight * Channels(value[0], value[1], value[2]);
+    }
+  }
+  return sum;
+}
+
+class Light {
+ public:
+  Light(const Rig& rig, const TriangleMesh& mesh, std::span<const ColorView> views,
+        const ColorOptions& options)
+      : rig_(rig), scene_(mesh), options_(options), reference_mm_(rig.projectors.size()) {
+    const Sphere volume = working_volume(rig);
+    for (std::size_t p = 0; p < rig.projectors.size(); ++p)
+      reference_mm_[p] = (rig.projectors[p].center() - volume.center).norm();
+    for (const ColorView& view : views) {
+      patterns_.emplace_back();
+      const Camera& camera = rig.cameras[static_cast<std::size_t>(view.camera)];
+      if (camera.sees_texture_only) continue;
+      for (std::size_t p = 0; p < rig.projectors.size(); ++p) {
+        for (std::size_t k = 0; k < rig.projectors[p].patterns.size(); ++k)
+          patterns_.back().emplace_back(rig, camera, static_cast<int>(p), static_cast<int>(k));
+      }
+    }
+  }
+
+  [[nodiscard]] bool sees(const Vec3& eye, const Vec3& x, const Vec3& normal) const {
+    if ((eye - x).normalized().dot(normal) < options_.least_cosine) return false;
+    return scene_.visible(eye, x + kOffSurface * normal, kOffSurface);
+  }
+
+  /// Of each projector at a place, relative to the centre of the volume at a right angle; 0 in
+  /// shadow.
+  void irradiance(const Vec3& x, const Vec3& normal, std::vector<double>& of_projector) const {
+    of_projector.assign(rig_.projectors.size(), 0.0);
+    for (std::size_t p = 0; p < rig_.projectors.size(); ++p) {
+      const Projector& projector = rig_.projectors[p];
+      const auto pixel = projector.project(x);
+      if (!pixel || !projector.contains(*pixel) || !sees(projector.center(), x, normal)) continue;
+      const Vec3 way = projector.center() - x;
+      const double near = reference_mm_[p] / way.norm();
+      of_projector[p] = near * near * way.normalized().dot(normal);
+    }
+  }
+
+  /// Pattern light that a camera ought to see there.
+  [[nodiscard]] Channels pattern_light(std::size_t view, const Camera& camera, double blur_px,
+                                       const Vec3& x, const Vec3& normal,
+                                       std::span<const double> irradiance) const {
+    Channels light = Channels::Zero();
+    const Vec3 local = camera.device_from_world * x;
+    const double w = 1 / local.z();
+    const Vec2 m = local.head<2>() * w;
+    const Eigen::Matrix2d jacobian = camera.K.topLeftCorner<2, 2>().inverse();
+    // Inverse depth of the tangent plane: w = omega . (x, y, 1), omega = n / (n . X).
+    const Vec3 n = camera.device_from_world.rotation * normal;
+    const Vec3 omega = n / n.dot(local);
+    const Eigen::Vector2f slope = (jacobian.transpose() * omega.head<2>()).cast<float>();
+    for (const PatternView& pattern : patterns_[view]) {
+      const double power = irradiance[static_cast<std::size_t>(pattern.projector())];
+      if (!(power > 0)) continue;
+      bool ok = false;
+      const WindowLines lines = pattern.lines(m, jacobian, w, ok);
+      if (!ok) continue;
+      const auto wf = static_cast<float>(w);
+      const double l = static_cast<double>(lines.line(0, 0, wf));
+      const double blur =
+          blur_px * static_cast<double>(lines.gradient(wf, slope[0], slope[1]).norm());
+      const Rgb color = pattern.pattern().color(static_cast<int>(std::lround(std::max(l, 0.0))));
+      const double value =
+          power * line_profile(l, static_cast<double>(pattern.half_width()), std::min(blur, 0.5));
+      light += (value * Eigen::Array3d(color[0], color[1], color[2])).cast<float>();
+    }
+    return light;
+  }
+
+ private:
+  const Rig& rig_;
+  RayScene scene_;
+  ColorOptions options_;
+  std::vector<double> reference_mm_;
+  std::vector<std::vector<PatternView>> patterns_;  ///< per view
+};
+
+std::vector<Sample> collect(const Rig& rig, const TriangleMesh& mesh,
+                            std::span<const ColorView> views, const ColorOptions& options,
+                            bool texture_cameras) {
+  const Light light(rig, mesh, views, options);
+  const std::vector<Vec3> normals = vertex_normals(mesh);
+  std::vector<Sample> samples(mesh.vertices.size() * views.size());
+  parallel_chunks(mesh.vertices.size(), kChunk, [&](std::size_t v) {
+    if (!mesh.confidence.empty() && !(mesh.confidence[v] > 0)) return;  // it may be elsewhere
+    const Vec3& x = mesh.vertices[v];
+    thread_local std::vector<double> irradiance;
+    irradiance.clear();
+    for (std::size_t k = 0; k < views.size(); ++k) {
+      const Camera& camera = rig.cameras[static_cast<std::size_t>(views[k].camera)];
+      if (camera.sees_texture_only != texture_cameras) continue;
+      const auto pixel = camera.project(x);
+      if (!pixel || !camera.contains(*pixel) || !light.sees(camera.center(), x, normals[v]))
+        continue;
+      Sample sample;
+      sample.image = bilinear(views[k].image, *pixel);
+      if (!sample.image.isFinite().all()) continue;
+      sample.weight = static_cast<float>((camera.center() - x).normalized().dot(normals[v]));
+      if (texture_cameras) {
+        sample.light = Channels::Ones();
+      } else {
+        if (irradiance.empty()) light.irradiance(x, normals[v], irradiance);
+        sample.light = light.pattern_light(k, camera, views[k].blur_px, x, normals[v], irradiance);
+      }
+      samples[v * views.size() + k] = sample;
+    }
+  });
+  return samples;
+}
+
+/// Sums of the normal equations of one vertex: albedo = right / weight.
+struct Evidence {
+  Channels weight = Channels::Zero();
+  Channels right = Channels::Zero();
+};
+
+std::vector<Evidence> evidence(std::span<const Sample> samples, std::size_t views,
+                               std::span<const Channels> ambient) {
+  std::vector<Evidence> sums(samples.size() / views);
+  for (std::size_t v = 0; v < sums.size(); ++v) {
+    for (std::size_t k = 0; k < views; ++k) {
+      const Sample& s = samples[v * views + k];
+      if (!(s.weight > 0)) continue;
+      const Channels light = s.light + ambient[k];
+      sums[v].weight += s.weight * light * light;
+      sums[v].right += s.weight * light * s.image;
+    }
+  }
+  return sums;
+}
+
+/// Ambient light of each view: least squares over vertices where no line falls.
+std::vector<Channels> ambient_light(std::span<const Sample> samples, std::size_t views,
+                                    std::span<const Channels> albedo) {
+  constexpr float kDark = 0.02F;
+  std::vector<Channels> ambient(views, Channels::Zero());
+  for (std::size_t k = 0; k < views; ++k) {
+    Eigen::Array3d right = Eigen::Array3d::Zero();
+    Eigen::Array3d weight = Eigen::Array3d::Constant(1e-9);
+    for (std::size_t v = 0; v < albedo.size(); ++v) {
+      const Sample& s = samples[v * views + k];
+      if (!(s.weight > 0)) continue;
+      for (int c = 0; c < 3; ++c) {
+        if (s.light[c] > kDark) continue;
+        const auto rho = static_cast<double>(albedo[v][c]);
+        right[c] += rho * static_cast<double>(s.image[c]);
+        weight[c] += rho * rho;
+      }
+    }
+    ambient[k] = (right / weight).max(0.0).cast<float>();
+  }
+  return ambient;
+}
+
+/// Neighbours of each vertex, each edge once per direction and face.
+class Neighbors {
+ public:
+  explicit Neighbors(const TriangleMesh& mesh) : begin_(mesh.vertices.size() + 1, 0) {
+    for (const auto& face : mesh.faces) {
+      for (const int v : face) ++begin_[static_cast<std::size_t>(v) + 1];
+    }
+    for (std::size_t v = 1; v < begin_.size(); ++v) begin_[v] += begin_[v - 1];
+    neighbors_.resize(begin_.back());
+    std::vector<std::size_t> at(begin_.begin(), begin_.end() - 1);
+    for (const auto& face : mesh.faces) {
+      for (std::size_t k = 0; k < 3; ++k)
+        neighbors_[at[static_cast<std::size_t>(face[k])]++] = face[(k + 1) % 3];
+    }
+  }
+  [[nodiscard]] std::span<const int> of(std::size_t v) const {
+    return std::span(neighbors_).subspan(begin_[v], begin_[v + 1] - begin_[v]);
+  }
+
+ private:
+  std::vector<std::size_t> begin_;
+  std::vector<int> neighbors_;
+};
+
+/// Minimises sum_v weight_v (rho_v - right_v / weight_v)^2 + smoothing sum_edges (rho_i - rho_j)^2
+/// per channel by conjugate gradients with the diagonal as preconditioner. The mesh is closed, so
+/// that each edge appears once in both directions and the matrix is symmetric.
+std::vector<Channels> solve(const Neighbors& neighbors, std::span<const Evidence> sums,
+                            float smoothing, int rounds) {
+  const std::size_t n = sums.size();
+  Channels mean_right = Channels::Zero();
+  Channels mean_weight = Channels::Constant(1e-9F);
+  for (const Evidence& e : sums) {
+    mean_right += e.right;
+    mean_weight += e.weight;
+  }
+  std::vector<Channels> rho(n, mean_right / mean_weight);
+  const auto diagonal = [&](std::size_t v) -> Channels {
+    return sums[v].weight + smoothing * static_cast<float>(neighbors.of(v).size()) + 1e-9F;
+  };
+  const auto times = [&](const std::vector<Channels>& x, std::vector<Channels>& y) {
+    parallel_chunks(n, 4096, [&](std::size_t v) {
+      Channels sum = diagonal(v) * x[v];
+      for (const int k : neighbors.of(v)) sum -= smoothing * x[static_cast<std::size_t>(k)];
+      y[v] = sum;
+    });
+  };
+  std::vector<Channels> residual(n), direction(n), product(n);
+  times(rho, product);
+  Eigen::Array3d energy = Eigen::Array3d::Zero();
+  for (std::size_t v = 0; v < n; ++v) {
+    residual[v] = sums[v].right - product[v];
+    direction[v] = residual[v] / diagonal(v);
+    energy += (residual[v] * direction[v]).cast<double>();
+  }
+  for (int round = 0; round < rounds; ++round) {
+    times(direction, product);
+    Eigen::Array3d curvature = Eigen::Array3d::Zero();
+    for (std::size_t v = 0; v < n; ++v) curvature += (direction[v] * product[v]).cast<double>();
+    const Channels step = (energy / (curvature + 1e-30)).cast<float>();
+    Eigen::Array3d next = Eigen::Array3d::Zero();
+    for (std::size_t v = 0; v < n; ++v) {
+      rho[v] += step * direction[v];
+      residual[v] -= step * product[v];
+      next += (residual[v] * residual[v] / diagonal(v)).cast<double>();
+    }
+    const Channels ratio = (next / (energy + 1e-30)).cast<float>();
+    energy = next;
+    for (std::size_t v = 0; v < n; ++v)
+      direction[v] = residual[v] / diagonal(v) + ratio * direction[v];
+  }
+  return rho;
+}
+
+}  // namespace
+
+std::vector<std::array<float, 3>> vertex_colors(const Rig& rig, const TriangleMesh& mesh,
+                                                std::span<const ColorView> views,
+                                                const ColorOptions& options) {
+  if (mesh.faces.empty() || views.empty()) return {};
+  const bool texture_cameras = std::any_of(views.begin(), views.end(), [&](const ColorView& view) {
+    return rig.cameras[static_cast<std::size_t>(view.camera)].sees_texture_only;
+  });
+  const std::vector<Sample> samples = collect(rig, mesh, views, options, texture_cameras);
+  std::vector<Channels> ambient(views.size(), Channels::Zero());
+  std::vector<Evidence> sums = evidence(samples, views.size(), ambient);
+  const Neighbors neighbors(mesh);
+  const auto smoothing = static_cast<float>(options.smoothing);
+  std::vector<Channels> rho = solve(neighbors, sums, smoothing, options.rounds / 2);
+  if (!texture_cameras) {
+    ambient = ambient_light(samples, views.size(), rho);
+    sums = evidence(samples, views.size(), ambient);
+    rho = solve(neighbors, sums, smoothing, options.rounds);
+  }
+  std::vector<float> brightest;
+  for (std::size_t v = 0; v < rho.size(); ++v) {
+    if (sums[v].weight.maxCoeff() > 0.05F) brightest.push_back(rho[v].maxCoeff());
+  }
+  if (brightest.empty()) return {};
+  const auto high =
+      brightest.begin() + static_cast<std::ptrdiff_t>(0.95 * static_cast<double>(brightest.size()));
+  std::nth_element(brightest.begin(), high, brightest.end());
+  const float scale = static_cast<float>(options.bright) / std::max(*high, 1e-6F);
+  std::vector<std::array<float, 3>> colors(rho.size());
+  for (std::size_t v = 0; v < rho.size(); ++v) {
+    const Channels c = (scale * rho[v]).max(0.F).min(1.F);
+    colors[v] = {c[0], c[1], c[2]};
+  }
+  return colors;
+}
+
+}  // namespace pencilscan

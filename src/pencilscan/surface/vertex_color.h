@@ -1,0 +1,43 @@
+#pragma once
+
+#include <array>
+#include <opencv2/core.hpp>
+#include <span>
+#include <vector>
+
+#include "pencilscan/geometry/mesh.h"
+#include "pencilscan/rig/rig.h"
+
+namespace pencilscan {
+
+struct ColorOptions {
+  double least_cosine = 0.2;  ///< of the incidence to camera and projector, in (0, 1)
+  double smoothing = 0.1;     ///< of a neighbour against a fully lit vertex, > 0
+  int rounds = 60;            ///< of conjugate gradients
+  double bright = 0.9;        ///< what the 95th percentile of the brightest channel becomes
+};
+
+/// One camera's image as colour needs it.
+struct ColorView {
+  int camera = 0;
+  /// CV_32FC3, linear: projector RGB of a camera that sees patterns, camera RGB of one that sees
+  /// texture only; NaN where overexposed.
+  cv::Mat image;
+  double blur_px = 0.8;  ///< of camera and projector together
+};
+
+/// Albedo per vertex (linear red, green, blue in [0, 1], up to one common factor, which no frame
+/// tells) from images of the patterns: the surface is known and so is its light,
+///   I_c = rho (sum_p E_p P_p + a_c),  E_p = cosine / distance^2 where p is not shadowed,
+/// P_p: the pattern's colour at the vertex with its lines as blurred as in the image, a_c: ambient
+/// light of camera c, estimated where no line falls. Least squares per vertex and channel; what is
+/// in the dark of a channel, or invented, is filled from its neighbours (the weighted Laplace
+/// equation on the mesh). Where the rig has cameras with the role "texture", they alone count,
+/// their light taken as even. Empty when no camera gives a colour. All projectors are taken as
+/// equally bright at the centre of the volume.
+[[nodiscard]] std::vector<std::array<float, 3>> vertex_colors(const Rig& rig,
+                                                              const TriangleMesh& mesh,
+                                                              std::span<const ColorView> views,
+                                                              const ColorOptions& options = {});
+
+}  // namespace pencilscan
