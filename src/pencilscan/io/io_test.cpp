@@ -9,6 +9,7 @@
 #include <opencv2/core.hpp>
 
 #include "pencilscan/core/error.h"
+#include "pencilscan/io/curve_file.h"
 #include "pencilscan/io/file.h"
 #include "pencilscan/io/image.h"
 #include "pencilscan/io/mesh_file.h"
@@ -334,6 +335,58 @@ TEST_F(Io, UnusableMeshesAreRejected) {
       ::testing::HasSubstr("vertex[1]: coordinates must be finite"));
   EXPECT_NE(error_of([&] { return read_mesh(put("d.obj", "nothing here")); }), "");
   EXPECT_NE(error_of([&] { return read_mesh(put("e.txt", "x")); }), "");
+}
+
+TEST_F(Io, CurvesComeBackAsWritten) {
+  CurveFile curves;
+  for (int i = 0; i < 3; ++i) {
+    CurveSample sample;
+    sample.u = 10.25F + static_cast<float>(i);
+    sample.v = 7.5F;
+    sample.sigma_px = 0.07F;
+    sample.amplitude = 0.4F;
+    sample.camera = 5;
+    sample.curve = 70'000;
+    sample.family = 1;
+    sample.color = 1;
+    sample.color_lead = 3.5F;
+    sample.state = static_cast<CurveState>(i);
+    sample.projector = 4;
+    sample.pattern = 1;
+    sample.line = 300;
+    sample.confidence = 0.875F;
+    curves.samples.push_back(sample);
+  }
+  curves.crossings.push_back({1.5F, 2.5F, 5, 3, 70'000});
+  write_curves(folder_ / "curves.ply", curves);
+  const CurveFile read = read_curves(folder_ / "curves.ply");
+  ASSERT_EQ(read.samples.size(), 3U);
+  const CurveSample& last = read.samples[2];
+  EXPECT_EQ(last.u, 12.25F);
+  EXPECT_EQ(last.sigma_px, 0.07F);
+  EXPECT_EQ(last.amplitude, 0.4F);
+  EXPECT_EQ(last.camera, 5);
+  EXPECT_EQ(last.curve, 70'000U);
+  EXPECT_EQ(last.family, 1);
+  EXPECT_EQ(last.color_lead, 3.5F);
+  EXPECT_EQ(last.state, CurveState::kAmbiguous);
+  EXPECT_EQ(last.projector, 4);
+  EXPECT_EQ(last.line, 300);
+  EXPECT_EQ(last.confidence, 0.875F);
+  ASSERT_EQ(read.crossings.size(), 1U);
+  EXPECT_EQ(read.crossings[0].curve_b, 70'000U);
+}
+
+TEST_F(Io, CurvesWithStatesThatDoNotExistAreRefused) {
+  CurveFile curves;
+  curves.samples.resize(1);
+  curves.samples[0].state = static_cast<CurveState>(9);
+  write_curves(folder_ / "curves.ply", curves);
+  EXPECT_THAT(error_of([&] { return read_curves(folder_ / "curves.ply"); }),
+              ::testing::HasSubstr("vertex[0].state"));
+  write_points(folder_ / "points.ply", std::vector<MeasuredPoint>(2));
+  EXPECT_THAT(error_of([&] { return read_curves(folder_ / "points.ply"); }),
+              ::testing::HasSubstr("`crossing`"));
 }
 
 }  // namespace

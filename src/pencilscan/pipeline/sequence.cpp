@@ -9,6 +9,7 @@
 #include "pencilscan/core/stopwatch.h"
 #include "pencilscan/io/file.h"
 #include "pencilscan/io/mesh_file.h"
+#include "pencilscan/pipeline/curve_output.h"
 #include "pencilscan/pipeline/depth_output.h"
 #include "pencilscan/pipeline/frame_files.h"
 #include "pencilscan/pipeline/frame_output.h"
@@ -21,6 +22,7 @@ namespace fs = std::filesystem;
 using nlohmann::ordered_json;
 
 constexpr const char* kInputsFile = "inputs.json";
+constexpr const char* kDevicesFile = "devices.json";
 constexpr const char* kRigFile = "rig.json";
 constexpr const char* kRefinementFile = "refinement.json";
 
@@ -121,6 +123,7 @@ void reconstruct_frame(const Rig& rig, const FrameFiles& files, const fs::path& 
   const SurfaceResult& surface = shape.surface;
   points.times.insert(points.times.end(), shape.times.begin(), shape.times.end());
   write_points(folder / "points.ply", points.points);
+  write_curves(folder / "curves.ply", describe_curves(points));
   write_mesh(folder / "mesh.ply", surface.mesh);
   write_mesh(folder / "mesh_measured.ply", surface.measured);
   for (const std::string& format : options.mesh_formats)
@@ -128,6 +131,7 @@ void reconstruct_frame(const Rig& rig, const FrameFiles& files, const fs::path& 
   if (options.depth_maps) write_depth_maps(folder, rig, shape);
   if (options.pictures) {
     const Stopwatch picture_watch;
+    write_camera_pictures(folder / "pictures", rig, frame);
     write_frame_pictures(folder / "pictures", rig, frame, points, shape);
     write_hole_pictures(folder / "pictures", rig, shape);
     points.times.push_back({"pictures", picture_watch.seconds()});
@@ -146,8 +150,12 @@ void reconstruct_frame(const Rig& rig, const FrameFiles& files, const fs::path& 
   outcome.done = true;
 }
 
+bool is_output_file(const fs::path& rig_path, const fs::path& file) {
+  return fs::exists(file) && fs::equivalent(rig_path, file);
+}
+
 bool is_output_rig(const fs::path& rig_path, const fs::path& out) {
-  return fs::exists(out / kRigFile) && fs::equivalent(rig_path, out / kRigFile);
+  return is_output_file(rig_path, out / kRigFile);
 }
 
 /// Removes what an earlier run refined, and nothing that anybody else wrote or that is read now.
@@ -218,6 +226,8 @@ SequenceOutcome reconstruct_sequence(const fs::path& rig_path, const fs::path& f
   SequenceOutcome result;
   if (options.refine_rig)
     rig = refined_rig(rig, frames, out, options, progress, result.refinement.emplace());
+  // The rig in use, so that the output can be looked at without its input.
+  if (!is_output_file(rig_path, out / kDevicesFile)) write_rig(rig, out / kDevicesFile);
   for (std::size_t i = 0; i < frames.size(); ++i) {
     FrameOutcome outcome;
     outcome.name = frames[i].name;

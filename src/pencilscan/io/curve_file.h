@@ -1,0 +1,56 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string_view>
+#include <vector>
+
+namespace pencilscan {
+
+/// What became of a curve point.
+enum class CurveState : std::uint8_t {
+  kLabelled,
+  kNoCrossing,
+  kAmbiguous,
+  kContradicted,
+  kOutsideVolume,
+  kUndecided,  ///< without a recorded reason
+};
+
+/// One sub-pixel point of a detected curve: a vertex of curves.ply (docs/formats.md). Points of one
+/// curve follow each other.
+struct CurveSample {
+  float u = 0, v = 0;       ///< camera pixel
+  float sigma_px = 0;       ///< one standard deviation across the curve
+  float amplitude = 0;      ///< height of the line above its surroundings
+  std::uint8_t camera = 0;  ///< index in the rig
+  std::uint32_t curve = 0;  ///< index within the camera
+  std::uint8_t family = 0;  ///< which set of colours
+  std::uint8_t color = 0;   ///< likeliest colour within the family
+  float color_lead = 0;     ///< its log-likelihood minus that of the next one, >= 0
+  CurveState state = CurveState::kUndecided;
+  std::uint8_t projector = 0;  ///< of the label; 0 where there is none, as the next three
+  std::uint8_t pattern = 0;
+  std::uint16_t line = 0;
+  float confidence = 0;  ///< of the label, 0..1
+};
+
+/// Where two curves of a camera cross.
+struct CurveCrossing {
+  float u = 0, v = 0;
+  std::uint8_t camera = 0;
+  std::uint32_t curve_a = 0;
+  std::uint32_t curve_b = 0;
+};
+
+struct CurveFile {
+  std::vector<CurveSample> samples;
+  std::vector<CurveCrossing> crossings;
+};
+
+/// Writes curves.ply, binary little endian: elements `vertex` and `crossing`. Whole or not at all.
+void write_curves(const std::filesystem::path& path, const CurveFile& curves);
+/// Reads what write_curves() wrote; InputError when a property is missing or out of range.
+[[nodiscard]] CurveFile read_curves(const std::filesystem::path& path);
+
+}  // namespace pencilscan

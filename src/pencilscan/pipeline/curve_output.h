@@ -1,0 +1,17 @@
+#pragma once
+
+#include <filesystem>
+
+#include "pencilscan/io/curve_file.h"
+#include "pencilscan/pipeline/frame.h"
+
+namespace pencilscan {
+
+/// Every detected curve with its code evidence, its label or the reason why it has none, and the
+/// crossings.
+[[nodiscard]] CurveFile describe_curves(const PointResult& points);
+
+/// pictures/<camera>.jpg: what each camera saw, as shown on a screen (gamma 2.2).
+void write_camera_pictures(const std::filesystem::path& folder, const Rig& rig, const Frame& frame);
+
+}  // namespace pencilscan
