@@ -1,0 +1,72 @@
+#include <pthread.h>
+
+#include <csignal>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "pencilscan/cli/command.h"
+#include "pencilscan/core/parallel.h"
+#include "pencilscan/server/view_server.h"
+
+namespace pencilscan::cli {
+namespace {
+
+struct ViewCommandOptions {
+  CommonOptions common;
+  std::string folder;
+  ViewOptions view;
+};
+
+void run_view(const ViewCommandOptions& options) {
+  // Signals are waited for by a thread of their own; all others, made from here on, ignore them.
+  sigset_t signals;
+  sigemptyset(&signals);
+  sigaddset(&signals, SIGINT);
+  sigaddset(&signals, SIGTERM);
+  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+  const ThreadLimit limit(options.common.threads);
+  ViewOptions view = options.view;
+  view.page.program = "pencilscan " PENCILSCAN_VERSION;
+  ViewServer server(options.folder, view);
+  const std::string address = "http://127.0.0.1:" + std::to_string(server.port()) + "/";
+  nlohmann::ordered_json figures;
+  figures["results"] = server.results();
+  figures["address"] = address;
+  print_figures(options.common, figures);
+  std::cout.flush();
+  std::cerr << "pencilscan: open " << address << " in a browser; Ctrl-C stops\n";
+  std::thread waiting([&] {
+    int signal = 0;
+    sigwait(&signals, &signal);
+    server.stop();
+  });
+  server.run();
+  pthread_kill(waiting.native_handle(), SIGTERM);  // when run() ended by itself
+  waiting.join();
+}
+
+}  // namespace
+
+void add_view_command(CLI::App& app) {
+  auto options = std::make_shared<ViewCommandOptions>();
+  CLI::App* command = app.add_subcommand(
+      "view", "The report with the full data, for a browser on this computer (Ctrl-C stops).");
+  command->add_option("folder", options->folder, "output folder of reconstruct or calibrate")
+      ->required();
+  command->add_option("--port", options->view.port, "on 127.0.0.1; 0: any free one")
+      ->check(CLI::Range(0, 65535))
+      ->capture_default_str();
+  command->add_option("--title", options->view.page.title, "default: the folder's name");
+  command->add_option("--truth", options->view.page.sources.truth,
+                      "true mesh, or a folder with <frame>/mesh.ply: shows distances to it");
+  command->add_option("--rig", options->view.page.sources.rig,
+                      "the rig, where the folder does not hold it");
+  command->add_option("--frames", options->view.page.sources.frames,
+                      "the captured frames, where the folder has no pictures");
+  add_common_options(*command, options->common, "pencilscan view result");
+  command->callback([options] { run_view(*options); });
+}
+
+}  // namespace pencilscan::cli

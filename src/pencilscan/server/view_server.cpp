@@ -1,0 +1,223 @@
+#include "pencilscan/server/view_server.h"
+
+#include <httplib.h>
+#include <sys/socket.h>
+
+#include <fstream>
+#include <list>
+#include <map>
+#include <mutex>
+#include <string>
+
+#include "pencilscan/core/error.h"
+#include "pencilscan/server/served_files.h"
+
+namespace pencilscan {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kPolicy =
+    "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
+    "img-src 'self' data: blob:; connect-src 'self'; base-uri 'none'; form-action 'none'; "
+    "frame-ancestors 'none'";
+constexpr std::size_t kOpenReaders = 4;
+constexpr std::size_t kPlayFaces = 20'000;  ///< of a mesh while a sequence plays
+
+Detail full_detail(std::size_t results) {
+  Detail detail;
+  detail.max_faces = 400'000;
+  detail.image_width = 4096;
+  detail.image_quality = 92;
+  detail.evaluate = results <= 8;
+  return detail;
+}
+
+/// Only an exclusive port: the library's default would share it with other programs.
+void exclusive_port(int socket) {
+  const int yes = 1;
+  static_cast<void>(::setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes));
+}
+
+/// The few readers used last, so that the parts of one result do not read its files again.
+class Readers {
+ public:
+  explicit Readers(const PageData& data) : data_(data) {}
+
+  std::shared_ptr<ResultReader> get(std::size_t result, bool playing) {
+    const std::lock_guard lock(mutex_);
+    const std::size_t key = 2 * result + (playing ? 1 : 0);
+    for (auto it = open_.begin(); it != open_.end(); ++it) {
+      if (it->first != key) continue;
+      open_.splice(open_.begin(), open_, it);
+      return open_.front().second;
+    }
+    Detail detail = full_detail(data_.size());
+    if (playing) {
+      detail.shape_only = true;
+      detail.max_faces = kPlayFaces;
+    }
+    open_.emplace_front(key, data_.open(result, detail));
+    if (open_.size() > kOpenReaders) open_.pop_back();
+    return open_.front().second;
+  }
+
+ private:
+  const PageData& data_;
+  std::mutex mutex_;
+  std::list<std::pair<std::size_t, std::shared_ptr<ResultReader>>> open_;
+};
+
+std::string part_type(const std::string& name) {
+  if (name == "thumb") return "image/jpeg";
+  if (name.starts_with("image/")) return "image/webp";
+  return name.starts_with("holes/") ? "image/png" : "application/octet-stream";
+}
+
+void fail(httplib::Response& response, int status, const std::string& why) {
+  response.status = status;
+  response.set_content(why + "\n", "text/plain");
+}
+
+}  // namespace
+
+struct ViewServer::State {
+  State(const fs::path& folder, const PageOptions& options)
+      : root(folder), data(folder, options), readers(data) {}
+
+  void add_routes();
+  void answer_part(const httplib::Request& request, httplib::Response& response);
+  void answer_list(const httplib::Request& request, httplib::Response& response);
+  void answer_file(const httplib::Request& request, httplib::Response& response);
+  std::string make_page() const;
+  bool names_this_host(const httplib::Request& request) const;
+  /// The number in the first group of a route; nothing when there is no such result.
+  std::optional<std::size_t> result_of(const httplib::Request& request) const;
+
+  fs::path root;
+  PageData data;
+  Readers readers;
+  httplib::Server server;
+  int port = 0;
+  std::string page;
+};
+
+std::string ViewServer::State::make_page() const {
+  std::vector<nlohmann::ordered_json> entries;
+  for (std::size_t i = 0; i < data.size(); ++i) {
+    const auto reader = data.open(i, full_detail(data.size()));
+    entries.push_back(data.entry(i, *reader, reader->part_names()));
+  }
+  return served_page(data.index("view", std::move(entries)));
+}
+
+bool ViewServer::State::names_this_host(const httplib::Request& request) const {
+  const std::string host = request.get_header_value("Host");
+  for (const char* name : {"127.0.0.1", "localhost"}) {
+    std::string own(name);
+    own.append(":").append(std::to_string(port));
+    if (host == own) return true;
+  }
+  return false;
+}
+
+std::optional<std::size_t> ViewServer::State::result_of(const httplib::Request& request) const {
+  const std::string digits = request.matches[1];
+  if (digits.size() > 9) return std::nullopt;
+  const auto result = static_cast<std::size_t>(std::stoul(digits));
+  return result < data.size() ? std::optional(result) : std::nullopt;
+}
+
+void ViewServer::State::answer_part(const httplib::Request& request, httplib::Response& response) {
+  const auto result = result_of(request);
+  if (!result) return fail(response, 404, "no such result");
+  const std::string name = request.matches[2];
+  const bool playing = name == "play" || (name == "thumb" && data.size() > 1);
+  const auto reader = readers.get(*result, playing);
+  auto bytes = reader->part(name == "play" ? "mesh" : name);
+  if (!bytes) {
+    std::string why = "not in this result: " + name;
+    for (const auto& missing : reader->missing()) {
+      if (missing.what == name || missing.what.starts_with(name + ".")) why = missing.why;
+    }
+    return fail(response, 404, why);
+  }
+  response.set_content(std::move(*bytes), part_type(name));
+}
+
+void ViewServer::State::answer_list(const httplib::Request& request, httplib::Response& response) {
+  const auto result = result_of(request);
+  if (!result) return fail(response, 404, "no such result");
+  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  for (const ServedFile& file : files_below(root, data.folder().results[*result].folder))
+    list.push_back({{"path", file.path}, {"bytes", file.bytes}});
+  response.set_content(list.dump(), "application/json");
+}
+
+void ViewServer::State::answer_file(const httplib::Request& request, httplib::Response& response) {
+  const auto file = file_inside(root, request.matches[1]);
+  if (!file) return fail(response, 404, "no such file in this folder");
+  auto stream = std::make_shared<std::ifstream>(*file, std::ios::binary);
+  std::error_code error;
+  const auto size = fs::file_size(*file, error);
+  if (!*stream || error) return fail(response, 404, "the file cannot be read");
+  if (size == 0) return response.set_content("", content_type(*file).c_str());
+  response.set_content_provider(
+      static_cast<std::size_t>(size), content_type(*file).c_str(),
+      [stream](std::size_t offset, std::size_t length, httplib::DataSink& sink) {
+        std::string bytes(std::min<std::size_t>(length, std::size_t{1} << 18), '\0');
+        stream->seekg(static_cast<std::streamoff>(offset));
+        stream->read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+        const auto got = static_cast<std::size_t>(stream->gcount());
+        return got > 0 && sink.write(bytes.data(), got);
+      });
+}
+
+void ViewServer::State::add_routes() {
+  server.set_default_headers({{"Content-Security-Policy", kPolicy},
+                              {"X-Content-Type-Options", "nosniff"},
+                              {"Cross-Origin-Resource-Policy", "same-origin"},
+                              {"Cache-Control", "no-cache"}});
+  server.set_pre_routing_handler(
+      [this](const httplib::Request& request, httplib::Response& response) {
+        if (names_this_host(request)) return httplib::Server::HandlerResponse::Unhandled;
+        fail(response, 403, "only for this computer");
+        return httplib::Server::HandlerResponse::Handled;
+      });
+  server.Get("/", [this](const httplib::Request&, httplib::Response& response) {
+    response.set_content(page, "text/html; charset=utf-8");
+  });
+  server.Get(R"(/part/(\d+)/([a-z]+(?:/\d+)?))",
+             [this](const auto& request, auto& response) { answer_part(request, response); });
+  server.Get(R"(/list/(\d+))",
+             [this](const auto& request, auto& response) { answer_list(request, response); });
+  server.Get(R"(/files/(.+))",
+             [this](const auto& request, auto& response) { answer_file(request, response); });
+}
+
+ViewServer::ViewServer(const fs::path& root, const ViewOptions& options)
+    : state_(std::make_unique<State>(root, options.page)) {
+  State& state = *state_;
+  state.server.set_socket_options(exclusive_port);
+  state.server.set_keep_alive_timeout(1);  // s; stop() waits for it
+  state.server.new_task_queue = [] { return new httplib::ThreadPool(4); };  // NOLINT: takes it
+  constexpr const char* kLoopback = "127.0.0.1";
+  if (options.port == 0) {
+    state.port = state.server.bind_to_any_port(kLoopback);
+  } else {
+    state.port = state.server.bind_to_port(kLoopback, options.port) ? options.port : -1;
+  }
+  if (state.port <= 0)
+    throw StageError("port " + std::to_string(options.port) + " on 127.0.0.1 is not free");
+  state.page = state.make_page();
+  state.add_routes();
+}
+
+ViewServer::~ViewServer() = default;
+
+int ViewServer::port() const { return state_->port; }
+std::size_t ViewServer::results() const { return state_->data.size(); }
+void ViewServer::run() { state_->server.listen_after_bind(); }
+void ViewServer::stop() { state_->server.stop(); }
+
+}  // namespace pencilscan
