@@ -32,5 +32,7 @@ void add_rig_command(CLI::App& app);
 void add_simulate_command(CLI::App& app);
 void add_reconstruct_command(CLI::App& app);
 void add_evaluate_command(CLI::App& app);
+void add_report_command(CLI::App& app);
+void add_view_command(CLI::App& app);
 
 }  // namespace pencilscan::cli

@@ -1,0 +1,72 @@
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "pencilscan/cli/command.h"
+#include "pencilscan/core/parallel.h"
+#include "pencilscan/page/page.h"
+
+namespace pencilscan::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct ReportOptions {
+  CommonOptions common;
+  std::string folder;
+  std::string out;
+  double max_megabytes = 15;
+  PageOptions page;
+};
+
+void run_report(const ReportOptions& options) {
+  const ThreadLimit limit(options.common.threads);
+  PageOptions page = options.page;
+  page.program = "pencilscan " PENCILSCAN_VERSION;
+  page.max_bytes = static_cast<std::size_t>(options.max_megabytes * 1e6);
+  const fs::path file =
+      options.out.empty() ? fs::path(options.folder) / "report.html" : fs::path(options.out);
+  const PageReport report = write_report(options.folder, file, page, stderr_progress());
+  constexpr std::size_t kShown = 12;
+  for (std::size_t i = 0; i < std::min(report.missing.size(), kShown); ++i)
+    std::cerr << "pencilscan: warning: " << report.missing[i] << "\n";
+  if (report.missing.size() > kShown) {
+    std::cerr << "pencilscan: warning: " << report.missing.size() - kShown
+              << " more are listed in the report\n";
+  }
+  nlohmann::ordered_json figures;
+  figures["results"] = report.results;
+  figures["results_with_points_and_images"] = report.full_results;
+  figures["megabytes"] = static_cast<double>(report.bytes) / 1e6;
+  figures["report"] = file.string();
+  print_figures(options.common, figures);
+}
+
+}  // namespace
+
+void add_report_command(CLI::App& app) {
+  auto options = std::make_shared<ReportOptions>();
+  CLI::App* command = app.add_subcommand(
+      "report", "One HTML file of an output folder, to look at in any browser and to mail.");
+  command->add_option("folder", options->folder, "output folder of reconstruct or calibrate")
+      ->required();
+  command->add_option("--out", options->out, "the file; default: <folder>/report.html");
+  command->add_option("--title", options->page.title, "default: the folder's name");
+  command->add_option("--truth", options->page.sources.truth,
+                      "true mesh, or a folder with <frame>/mesh.ply: shows distances to it");
+  command->add_option("--rig", options->page.sources.rig,
+                      "the rig, where the folder does not hold it");
+  command->add_option("--frames", options->page.sources.frames,
+                      "the captured frames, where the folder has no pictures");
+  command
+      ->add_option("--max-size", options->max_megabytes,
+                   "megabytes to aim at; of long sequences, some frames get points and images and "
+                   "the others their shape")
+      ->check(CLI::Range(1.0, 2000.0))
+      ->capture_default_str();
+  add_common_options(*command, options->common, "pencilscan report result");
+  command->callback([options] { run_report(*options); });
+}
+
+}  // namespace pencilscan::cli

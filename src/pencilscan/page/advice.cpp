@@ -1,0 +1,143 @@
+#include "pencilscan/page/advice.h"
+
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <map>
+
+namespace pencilscan {
+namespace {
+
+using nlohmann::json;
+
+struct Known {
+  const char* part;  ///< of the warning's text
+  const char* action;
+};
+
+/// What to do about the warnings that detection and surface give.
+constexpr std::array<Known, 7> kKnown = {{
+    {"saturated",
+     "Close the aperture or shorten the exposure until the brightest lines stay below "
+     "full scale, and capture again."},
+    {"has no image",
+     "Check that this camera was triggered and that its file lies in the frame's "
+     "folder under the camera's name."},
+    {"no projected line",
+     "Check that the camera sees the object and that the projectors were on; "
+     "compare its picture with the others below."},
+    {"cannot be told apart",
+     "Give projectors whose lines overlap colours of different channels "
+     "(blue/cyan against red/yellow), or state color_matrix in the rig."},
+    {"calibration is off",
+     "Run reconstruct with --refine-rig, or calibrate again if devices were "
+     "moved."},
+    {"rests on the labelled curves",
+     "Look at the hole map of each camera below: it says what kept "
+     "depth from being found between the curves."},
+    {"open", "Look at the mesh for gaps; more overlap between the cameras closes them."},
+}};
+
+std::string percent(double share) {
+  std::array<char, 32> text{};
+  std::snprintf(text.data(), text.size(), share < 0.1 ? "%.1f %%" : "%.0f %%", 100 * share);
+  return text.data();
+}
+
+double number_at(const json& object, const char* key) {
+  if (!object.is_object()) return 0;
+  const auto it = object.find(key);
+  return it != object.end() && it->is_number() ? it->get<double>() : 0.0;
+}
+
+const json& child(const json& object, const char* key) {
+  static const json kNothing;
+  if (!object.is_object()) return kNothing;
+  const auto it = object.find(key);
+  return it == object.end() ? kNothing : *it;
+}
+
+/// Surface that nobody measured, by reason, where it is more than a few percent.
+void advise_holes(const json& area, std::vector<Advice>& advice) {
+  if (!area.is_object()) return;
+  double total = 0;
+  for (const auto& [reason, mm2] : area.items()) total += mm2.is_number() ? mm2.get<double>() : 0;
+  if (!(total > 0)) return;
+  constexpr double kWorthSaying = 0.04;
+  static const std::map<std::string, Known> kByReason = {
+      {"no projector",
+       {"of the surface lies in the shadow of all projectors or is turned away from them",
+        "Add or move a projector, or turn the object, so that light reaches it."}},
+      {"one projector",
+       {"of the surface is lit by one projector only, whose lines did not fix the depth",
+        "Let the light of two projectors overlap there."}},
+      {"too compressed",
+       {"of the surface shows lines closer together than the camera resolves",
+        "Use a wider line pitch, a longer focal length or a camera that faces this part."}},
+      {"ambiguous",
+       {"of the surface is lit by several projectors, and yet no depth was accepted",
+        "Fewer projectors on the same spot, or different colours for neighbours, make it clear."}},
+      {"contradicted",
+       {"of the surface got depths that other views prove wrong",
+        "Check calibration (--refine-rig) and shiny or translucent material."}},
+      {"saturated", {"of the surface is overexposed", "Lower exposure or gain and capture again."}},
+      {"not seen", {"of the surface is seen by no camera", "Add a camera, or turn the object."}},
+  };
+  for (const auto& [reason, mm2] : area.items()) {
+    std::string words = reason;
+    for (char& c : words) c = c == '_' ? ' ' : c;
+    const auto known = kByReason.find(words);
+    const double share = mm2.is_number() ? mm2.get<double>() / total : 0;
+    if (known == kByReason.end() || share < kWorthSaying) continue;
+    advice.push_back({percent(share) + " " + known->second.part, known->second.action});
+  }
+}
+
+void advise_undecided(const json& report, std::vector<Advice>& advice) {
+  double curve_points = 0;
+  double labelled = 0;
+  const json& cameras = child(report, "cameras");
+  if (!cameras.is_array()) return;
+  for (const json& camera : cameras) {
+    curve_points += number_at(camera, "curve_points");
+    labelled += number_at(camera, "labelled_curve_points");
+  }
+  constexpr double kMuch = 0.25;
+  if (curve_points > 0 && labelled < (1 - kMuch) * curve_points) {
+    advice.push_back(
+        {percent(1 - labelled / curve_points) + " of the detected curve points got no line",
+         "Switch the image layer to \"undecided\": it shows the reason of every piece. Many "
+         "crossings from two or more projectors on each part of the surface help most."});
+  }
+}
+
+}  // namespace
+
+std::vector<Advice> advise(const json& report) {
+  std::vector<Advice> advice;
+  const json& warnings = child(report, "warnings");
+  if (warnings.is_array()) {
+    for (const json& warning : warnings) {
+      if (!warning.is_string()) continue;
+      Advice entry{warning.get<std::string>(), ""};
+      for (const Known& known : kKnown) {
+        if (entry.warning.find(known.part) == std::string::npos) continue;
+        entry.action = known.action;
+        break;
+      }
+      advice.push_back(std::move(entry));
+    }
+  }
+  const json& surface = child(report, "surface");
+  const double boundary = number_at(surface, "boundary_edges");
+  if (boundary > 0) {
+    advice.push_back({"The mesh is not closed: it has " +
+                          std::to_string(static_cast<long>(boundary)) + " boundary edges",
+                      "Look for gaps at the rim of what the cameras see."});
+  }
+  advise_holes(child(surface, "area_mm2"), advice);
+  advise_undecided(report, advice);
+  return advice;
+}
+
+}  // namespace pencilscan

@@ -1,0 +1,268 @@
+#include "pencilscan/page/page.h"
+
+#include <algorithm>
+#include <map>
+#include <utility>
+
+#include "pencilscan/core/error.h"
+#include "pencilscan/core/parallel.h"
+#include "pencilscan/detection/color_family.h"
+#include "pencilscan/io/file.h"
+#include "pencilscan/page/page_assets.h"
+
+namespace pencilscan {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::ordered_json;
+
+/// JSON that may stand inside a <script> element.
+std::string script_json(const ordered_json& value) {
+  const std::string text =
+      value.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+  std::string safe;
+  safe.reserve(text.size());
+  for (const char c : text) {
+    if (c == '<') {
+      safe += "\\u003c";
+    } else {
+      safe.push_back(c);
+    }
+  }
+  return safe;
+}
+
+/// rig.json with what the page cannot easily derive: line counts, families of colours, the volume.
+ordered_json describe_rig(const Rig& rig, const fs::path& path) {
+  ordered_json json = ordered_json(read_json(path));
+  ordered_json lines = ordered_json::array();
+  for (const Projector& projector : rig.projectors) {
+    ordered_json counts = ordered_json::array();
+    for (const LinePattern& pattern : projector.patterns) {
+      counts.push_back({{"lines", projector.line_count(pattern)},
+                        {"vertical", pattern.axis == Axis::kColumn},
+                        {"pitch_px", pattern.pitch_px},
+                        {"offset_px", pattern.offset_px},
+                        {"sequence", pattern.sequence},
+                        {"colors", pattern.colors}});
+    }
+    lines.push_back(std::move(counts));
+  }
+  ordered_json families = ordered_json::array();
+  for (const ColorFamily& family : color_families(rig)) families.push_back(family.colors);
+  const Sphere volume = working_volume(rig);
+  return {{"cameras", std::move(json["cameras"])},
+          {"projectors", std::move(json["projectors"])},
+          {"patterns", std::move(lines)},
+          {"families", std::move(families)},
+          {"unit", rig.unit_known ? "mm" : "units"},
+          {"volume",
+           {{"center", {volume.center.x(), volume.center.y(), volume.center.z()}},
+            {"radius", volume.radius}}}};
+}
+
+struct CollectedPart {
+  std::string name;
+  std::string bytes;
+};
+
+struct Collected {
+  ordered_json entry;
+  std::vector<CollectedPart> parts;
+  std::vector<ResultReader::Missing> missing;
+
+  [[nodiscard]] std::size_t embedded_bytes() const {
+    std::size_t sum = 0;
+    for (const CollectedPart& part : parts) sum += part.bytes.size() * 4 / 3 + 80;
+    return sum;
+  }
+};
+
+Collected collect(const PageData& data, std::size_t result, const Detail& detail) {
+  const auto reader = data.open(result, detail);
+  Collected collected;
+  std::vector<std::string> names;
+  for (const std::string& name : reader->part_names()) {
+    auto bytes = reader->part(name);
+    if (!bytes) continue;
+    names.push_back(name);
+    collected.parts.push_back({name, std::move(*bytes)});
+  }
+  collected.entry = data.entry(result, *reader, names);
+  collected.entry["detail"] = detail.shape_only ? "shape" : "full";
+  collected.missing = reader->missing();
+  return collected;
+}
+
+/// What the details cost, from rich to poor.
+constexpr std::array<Detail, 4> kFullDetails = {{
+    {.max_faces = 80'000, .point_stride = 1, .image_width = 1280, .image_quality = 72},
+    {.max_faces = 50'000, .point_stride = 2, .image_width = 1280, .image_quality = 60},
+    {.max_faces = 30'000, .point_stride = 4, .image_width = 960, .image_quality = 50},
+    {.max_faces = 20'000, .point_stride = 8, .image_width = 640, .image_quality = 40},
+}};
+constexpr double kBytesPerFace = 6;  // embedded, measured on scanned shapes
+
+Detail shape_detail(std::size_t results, std::size_t max_bytes) {
+  Detail detail;
+  detail.shape_only = true;
+  const double share = 0.6 * static_cast<double>(max_bytes) / static_cast<double>(results);
+  detail.max_faces = static_cast<std::size_t>(std::clamp(share / kBytesPerFace, 2000.0, 20'000.0));
+  return detail;
+}
+
+}  // namespace
+
+PageData::PageData(const fs::path& root, const PageOptions& options) : options_(options) {
+  for (const fs::path& path :
+       {options.sources.rig, options.sources.frames, options.sources.truth}) {
+    if (!path.empty() && !fs::exists(path))
+      throw InputError(path.string(), "", "", "no such file or folder");
+  }
+  folder_ = find_results(root, options.sources);
+  for (const ResultEntry& entry : folder_.results) {
+    if (entry.rig.empty()) {
+      rig_of_result_.push_back(-1);
+      continue;
+    }
+    const auto known = std::find(rig_paths_.begin(), rig_paths_.end(), entry.rig);
+    rig_of_result_.push_back(static_cast<int>(known - rig_paths_.begin()));
+    if (known != rig_paths_.end()) continue;
+    rig_paths_.push_back(entry.rig);
+    try {
+      rigs_.push_back(std::make_shared<const Rig>(read_rig(entry.rig)));
+      rig_jsons_.push_back(describe_rig(*rigs_.back(), entry.rig));
+    } catch (const InputError&) {
+      if (!options.sources.rig.empty()) throw;  // the user named it
+      rigs_.emplace_back();
+      rig_jsons_.emplace_back(nullptr);
+    }
+  }
+}
+
+std::unique_ptr<ResultReader> PageData::open(std::size_t result, const Detail& detail) const {
+  const int rig = rig_of_result_[result];
+  return std::make_unique<ResultReader>(
+      folder_.results[result], rig < 0 ? nullptr : rigs_[static_cast<std::size_t>(rig)], detail);
+}
+
+ordered_json PageData::entry(std::size_t result, ResultReader& reader,
+                             const std::vector<std::string>& parts) const {
+  const ResultEntry& found = folder_.results[result];
+  ordered_json entry = {{"name", found.name},
+                        {"run", found.run},
+                        {"rig", rig_of_result_[result]},
+                        {"truth", !found.truth.empty()},
+                        {"detail", "full"},
+                        {"summary", reader.summary()},
+                        {"parts", parts}};
+  entry["missing"] = ordered_json::array();
+  for (const auto& missing : reader.missing())
+    entry["missing"].push_back({{"what", missing.what}, {"why", missing.why}});
+  return entry;
+}
+
+ordered_json PageData::index(const std::string& mode, std::vector<ordered_json> entries) const {
+  ordered_json index = {{"format", "pencilscan-page/1"},
+                        {"mode", mode},
+                        {"program", options_.program},
+                        {"title", options_.title}};
+  if (options_.title.empty())
+    index["title"] = fs::absolute(folder_.root).lexically_normal().filename().string();
+  if (index["title"] == "") {
+    index["title"] =
+        fs::absolute(folder_.root).lexically_normal().parent_path().filename().string();
+  }
+  index["rigs"] = rig_jsons_;
+  index["results"] = std::move(entries);
+  index["failed"] = ordered_json::array();
+  for (const fs::path& path : folder_.failed)
+    index["failed"].push_back(fs::relative(path, folder_.root).string());
+  index["calibrations"] = ordered_json::array();
+  for (const fs::path& path : folder_.calibrations) {
+    try {
+      index["calibrations"].push_back({{"file", fs::relative(path, folder_.root).string()},
+                                       {"report", ordered_json(read_json(path))}});
+    } catch (const InputError& error) {
+      index["calibrations"].push_back(
+          {{"file", fs::relative(path, folder_.root).string()}, {"broken", error.what()}});
+    }
+  }
+  return index;
+}
+
+PageReport write_report(const fs::path& root, const fs::path& file, const PageOptions& options,
+                        const Progress& progress) {
+  const PageData data(root, options);
+  const std::size_t count = data.size();
+  std::vector<Collected> collected(count);
+  std::vector<char> full(count, 0);
+  Detail full_detail;
+  const Detail shape = shape_detail(std::max<std::size_t>(count, 1), options.max_bytes);
+  if (count > 0) {
+    const double rest =
+        count > 1 ? static_cast<double>((count - 1) * shape.max_faces) * kBytesPerFace : 0;
+    const double room = static_cast<double>(options.max_bytes) - 1e6;  // 1 MB: the page itself
+    for (const Detail& detail : kFullDetails) {
+      if (progress) progress("reading results", 0);
+      full_detail = detail;
+      full_detail.evaluate = count <= 8;
+      collected[0] = collect(data, 0, full_detail);
+      // All of them whole, or else at least one.
+      if (static_cast<double>(collected[0].embedded_bytes()) + std::min(rest, 0.6 * room) <= room)
+        break;
+    }
+    const double each = static_cast<double>(collected[0].embedded_bytes());
+    const double shape_bytes = static_cast<double>(shape.max_faces) * kBytesPerFace;
+    const double fit =
+        (room - static_cast<double>(count) * shape_bytes) / std::max(1.0, each - shape_bytes);
+    std::size_t whole = static_cast<std::size_t>(std::clamp(fit, 1.0, static_cast<double>(count)));
+    if (each * static_cast<double>(count) <= room) whole = count;
+    for (std::size_t i = 0; i < whole; ++i) full[i * count / whole] = 1;
+  }
+  const auto chunk = static_cast<std::size_t>(thread_count());
+  for (std::size_t first = 1; first < count; first += chunk) {
+    const std::size_t last = std::min(first + chunk, count);
+    parallel_for(last - first, [&](std::size_t i) {
+      const std::size_t result = first + i;
+      collected[result] = collect(data, result, full[result] != 0 ? full_detail : shape);
+    });
+    if (progress)
+      progress("reading results", static_cast<double>(last) / static_cast<double>(count));
+  }
+  PageReport report;
+  report.results = count;
+  report.full_results = static_cast<std::size_t>(std::count(full.begin(), full.end(), 1));
+  std::vector<ordered_json> entries;
+  for (std::size_t i = 0; i < count; ++i) {
+    entries.push_back(collected[i].entry);
+    for (const auto& missing : collected[i].missing)
+      report.missing.push_back(data.folder().results[i].name + ": " + missing.what + ": " +
+                               missing.why);
+  }
+  const PageAssets assets = page_assets();
+  const std::string index = script_json(data.index("report", std::move(entries)));
+  write_atomically(file, [&](std::ostream& stream) {
+    stream << assets.head;
+    for (std::size_t i = 0; i < count; ++i) {
+      for (const CollectedPart& part : collected[i].parts) {
+        stream << "<script type=\"text/plain\" id=\"part/" << i << "/" << part.name << "\">"
+               << base64(part.bytes) << "</script>\n";
+      }
+    }
+    stream << assets.middle << index << assets.tail;
+  });
+  report.bytes = fs::file_size(file);
+  return report;
+}
+
+std::string served_page(const ordered_json& index) {
+  const PageAssets assets = page_assets();
+  std::string page(assets.head);
+  page += assets.middle;
+  page += script_json(index);
+  page += assets.tail;
+  return page;
+}
+
+}  // namespace pencilscan

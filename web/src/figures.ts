@@ -1,0 +1,194 @@
+// Warnings, key figures, histograms and tables of the shown result.
+import type {App} from './app';
+import {bars, histogramChart, table} from './charts';
+import {dig, digList, digNumber, type Details, type Json} from './data';
+import {byId, format, h, percent} from './dom';
+
+const kReasons = ['no_crossing', 'ambiguous', 'contradicted', 'outside_volume'];
+const words = (key: string) => key.replace(/_/g, ' ');
+
+interface Tile {
+  name: string;
+  value: string;
+  hint?: string;
+}
+
+export class Figures {
+  constructor(private readonly app: App) {
+    app.on('result', () => void this.load());
+  }
+
+  private async load(): Promise<void> {
+    const {app} = this;
+    const {result, source} = app;
+    const found = source.index.results[result];
+    byId('figures').replaceChildren();
+    byId('warnings').replaceChildren();
+    if (!found) return;
+    let details: Details = {};
+    try {
+      details = await source.details(result);
+    } catch (error) {
+      found.missing.push({what: 'details', why: String(error)});
+    }
+    if (app.result !== result) return;
+    this.warnings(details);
+    byId('figures').append(this.tiles(details), this.charts(details), ...this.tables(details));
+    if (source.index.mode === 'view') void this.files();
+  }
+
+  private warnings(details: Details): void {
+    const found = this.app.source.index.results[this.app.result];
+    const list = byId('warnings');
+    const items = details.warnings ?? [];
+    for (const {text, action} of items) {
+      list.append(h('li', {class: 'warning'}, h('strong', {}, text), action ? h('p', {}, action) : null));
+    }
+    for (const {what, why} of found.missing) {
+      list.append(h('li', {class: 'absent'}, h('strong', {}, `Missing: ${what}`), h('p', {}, why)));
+    }
+    if (!list.childElementCount) {
+      list.append(h('li', {class: 'fine'}, h('strong', {}, 'Nothing to warn of in this result.')));
+    }
+    byId('warning-count').textContent = items.length + found.missing.length > 0
+      ? `${items.length + found.missing.length} to look at` : 'all fine';
+  }
+
+  private tiles(details: Details): HTMLElement {
+    const {report, figures, timing, histograms} = details;
+    const {summary} = this.app.source.index.results[this.app.result];
+    const tiles: Tile[] = [];
+    const add = (name: string, value: number | undefined, text: (x: number) => string, hint?: string) => {
+      if (value !== undefined) tiles.push({name, value: text(value), hint});
+    };
+    add('Measured points', digNumber(report, 'points') ?? summary.points, (x) => format(x));
+    add('Surface measured', digNumber(report, 'surface', 'measured_share'), percent,
+      'share of the closed surface that was measured');
+    const sigma = histograms?.sigma_mm;
+    if (sigma) add('Sigma, median', sigma.median, (x) => `${format(x)} mm`, 'one standard deviation along the ray');
+    add('Lines disagree by', digNumber(report, 'crossing_disagreement', 'median_px'),
+      (x) => `${format(x)} px`, `median at crossings; noise explains ${
+        format(digNumber(report, 'crossing_disagreement', 'expected_px'))} px`);
+    add('Label error', digNumber(figures, 'label_error'), (x) => percent(x, 2), 'points with a wrong line');
+    add('Line recall', digNumber(figures, 'line_recall'), percent, 'true lines that were measured, spacing from 5 px');
+    add('Distance, median', digNumber(figures, 'distance_median_mm'), (x) => `${format(x)} mm`, 'points to the truth');
+    add('Complete at 1 mm', digNumber(figures, 'completeness_1mm'), percent, 'of the measurable surface');
+    add('Time', digNumber(timing, 'seconds', 'total') ?? summary.seconds, (x) => `${format(x)} s`,
+      `${format(digNumber(timing, 'threads'))} threads`);
+    return h('dl', {class: 'tiles'}, ...tiles.map(({name, value, hint}) =>
+      h('div', {class: 'tile'}, h('dt', {}, name), h('dd', {}, value), hint ? h('p', {}, hint) : null)));
+  }
+
+  private charts(details: Details): HTMLElement {
+    const grid = h('div', {class: 'grid'});
+    const {histograms, timing, figures, report} = details;
+    const chart = (key: string, title: string, unit: string, marks: {at: number; text: string}[] = []) => {
+      const data = histograms?.[key];
+      if (data) grid.append(histogramChart(title, data, unit, marks));
+    };
+    const unit = this.app.rig?.unit ?? 'mm';
+    chart('sigma_mm', 'Sigma of the points', unit);
+    chart('error_mm', 'Distance of the points to the truth', unit);
+    chart('error_over_sigma', 'Error along the ray, in sigmas', '',
+      [{at: 1, text: '1 σ'}, {at: 2, text: '2 σ'}]);
+    chart('confidence', 'Confidence of the points', '');
+    const seconds = dig(timing, 'seconds');
+    if (seconds && typeof seconds === 'object' && !Array.isArray(seconds)) {
+      const rows = Object.entries(seconds)
+        .filter(([key, value]) => key !== 'total' && typeof value === 'number')
+        .map(([key, value]) => [words(key), value as number, `${format(value as number, 2)} s`] as [string, number, string]);
+      if (rows.length) grid.append(bars('Time per stage', rows));
+    }
+    const recall = (key: string, title: string) => {
+      const group = dig(figures, key);
+      if (!group || typeof group !== 'object' || Array.isArray(group)) return;
+      const rows = Object.entries(group).flatMap(([name, entry]) => {
+        const value = digNumber(entry, 'line_recall');
+        return value === undefined ? [] : [[spacing(name), value, percent(value)] as [string, number, string]];
+      });
+      if (rows.length) grid.append(bars(title, rows, 1));
+    };
+    recall('by_projector', 'Line recall by projector');
+    recall('by_spacing', 'Line recall by spacing in the image');
+    const area = dig(report, 'surface', 'area_mm2');
+    if (area && typeof area === 'object' && !Array.isArray(area)) {
+      const entries = Object.entries(area).filter(([, v]) => typeof v === 'number') as [string, number][];
+      const total = entries.reduce((sum, [, v]) => sum + v, 0);
+      if (total > 0) {
+        grid.append(bars('Surface by what is known of it',
+          entries.filter(([, v]) => v > 0).map(([key, v]) => [words(key), v / total, percent(v / total)]), 1));
+      }
+    }
+    return grid;
+  }
+
+  private tables(details: Details): HTMLElement[] {
+    const {report, figures} = details;
+    const result: HTMLElement[] = [];
+    const cameras = digList(report, 'cameras');
+    if (cameras.length) {
+      result.push(table(
+        ['Camera', 'Curves', 'Curve points', 'Labelled', ...kReasons.map(words), 'Crossings', 'Sigma px', 'Saturated px'],
+        cameras.map((camera) => {
+          const n = (...path: string[]) => digNumber(camera, ...path);
+          const points = n('curve_points');
+          const labelled = n('labelled_curve_points');
+          return [text(dig(camera, 'name')), format(n('curves')), format(points),
+            points ? percent((labelled ?? 0) / points) : '–',
+            ...kReasons.map((key) => format(n('undecided_points', key))),
+            format(n('crossings')), format(n('curve_sigma_median_px')), format(n('saturated_pixels'))];
+        }), 'What each camera saw; undecided curve points by reason'));
+    }
+    const perProjector = dig(report, 'points_by_projector');
+    if (perProjector && typeof perProjector === 'object' && !Array.isArray(perProjector)) {
+      const rows = Object.entries(perProjector).map(([name, value]) => {
+        const judged = dig(figures, 'by_projector', name);
+        const error = digNumber(judged, 'label_error');
+        const recall = digNumber(judged, 'line_recall');
+        return [name, format(typeof value === 'number' ? value : undefined), percent(error, 2), percent(recall)];
+      });
+      result.push(table(['Projector', 'Points', 'Label error', 'Line recall'], rows, 'What each projector gave'));
+    }
+    result.push(this.comparison());
+    const raw = {report, timing: details.timing, figures};
+    result.push(h('details', {class: 'raw'}, h('summary', {}, 'All numbers (JSON)'),
+      h('pre', {tabindex: 0}, JSON.stringify(raw, null, 1))));
+    return result;
+  }
+
+  /** Runs over the same frame beside each other, where there are several. */
+  private comparison(): HTMLElement {
+    const {results} = this.app.source.index;
+    const runs = new Set(results.map((r) => r.run));
+    if (runs.size < 2) return h('div');
+    const keys: [string, string, (x: number) => string][] = [
+      ['points', 'Points', (x) => format(x)], ['measured_share', 'Measured', percent],
+      ['label_error', 'Label error', (x) => percent(x, 2)], ['line_recall', 'Line recall', percent],
+      ['line_recall_3_5px', 'Recall 3–5 px', percent],
+      ['distance_median_mm', 'Distance mm', (x) => format(x)], ['completeness_1mm', 'Complete 1 mm', percent],
+      ['total', 'Seconds', (x) => format(x)]];
+    const shown = keys.filter(([key]) => results.some((r) => r.summary[key] !== undefined));
+    return table(['Run', ...shown.map(([, name]) => name)],
+      results.slice(0, 60).map((r) => [[r.run, r.name].filter(Boolean).join(' / '),
+        ...shown.map(([key, , show]) => r.summary[key] === undefined ? '–' : show(r.summary[key]))]),
+      'All runs beside each other');
+  }
+
+  private async files(): Promise<void> {
+    const {app} = this;
+    const {result} = app;
+    const files = await app.source.files(result);
+    if (app.result !== result || !files.length) return;
+    byId('figures').append(h('details', {class: 'raw'}, h('summary', {}, `Files (${files.length})`),
+      h('ul', {class: 'files'}, ...files.map(({path, bytes}) => h('li', {},
+        h('a', {href: `files/${path.split('/').map(encodeURIComponent).join('/')}`, download: ''}, path),
+        ` ${format(bytes / 1e6, 2)} MB`)))));
+  }
+}
+
+const text = (value: Json | undefined): string => (typeof value === 'string' ? value : '–');
+
+function spacing(band: string): string {
+  return ({below_3px: 'below 3 px', '3_5px': '3–5 px', '5_8px': '5–8 px', '8_12px': '8–12 px',
+    from_12px: 'from 12 px'} as Record<string, string>)[band] ?? words(band);
+}

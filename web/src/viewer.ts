@@ -1,0 +1,456 @@
+// The 3-D panel: picture, tools, legend, selection in space, measuring.
+import {Group, Vector3} from 'three';
+import type {App} from './app';
+import {
+  colorMesh, colorPoints, kColorModes, legendOf, scaleOf, type ColorMode, type Legend, type Ramps,
+} from './coloring';
+import type {Mesh} from './data';
+import {clear, drawDevices, drawMarker, drawSegments, drawSheet} from './devices3d';
+import {Device, type Vec3} from './device';
+import {byId, choice, format, h} from './dom';
+import {css, sequential, type Rgb} from './palette';
+import {angleBetween, fitPlane, type Plane} from './plane_fit';
+import {Picture3d} from './scene';
+
+type Surface = 'mesh' | 'measured' | 'none';
+type Tool = 'select' | 'distance' | 'angle';
+
+const cssColor = (name: string): string =>
+  getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+
+function rgbOf(name: string): Rgb {
+  const hex = cssColor(name);
+  return [1, 3, 5].map((k) => parseInt(hex.slice(k, k + 2), 16)) as unknown as Rgb;
+}
+
+export class Viewer {
+  private picture: Picture3d | null = null;
+  private surface: Surface = 'mesh';
+  private mode: ColorMode = 'shading';
+  private tool: Tool = 'select';
+  private meshes: Record<'mesh' | 'measured', Mesh | null> = {mesh: null, measured: null};
+  private readonly devices = new Group();
+  private readonly picked = new Group();
+  private readonly measured = new Group();
+  private marks: {at: Vec3; plane: Plane | null}[] = [];
+  private ramps: Ramps = {sigma: 1, distance: 1};
+  private shown = -1; // result in the picture
+  private readonly colorSelect = h('select', {id: 'color-mode', onchange: () => {
+    this.mode = this.colorSelect.value as ColorMode;
+    this.modeChosen();
+  }});
+  private readonly viewSelect = h('select', {id: 'view-from', onchange: () => this.lookFrom()});
+  private readonly showPoints = h('input', {type: 'checkbox', id: 'show-points',
+    onchange: () => this.drawPoints()});
+  private readonly showDevices = h('input', {type: 'checkbox', id: 'show-devices', checked: true,
+    onchange: () => this.drawDevices()});
+  private readonly showSheet = h('input', {type: 'checkbox', id: 'show-sheet', checked: true,
+    onchange: () => this.drawSelection()});
+  private readonly patch = h('input', {type: 'range', id: 'patch', min: 1, max: 30, value: 8,
+    'aria-label': 'Radius of the fitted patches', oninput: () => this.refit()});
+  private readonly legend = h('div', {class: 'legend', hidden: true});
+  private readonly message = h('p', {class: 'overlay-message', hidden: true});
+  private readonly readout = h('output', {class: 'readout', hidden: true, 'aria-live': 'polite'});
+  private readonly surfaceChoice = choice<Surface>('Surface', [
+    {value: 'mesh', text: 'Closed', title: 'mesh.ply: the closed surface'},
+    {value: 'measured', text: 'Measured', title: 'mesh_measured.ply: only what was measured'},
+    {value: 'none', text: 'None'},
+  ], 'mesh', (value) => {
+    this.surface = value;
+    void this.drawSurface();
+  });
+  private readonly toolChoice = choice<Tool>('Tool', [
+    {value: 'select', text: 'Select', title: 'Click the shape: which measurement is it?'},
+    {value: 'distance', text: 'Distance', title: 'Click two places'},
+    {value: 'angle', text: 'Angle', title: 'Click two flat places: planes are fitted to the points'},
+  ], 'select', (value) => {
+    this.tool = value;
+    this.marks = [];
+    this.drawMeasuring();
+  });
+
+  constructor(private readonly app: App) {
+    this.build();
+    app.on('result', () => void this.load());
+    app.on('points', () => this.pointsArrived());
+    app.on('selection', () => this.drawSelection());
+    app.on('theme', () => this.recolor());
+  }
+
+  private build(): void {
+    const panel = byId('viewer');
+    const check = (input: HTMLInputElement, text: string) =>
+      h('label', {class: 'check'}, input, text);
+    panel.append(
+      h('div', {class: 'tools'},
+        h('span', {class: 'tool-group'}, h('span', {class: 'tool-label'}, 'Surface'),
+          this.surfaceChoice.element),
+        check(this.showPoints, 'Points'),
+        check(this.showDevices, 'Devices'),
+        h('label', {class: 'tool-group'}, h('span', {class: 'tool-label'}, 'Colour'), this.colorSelect),
+        h('label', {class: 'tool-group'}, h('span', {class: 'tool-label'}, 'View'), this.viewSelect),
+        h('button', {type: 'button', title: 'Save a screenshot of the 3-D picture', 'aria-label': 'Save a screenshot', onclick: () => void this.save()},
+          'PNG')),
+      h('div', {class: 'canvas-holder', id: 'canvas-3d'}, this.message, this.legend, this.readout,
+        h('div', {class: 'canvas-tools'}, this.toolChoice.element,
+          h('label', {class: 'check', id: 'patch-label', hidden: true}, 'Patch', this.patch))));
+    try {
+      this.picture = new Picture3d(byId('canvas-3d'));
+    } catch (error) {
+      this.say(`The 3-D picture needs WebGL, which this browser does not offer (${String(error)}).`);
+      return;
+    }
+    const {canvas, helpers} = this.picture;
+    canvas.setAttribute('role', 'application');
+    canvas.setAttribute('aria-label',
+      '3-D view. Arrow keys turn it, plus and minus zoom, 0 shows everything.');
+    helpers.add(this.devices, this.picked, this.measured);
+    let down: {x: number; y: number} | null = null;
+    canvas.addEventListener('pointerdown', (e) => (down = {x: e.offsetX, y: e.offsetY}));
+    canvas.addEventListener('pointerup', (e) => {
+      if (down && Math.hypot(e.offsetX - down.x, e.offsetY - down.y) < 5) {
+        this.click(e.offsetX, e.offsetY);
+      }
+      down = null;
+    });
+    // For tests and scripts: where a world point is on the canvas.
+    Object.assign(canvas, {pencilscanProject: (p: Vec3) =>
+      this.picture!.toCanvas(new Vector3(...p))});
+  }
+
+  private say(text: string): void {
+    this.message.textContent = text;
+    this.message.hidden = text === '';
+  }
+
+  private async load(): Promise<void> {
+    const {app} = this;
+    this.meshes = {mesh: null, measured: null};
+    this.marks = [];
+    this.fillSelects();
+    this.drawPoints();
+    this.drawDevices();
+    this.drawMeasuring();
+    const has = (part: string) => app.source.has(app.result, part);
+    if (!has('mesh') && has('measured')) this.surface = 'measured';
+    if (!has('mesh') && !has('measured')) this.surface = 'none';
+    if (this.surface === 'none' && has('points')) this.showPoints.checked = true;
+    this.surfaceChoice.set(this.surface);
+    this.say(has('mesh') || has('measured') || has('points') ? '' : 'This result holds no shape.');
+    await this.drawSurface();
+  }
+
+  private fillSelects(): void {
+    const {rig} = this.app;
+    const chosen = this.viewSelect.value;
+    const group = (name: string, devices: {name: string}[], prefix: string) =>
+      h('optgroup', {label: name},
+        ...devices.map((d, i) => h('option', {value: `${prefix}${i}`}, d.name)));
+    this.viewSelect.replaceChildren(
+      h('option', {value: 'free'}, 'Free'),
+      ...['Front', 'Right', 'Back', 'Left', 'Above', 'Below'].map((name) =>
+        h('option', {value: name}, name)),
+      ...(rig ? [group('Cameras', rig.cameras, 'c'), group('Projectors', rig.projectors, 'p')] : []));
+    if ([...this.viewSelect.options].some((o) => o.value === chosen)) this.viewSelect.value = chosen;
+    this.fillColorModes();
+  }
+
+  private fillColorModes(): void {
+    const mesh = this.currentMesh() ?? this.meshes.mesh;
+    const {points} = this.app;
+    const available: Record<ColorMode, boolean> = {
+      shading: true, albedo: points?.albedo !== undefined || mesh?.albedo !== undefined, camera: points !== null,
+      projector: points !== null, line: points !== null,
+      sigma: points !== null || mesh?.sigma !== undefined,
+      confidence: points !== null || mesh?.confidence !== undefined,
+      hole: mesh?.hole !== undefined,
+      distance: points?.distance !== undefined || mesh?.distance !== undefined,
+    };
+    this.colorSelect.replaceChildren(...kColorModes.map(({value, text}) =>
+      h('option', {value, disabled: !available[value]}, text)));
+    if (available[this.mode]) this.colorSelect.value = this.mode;
+  }
+
+  private currentMesh(): Mesh | null {
+    return this.surface === 'none' ? null : this.meshes[this.surface];
+  }
+
+  private async drawSurface(): Promise<void> {
+    const {app, picture} = this;
+    if (!picture) return;
+    const part = this.surface;
+    const {result} = app;
+    if (part !== 'none' && !this.meshes[part] && app.source.has(result, part)) {
+      try {
+        const mesh = await app.source.mesh(result, part);
+        if (app.result !== result) return;
+        this.meshes[part] = mesh;
+      } catch (error) {
+        this.say(`The surface cannot be shown: ${String(error)}`);
+      }
+      if (this.surface !== part) return;
+    }
+    const mesh = this.currentMesh();
+    picture.setMesh(mesh);
+    if (mesh && this.shown !== result) this.frame(mesh.position);
+    if (!mesh && this.surface !== 'none') this.say(`There is no ${part === 'mesh' ? 'closed' : 'measured'} surface in this result.`);
+    else if (mesh) this.say('');
+    this.fillColorModes();
+    this.recolor();
+  }
+
+  /** Shows another result's shape from where the last one was seen; the first one from the front. */
+  private frame(position: Float32Array): void {
+    const {picture} = this;
+    if (!picture || position.length === 0) return;
+    const low = [Infinity, Infinity, Infinity];
+    const high = [-Infinity, -Infinity, -Infinity];
+    for (let i = 0; i < position.length; ++i) {
+      low[i % 3] = Math.min(low[i % 3], position[i]);
+      high[i % 3] = Math.max(high[i % 3], position[i]);
+    }
+    const center = low.map((x, k) => (x + high[k]) / 2) as Vec3;
+    picture.setBounds(center, Math.max(1e-6, Math.hypot(...low.map((x, k) => high[k] - x)) / 2));
+    if (this.shown < 0) this.lookFrom();
+    this.shown = this.app.result;
+  }
+
+  private lookFrom(): void {
+    const {picture, app} = this;
+    const value = this.viewSelect.value;
+    const sides: Record<string, Vec3> = {Front: [1, 0, 0.15], Right: [0, 1, 0.15], Back: [-1, 0, 0.15],
+      Left: [0, -1, 0.15], Above: [0.01, 0, 1], Below: [0.01, 0, -1]};
+    if (!picture) return;
+    if (value === 'free' || sides[value]) {
+      picture.fit(sides[value]);
+    } else if (app.rig) {
+      const list = value[0] === 'c' ? app.rig.cameras : app.rig.projectors;
+      picture.viewFrom(new Device(list[Number(value.slice(1))]));
+    }
+  }
+
+  private pointsArrived(): void {
+    this.fillColorModes();
+    this.drawPoints();
+    if (this.shown !== this.app.result && this.app.points) this.frame(this.app.points.position);
+  }
+
+  private drawPoints(): void {
+    const {picture, app} = this;
+    if (!picture) return;
+    picture.setPoints(this.showPoints.checked && app.points ? app.points.position : null);
+    this.recolor();
+  }
+
+  private drawDevices(): void {
+    const {picture, app} = this;
+    clear(this.devices);
+    if (picture && app.rig && this.showDevices.checked) {
+      this.devices.add(drawDevices(app.rig, cssColor('--ink-3d')));
+    }
+    picture?.render();
+  }
+
+  /** Some colours only points have: show them then. */
+  private modeChosen(): void {
+    const ofPoints = ['camera', 'projector', 'line'].includes(this.mode);
+    const ofMesh = this.mode === 'hole';
+    if (ofPoints && !this.showPoints.checked) {
+      this.showPoints.checked = true;
+      this.drawPoints();
+    }
+    if (ofMesh && this.surface !== 'mesh') {
+      this.surface = 'mesh';
+      this.surfaceChoice.set('mesh');
+      void this.drawSurface();
+    }
+    this.recolor();
+  }
+
+  private recolor(): void {
+    const {picture, app} = this;
+    if (!picture) return;
+    const mesh = this.currentMesh();
+    const {points} = app;
+    const [clay, invented] = [rgbOf('--clay'), rgbOf('--invented')];
+    this.ramps = {
+      sigma: scaleOf(points?.sigma, points ? undefined : mesh?.sigma),
+      distance: scaleOf(points?.distance, mesh?.distance),
+    };
+    picture.setBackground(cssColor('--canvas'));
+    picture.pointSize = 2 * Math.min(devicePixelRatio, 2);
+    if (mesh) picture.setColors('mesh', colorMesh(mesh, this.mode, this.ramps, clay, invented));
+    if (points && this.showPoints.checked) {
+      picture.setColors('points',
+        colorPoints(points, this.mode, app.rig, this.ramps, rgbOf('--point')));
+    }
+    this.drawLegend(legendOf(this.mode, app.rig, mesh, this.ramps, clay, invented));
+    this.drawDevices();
+  }
+
+  private drawLegend(legend: Legend | null): void {
+    this.legend.hidden = legend === null;
+    if (!legend) return;
+    this.legend.replaceChildren(h('strong', {}, legend.title));
+    for (const {name, color} of legend.named ?? []) {
+      this.legend.append(h('span', {class: 'key'},
+        h('i', {style: `background:${css(color)}`}), name));
+    }
+    if (legend.range) {
+      const {low, high, unit} = legend.range;
+      const stops = [0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1].map((x) => css(sequential(x)));
+      this.legend.append(
+        h('span', {class: 'ramp', style: `background:linear-gradient(90deg,${stops.join(',')})`}),
+        h('span', {class: 'ramp-ends'}, h('span', {}, format(low)), h('span', {}, format((low + high) / 2)),
+          h('span', {}, `${unit === '' ? '' : '≥ '}${format(high)} ${unit}`)));
+    }
+  }
+
+  private click(x: number, y: number): void {
+    const {picture, app} = this;
+    if (!picture) return;
+    const hit = picture.meshHit(x, y);
+    const {points} = app;
+    if (this.tool !== 'select') {
+      const i = !hit && points ? picture.pointHit(points.position, x, y, 12) : -1;
+      const at = hit ? (hit.toArray() as Vec3) : i >= 0 ? app.position(i) : null;
+      if (at) this.addMark(at);
+      return;
+    }
+    if (!points) return;
+    const chosen = hit ? this.nearestTo(points.position, hit) :
+      picture.pointHit(points.position, x, y, 12);
+    if (chosen >= 0) app.selectPoint(chosen);
+    else app.clearSelection();
+  }
+
+  private nearestTo(position: Float32Array, hit: Vector3): number {
+    let best = -1;
+    let least = (0.05 * this.picture!.bounds.radius) ** 2;
+    for (let i = 0; i < position.length / 3; ++i) {
+      const d = (position[3 * i] - hit.x) ** 2 + (position[3 * i + 1] - hit.y) ** 2 +
+        (position[3 * i + 2] - hit.z) ** 2;
+      if (d < least) {
+        least = d;
+        best = i;
+      }
+    }
+    return best;
+  }
+
+  private addMark(at: Vec3): void {
+    if (this.marks.length === 2) this.marks = [];
+    this.marks.push({at, plane: this.tool === 'angle' ? this.planeAt(at) : null});
+    this.drawMeasuring();
+  }
+
+  private get patchRadius(): number {
+    return (Number(this.patch.value) / 100) * (this.picture?.bounds.radius ?? 100);
+  }
+
+  private planeAt(at: Vec3): Plane | null {
+    const position = this.app.points?.position ?? this.currentMesh()?.position;
+    return position ? fitPlane(position, at, this.patchRadius) : null;
+  }
+
+  private refit(): void {
+    for (const mark of this.marks) mark.plane = this.planeAt(mark.at);
+    this.drawMeasuring();
+  }
+
+  private drawMeasuring(): void {
+    const {picture, marks} = this;
+    byId('patch-label').hidden = this.tool !== 'angle';
+    clear(this.measured);
+    this.readout.hidden = this.tool === 'select';
+    for (const {at} of marks) {
+      const marker = drawMarker('#ffd23f');
+      marker.position.set(...at);
+      this.measured.add(marker);
+    }
+    const unit = this.app.rig?.unit ?? 'mm';
+    if (this.tool === 'distance') {
+      if (marks.length === 2) {
+        this.measured.add(drawSegments([...marks[0].at, ...marks[1].at], 0xffd23f));
+        const length = Math.hypot(...marks[0].at.map((x, k) => x - marks[1].at[k]));
+        this.readout.textContent = `Distance ${length.toFixed(2)} ${unit}`;
+      } else {
+        this.readout.textContent = marks.length ? 'Click the second place.' : 'Click two places on the shape.';
+      }
+    } else if (this.tool === 'angle') {
+      for (const {plane} of marks) if (plane) this.measured.add(this.disc(plane));
+      this.readout.textContent = this.angleText(unit);
+    }
+    picture?.render();
+  }
+
+  private angleText(unit: string): string {
+    const {marks, picture} = this;
+    if (marks.some((m) => !m.plane)) return 'Too few points there: take a larger patch.';
+    const fits = marks.map((m) => `${m.plane!.count} points, rms ${format(m.plane!.rms)} ${unit}`);
+    if (marks.length < 2) return marks.length ? `First plane: ${fits[0]}. Click the second one.` :
+      'Click two flat places; planes are fitted to the points around them.';
+    const eye = picture!.camera.position.toArray() as Vec3;
+    const angle = angleBetween(marks[0].plane!, marks[1].plane!, eye);
+    return `Angle between the normals ${angle.toFixed(2)}° (${fits.join('; ')})`;
+  }
+
+  private disc(plane: Plane) {
+    const n = new Vector3(...plane.normal);
+    const a = new Vector3(Math.abs(n.x) < 0.9 ? 1 : 0, Math.abs(n.x) < 0.9 ? 0 : 1, 0).cross(n).normalize();
+    const b = n.clone().cross(a);
+    const center = new Vector3(...plane.center);
+    const r = this.patchRadius;
+    const rim = (i: number) => center.clone()
+      .addScaledVector(a, r * Math.cos(i * Math.PI / 24)).addScaledVector(b, r * Math.sin(i * Math.PI / 24));
+    const positions: number[] = [];
+    for (let i = 0; i < 48; ++i) positions.push(...rim(i).toArray(), ...rim(i + 1).toArray());
+    positions.push(...center.toArray(), ...center.clone().addScaledVector(n, 0.6 * r).toArray());
+    return drawSegments(positions, 0xffd23f);
+  }
+
+  private drawSelection(): void {
+    const {picture, app} = this;
+    if (!picture) return;
+    clear(this.picked);
+    const {selection, points, rig} = app;
+    if (selection && selection.point >= 0 && points) {
+      const at = app.position(selection.point);
+      const marker = drawMarker('#ff3d6e');
+      marker.position.set(...at);
+      this.picked.add(marker);
+      const camera = app.cameras[selection.camera];
+      if (camera) this.picked.add(drawSegments([...camera.center, ...at], 0xff3d6e));
+      if (rig && this.showSheet.checked) {
+        this.picked.add(drawSheet(rig, points.projector[selection.point],
+          points.pattern[selection.point], points.line[selection.point]));
+      }
+    } else if (selection && rig) {
+      const camera = app.cameras[selection.camera];
+      if (camera) {
+        const d = camera.direction(selection.u, selection.v);
+        const reach = Math.hypot(...camera.center.map((x, k) => x - rig.volume.center[k])) +
+          rig.volume.radius;
+        this.picked.add(drawSegments(
+          [...camera.center, ...camera.center.map((x, k) => x + reach * d[k])], 0xff3d6e));
+      }
+    }
+    picture.render();
+  }
+
+  /** One frame of a playing sequence. */
+  play(mesh: Mesh): void {
+    const {picture} = this;
+    if (!picture) return;
+    picture.setMesh(mesh);
+    picture.setColors('mesh', colorMesh(mesh, this.mode, this.ramps, rgbOf('--clay'), rgbOf('--invented')));
+  }
+
+  private async save(): Promise<void> {
+    const blob = await this.picture?.screenshot();
+    if (!blob) return;
+    const link = h('a', {download: `${this.app.source.index.title}.png`, href: URL.createObjectURL(blob)});
+    link.click();
+    setTimeout(() => URL.revokeObjectURL(link.href), 10000);
+  }
+}
