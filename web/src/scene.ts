@@ -9,6 +9,15 @@ import type {Device} from './device';
 
 const kFov = 35; // degrees, of the free view
 
+function rendersInSoftware(): boolean {
+  const context = document.createElement('canvas').getContext('webgl2');
+  if (!context) return false;
+  const info = context.getExtension('WEBGL_debug_renderer_info');
+  const name = String(context.getParameter(info ? info.UNMASKED_RENDERER_WEBGL : context.RENDERER));
+  context.getExtension('WEBGL_lose_context')?.loseContext();
+  return /swiftshader|llvmpipe|software|basic render/i.test(name);
+}
+
 export class Picture3d {
   readonly camera = new PerspectiveCamera(kFov, 1, 1, 10000);
   readonly helpers = new Group(); // devices, planes, markers: not picked, not fitted
@@ -26,8 +35,10 @@ export class Picture3d {
   beforeRender: (() => void) | null = null;
 
   constructor(private readonly container: HTMLElement) {
-    this.renderer = new WebGLRenderer({antialias: true, powerPreference: 'low-power'});
-    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+    // Without a graphics card, smooth edges would cost four times the time.
+    const software = rendersInSoftware();
+    this.renderer = new WebGLRenderer({antialias: !software, powerPreference: 'low-power'});
+    this.renderer.setPixelRatio(software ? 1 : Math.min(devicePixelRatio, 2));
     const canvas = this.renderer.domElement;
     canvas.tabIndex = 0;
     container.append(canvas);
@@ -168,7 +179,8 @@ export class Picture3d {
 
   private resize(): void {
     const {width, height} = this.size();
-    this.renderer.setSize(width, height);
+    const drawn = this.renderer.getSize(new Vector2());
+    if (drawn.x !== width || drawn.y !== height) this.renderer.setSize(width, height);
     this.camera.aspect = width / height;
     if (this.deviceView) {
       const {K, width: w, height: h} = this.deviceView.json;
@@ -182,7 +194,7 @@ export class Picture3d {
       this.camera.clearViewOffset();
     }
     this.camera.updateProjectionMatrix();
-    this.render();
+    this.draw(); // at once: the canvas is empty now
   }
 
   render(): void {

@@ -74,7 +74,10 @@ export class Viewer {
     app.on('result', () => void this.load());
     app.on('points', () => this.pointsArrived());
     app.on('selection', () => this.drawSelection());
-    app.on('theme', () => this.recolor());
+    app.on('theme', () => {
+      this.recolor();
+      this.drawDevices(); // their ink
+    });
   }
 
   private build(): void {
@@ -285,7 +288,6 @@ export class Viewer {
         colorPoints(points, this.mode, app.rig, this.ramps, rgbOf('--point')));
     }
     this.drawLegend(legendOf(this.mode, app.rig, mesh, this.ramps, clay, invented));
-    this.drawDevices();
   }
 
   private drawLegend(legend: Legend | null): void {

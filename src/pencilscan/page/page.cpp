@@ -1,7 +1,7 @@
 #include "pencilscan/page/page.h"
 
 #include <algorithm>
-#include <map>
+#include <array>
 #include <utility>
 
 #include "pencilscan/core/error.h"
@@ -111,6 +111,49 @@ Detail shape_detail(std::size_t results, std::size_t max_bytes) {
   return detail;
 }
 
+/// All results, each in the detail that there is room for; first of all the first one, which says
+/// how much a whole one takes.
+std::vector<Collected> collect_all(const PageData& data, const PageOptions& options,
+                                   const Progress& progress) {
+  const std::size_t count = data.size();
+  std::vector<Collected> collected(count);
+  if (count == 0) return collected;
+  const Detail shape = shape_detail(count, options.max_bytes);
+  const auto number = static_cast<double>(count);
+  const double shape_bytes = static_cast<double>(shape.max_faces) * kBytesPerFace;
+  const double room = static_cast<double>(options.max_bytes) - 1e6;  // 1 MB: the page itself
+  Detail full;
+  double each = 0;
+  for (const Detail& detail : kFullDetails) {
+    if (progress) progress("reading results", 0);
+    full = detail;
+    full.evaluate = count <= 8;
+    collected[0] = collect(data, 0, full);
+    each = static_cast<double>(collected[0].embedded_bytes());
+    // Few results are all whole, if need be with less detail; of many, at least one.
+    constexpr std::size_t kFew = 6;
+    const double others = std::min((number - 1) * shape_bytes, 0.6 * room);
+    if ((count <= kFew ? number * each : each + others) <= room) break;
+  }
+  std::size_t whole = count;
+  if (number * each > room) {
+    const double fit = (room - number * shape_bytes) / std::max(1.0, each - shape_bytes);
+    whole = static_cast<std::size_t>(std::clamp(fit, 1.0, number));
+  }
+  std::vector<char> is_whole(count, 0);
+  for (std::size_t i = 0; i < whole; ++i) is_whole[i * count / whole] = 1;
+  const auto chunk = static_cast<std::size_t>(thread_count());
+  for (std::size_t first = 1; first < count; first += chunk) {
+    const std::size_t last = std::min(first + chunk, count);
+    parallel_for(last - first, [&](std::size_t i) {
+      const std::size_t result = first + i;
+      collected[result] = collect(data, result, is_whole[result] != 0 ? full : shape);
+    });
+    if (progress) progress("reading results", static_cast<double>(last) / number);
+  }
+  return collected;
+}
+
 }  // namespace
 
 PageData::PageData(const fs::path& root, const PageOptions& options) : options_(options) {
@@ -194,45 +237,13 @@ ordered_json PageData::index(const std::string& mode, std::vector<ordered_json> 
 PageReport write_report(const fs::path& root, const fs::path& file, const PageOptions& options,
                         const Progress& progress) {
   const PageData data(root, options);
-  const std::size_t count = data.size();
-  std::vector<Collected> collected(count);
-  std::vector<char> full(count, 0);
-  Detail full_detail;
-  const Detail shape = shape_detail(std::max<std::size_t>(count, 1), options.max_bytes);
-  if (count > 0) {
-    const double rest =
-        count > 1 ? static_cast<double>((count - 1) * shape.max_faces) * kBytesPerFace : 0;
-    const double room = static_cast<double>(options.max_bytes) - 1e6;  // 1 MB: the page itself
-    for (const Detail& detail : kFullDetails) {
-      if (progress) progress("reading results", 0);
-      full_detail = detail;
-      full_detail.evaluate = count <= 8;
-      collected[0] = collect(data, 0, full_detail);
-      // All of them whole, or else at least one.
-      if (static_cast<double>(collected[0].embedded_bytes()) + std::min(rest, 0.6 * room) <= room)
-        break;
-    }
-    const double each = static_cast<double>(collected[0].embedded_bytes());
-    const double shape_bytes = static_cast<double>(shape.max_faces) * kBytesPerFace;
-    const double fit =
-        (room - static_cast<double>(count) * shape_bytes) / std::max(1.0, each - shape_bytes);
-    std::size_t whole = static_cast<std::size_t>(std::clamp(fit, 1.0, static_cast<double>(count)));
-    if (each * static_cast<double>(count) <= room) whole = count;
-    for (std::size_t i = 0; i < whole; ++i) full[i * count / whole] = 1;
-  }
-  const auto chunk = static_cast<std::size_t>(thread_count());
-  for (std::size_t first = 1; first < count; first += chunk) {
-    const std::size_t last = std::min(first + chunk, count);
-    parallel_for(last - first, [&](std::size_t i) {
-      const std::size_t result = first + i;
-      collected[result] = collect(data, result, full[result] != 0 ? full_detail : shape);
-    });
-    if (progress)
-      progress("reading results", static_cast<double>(last) / static_cast<double>(count));
-  }
+  const std::vector<Collected> collected = collect_all(data, options, progress);
+  const std::size_t count = collected.size();
   PageReport report;
   report.results = count;
-  report.full_results = static_cast<std::size_t>(std::count(full.begin(), full.end(), 1));
+  report.full_results = static_cast<std::size_t>(
+      std::count_if(collected.begin(), collected.end(),
+                    [](const Collected& c) { return c.entry["detail"] == "full"; }));
   std::vector<ordered_json> entries;
   for (std::size_t i = 0; i < count; ++i) {
     entries.push_back(collected[i].entry);

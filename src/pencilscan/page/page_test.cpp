@@ -157,7 +157,8 @@ TEST(Decimated, KeepsTheBallClosedAndItsSize) {
   EXPECT_LE(small.faces.size(), kFaces);
   EXPECT_GT(small.faces.size(), kFaces / 2);
   EXPECT_EQ(count_edges(small).boundary, 0U);
-  EXPECT_NEAR(signed_volume(small) / signed_volume(mesh), 1, 0.03);
+  constexpr double kInscribed = 0.05;  // vertices lie on the ball: a geodesic one loses 0.03
+  EXPECT_NEAR(signed_volume(small) / signed_volume(mesh), 1, kInscribed);
   ASSERT_EQ(small.hole.size(), small.vertices.size());
   for (std::size_t i = 0; i < small.vertices.size(); ++i)
     EXPECT_EQ(small.hole[i], small.vertices[i].x() > 0 ? 1 : 8);
@@ -291,7 +292,8 @@ TEST_F(Folder, ATruthAddsDistancesAndFigures) {
   EXPECT_LT(details["figures"]["distance_median_mm"].get<double>(), 0.2);
   EXPECT_LT(details["histograms"]["error_mm"]["median"].get<double>(), 0.2);
   EXPECT_TRUE(ReadBlock(*reader->part("points")).header["arrays"].contains("distance"));
-  EXPECT_THROW(PageData(root_, PageOptions{.sources = {.truth = "none.ply"}}), InputError);
+  options.sources.truth = "none.ply";
+  EXPECT_THROW(PageData(root_, options), InputError);
 }
 
 }  // namespace

@@ -1,16 +1,20 @@
 #include <arpa/inet.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <httplib.h>
 #include <ifaddrs.h>
 #include <unistd.h>
 
 #include <thread>
 
+// clang-format off
 #include "pencilscan/core/error.h"
 #include "pencilscan/page/sample_result.h"
 #include "pencilscan/server/served_files.h"
 #include "pencilscan/server/view_server.h"
+
+// After all that includes Eigen: its <resolv.h> defines a macro that Eigen uses as a name.
+#include <httplib.h>
+// clang-format on
 
 namespace pencilscan {
 namespace {
