@@ -1,5 +1,5 @@
-// From the images of one frame to labelled points, stage by stage, as blur ratios
-// (reference_blur.h).
+// From the images of one frame to labelled points, and with --shape on to the mesh, stage by stage,
+// as blur ratios (reference_blur.h).
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -40,7 +40,7 @@ void print_row(const std::string& stage, double seconds, double blur_seconds) {
   std::printf("%-24s %9.1f %9.1f\n", stage.c_str(), 1e3 * seconds, seconds / blur_seconds);
 }
 
-void run(const Rig& rig, const Frame& frame, int threads, int runs) {
+void run(const Rig& rig, const Frame& frame, int threads, int runs, bool with_shape) {
   const ThreadLimit limit(threads);
   cv::setNumThreads(1);  // the cameras share the threads
 
@@ -49,17 +49,26 @@ void run(const Rig& rig, const Frame& frame, int threads, int runs) {
   std::vector<std::string> stages;  // in the order in which they run
   std::map<std::string, std::vector<double>> seconds_by_stage;
   std::vector<double> total_seconds;
+  std::vector<double> shape_seconds;  // depth to mesh
   std::size_t points = 0;
   for (int i = 0; i <= runs; ++i) {  // the first run warms up
     const Stopwatch watch;
     const PointResult result = measure_points(rig, frame);
+    const double seconds = watch.seconds();
+    const Stopwatch shape_watch;
+    std::vector<StageTime> times = result.times;
+    if (with_shape) {
+      const ShapeResult shape = measure_shape(rig, frame, result);
+      times.insert(times.end(), shape.times.begin(), shape.times.end());
+    }
     if (i == 0) {
-      for (const StageTime& time : result.times) stages.push_back(time.stage);
+      for (const StageTime& time : times) stages.push_back(time.stage);
       points = result.points.size();
       continue;
     }
-    total_seconds.push_back(watch.seconds());
-    for (const StageTime& time : result.times) seconds_by_stage[time.stage].push_back(time.seconds);
+    total_seconds.push_back(seconds);
+    shape_seconds.push_back(shape_watch.seconds());
+    for (const StageTime& time : times) seconds_by_stage[time.stage].push_back(time.seconds);
   }
   const double blur_after = reference_blur_seconds();
   const double blur = std::min(blur_before, blur_after);
@@ -73,6 +82,7 @@ void run(const Rig& rig, const Frame& frame, int threads, int runs) {
     print_row(stage, median(seconds_by_stage[stage]), blur);
   }
   print_row("images to points", median(total_seconds), blur);
+  if (with_shape) print_row("points to colored mesh", median(shape_seconds), blur);
 }
 
 }  // namespace
@@ -89,10 +99,12 @@ int main(int argc, char** argv) {
   app.add_option("frame", frame_folder, "Folder of one frame's images")->required();
   app.add_option("--threads", threads)->check(CLI::PositiveNumber)->capture_default_str();
   app.add_option("--runs", runs)->check(CLI::Range(kBenchmarkRuns, 1000))->capture_default_str();
+  bool with_shape = false;
+  app.add_flag("--shape", with_shape, "Dense depth, mesh and colour too");
   CLI11_PARSE(app, argc, argv);
   try {
     const Rig rig = read_rig(rig_path);
-    run(rig, read_frame(rig, frame_folder), threads, runs);
+    run(rig, read_frame(rig, frame_folder), threads, runs, with_shape);
   } catch (const std::exception& error) {
     std::fprintf(stderr, "frame_benchmark: %s\n", error.what());
     return 1;

@@ -167,7 +167,15 @@ ShapeResult measure_shape(const Rig& rig, const Frame& frame, const PointResult&
         measure_depth(rig, points.families, frame.images, unmixings, points.points, options.depth);
     result.times.push_back({"depth", depth_watch.seconds()});
     const Stopwatch surface_watch;
-    result.surface = fuse_depth(rig, points.points, result.depth.maps, options.fusion);
+    const std::vector<ColorView> views = color_views(rig, frame, points, result.depth.report);
+    std::vector<Silhouette> silhouettes;
+    for (const ColorView& view : views) {
+      const Camera& camera = rig.cameras[static_cast<std::size_t>(view.camera)];
+      if (camera.sees_texture_only) continue;
+      silhouettes.push_back(silhouette(view.camera, view.image, line_reach_px(rig, camera)));
+    }
+    result.surface =
+        fuse_depth(rig, points.points, result.depth.maps, options.fusion, {}, silhouettes);
     result.times.push_back({"surface", surface_watch.seconds()});
     if (result.surface.report.status != SurfaceStatus::kTooFewPoints) {
       const Stopwatch hole_watch;
@@ -177,7 +185,7 @@ ShapeResult measure_shape(const Rig& rig, const Frame& frame, const PointResult&
       result.times.push_back({"holes", hole_watch.seconds()});
       const Stopwatch color_watch;
       TriangleMesh& mesh = result.surface.mesh;
-      mesh.color = vertex_colors(rig, mesh, color_views(rig, frame, points, result.depth.report));
+      mesh.color = vertex_colors(rig, mesh, views);
       if (!mesh.color.empty()) copy_colors(mesh, result.surface.measured);
       result.times.push_back({"color", color_watch.seconds()});
       return result;

@@ -196,7 +196,7 @@ SurfaceResult reconstruct_surface(const Rig& rig, std::span<const MeasuredPoint>
 
 SurfaceResult fuse_depth(const Rig& rig, std::span<const MeasuredPoint> points,
                          std::span<const DepthMap> maps, const FusionOptions& options,
-                         const Progress& progress) {
+                         const Progress& progress, std::span<const Silhouette> silhouettes) {
   PENCILSCAN_CHECK(options.max_depth >= 5 && options.max_depth <= 10);
   PENCILSCAN_CHECK(options.cell_spacings > 0 && options.fit_spacings > 0);
   const auto tell = [&](double fraction) {
@@ -232,6 +232,7 @@ SurfaceResult fuse_depth(const Rig& rig, std::span<const MeasuredPoint> points,
   report.seconds_poisson = poisson_watch.seconds();
   tell(0.8);
   if (!result.mesh.faces.empty()) {
+    draw_in(rig, silhouettes, options.draw_in, result.mesh);
     for (int i = 0; i < options.subdivisions; ++i) result.mesh = subdivided(result.mesh);
     follow_nodes(rig, maps, options.follow, result.mesh);
     attribute_vertices(samples, options.reach_spacings, spacing, result.mesh);

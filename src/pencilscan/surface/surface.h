@@ -11,6 +11,7 @@
 #include "pencilscan/io/point_file.h"
 #include "pencilscan/rig/rig.h"
 #include "pencilscan/surface/node_surface.h"
+#include "pencilscan/surface/silhouette.h"
 
 namespace pencilscan {
 
@@ -81,6 +82,7 @@ struct FusionOptions {
   double cell_spacings = 0.9;          ///< wished octree cell in node spacings, > 0
   double fit_spacings = 1.5;           ///< radius of local quadrics in node spacings, > 0
   int subdivisions = 1;                ///< of the octree's triangles, before they follow the depth
+  DrawInOptions draw_in;               ///< of what was invented, into the silhouettes
   FollowOptions follow;                ///< how vertices follow the depth
   double reach_spacings = 2;           ///< a vertex farther from all nodes was not measured, > 0
   double min_component_share = 0.05;   ///< of the largest component's measured area, in [0, 1]
@@ -94,7 +96,8 @@ struct FusionOptions {
 [[nodiscard]] SurfaceResult fuse_depth(const Rig& rig, std::span<const MeasuredPoint> points,
                                        std::span<const DepthMap> maps,
                                        const FusionOptions& options = {},
-                                       const Progress& progress = {});
+                                       const Progress& progress = {},
+                                       std::span<const Silhouette> silhouettes = {});
 
 [[nodiscard]] std::string to_string(SurfaceStatus status);
 

@@ -17,6 +17,7 @@
 #include "pencilscan/surface/holes.h"
 #include "pencilscan/surface/mesh_parts.h"
 #include "pencilscan/surface/node_surface.h"
+#include "pencilscan/surface/point_grid.h"
 #include "pencilscan/surface/vertex_color.h"
 
 namespace pencilscan {
@@ -316,6 +317,68 @@ std::vector<DepthMap> ball_maps(const Rig& rig, double noise = kNoise) {
   return maps;
 }
 
+/// True when segment pq passes through the inside of the triangle abc.
+bool pierces(const Vec3& p, const Vec3& q, const Vec3& a, const Vec3& b, const Vec3& c) {
+  const auto volume = [](const Vec3& o, const Vec3& x, const Vec3& y, const Vec3& z) {
+    return (x - o).cross(y - o).dot(z - o);
+  };
+  if (volume(p, a, b, c) * volume(q, a, b, c) >= 0) return false;
+  const double ab = volume(p, q, a, b);
+  const double bc = volume(p, q, b, c);
+  const double ca = volume(p, q, c, a);
+  return (ab > 0 && bc > 0 && ca > 0) || (ab < 0 && bc < 0 && ca < 0);
+}
+
+/// Number of (edge, face) pairs without a common vertex that intersect, by brute force within
+/// cells.
+std::size_t self_intersections(const TriangleMesh& mesh) {
+  double longest = 0;
+  for (const auto& face : mesh.faces) {
+    for (std::size_t k = 0; k < 3; ++k)
+      longest = std::max(longest, (mesh.vertices[static_cast<std::size_t>(face[k])] -
+                                   mesh.vertices[static_cast<std::size_t>(face[(k + 1) % 3])])
+                                      .norm());
+  }
+  std::vector<Vec3> centers;
+  for (const auto& face : mesh.faces)
+    centers.push_back((mesh.vertices[static_cast<std::size_t>(face[0])] +
+                       mesh.vertices[static_cast<std::size_t>(face[1])] +
+                       mesh.vertices[static_cast<std::size_t>(face[2])]) /
+                      3);
+  const double reach = 1.4 * longest;  // centres of triangles that touch are no farther apart
+  const PointGrid grid(centers, reach);
+  std::size_t count = 0;
+  for (const auto& face : mesh.faces) {
+    const auto at = [&](int v) -> const Vec3& {
+      return mesh.vertices[static_cast<std::size_t>(v)];
+    };
+    for (std::size_t k = 0; k < 3; ++k) {
+      const int p = face[k];
+      const int q = face[(k + 1) % 3];
+      if (p > q) continue;  // the other face of this edge asks
+      grid.for_each_within(0.5 * (at(p) + at(q)), reach, [&](std::size_t j, double) {
+        const auto& other = mesh.faces[j];
+        for (const int v : other) {
+          if (v == p || v == q) return;
+        }
+        count += pierces(at(p), at(q), at(other[0]), at(other[1]), at(other[2])) ? 1 : 0;
+      });
+    }
+  }
+  return count;
+}
+
+TEST(SelfIntersections, AreCounted) {
+  EXPECT_EQ(self_intersections(make_sphere(20, 16)), 0U);
+  TriangleMesh two = make_sphere(20, 16);
+  const TriangleMesh other = make_sphere(20, 16, Vec3(15, 1, 2));
+  const int shift = static_cast<int>(two.vertices.size());
+  two.vertices.insert(two.vertices.end(), other.vertices.begin(), other.vertices.end());
+  for (const auto& face : other.faces)
+    two.faces.push_back({face[0] + shift, face[1] + shift, face[2] + shift});
+  EXPECT_GT(self_intersections(two), 10U);
+}
+
 TEST(FuseDepth, BallIsClosedAndAccurate) {
   const Rig rig = ball_rig();
   const std::vector<MeasuredPoint> points = ball_points(rig);
@@ -326,6 +389,7 @@ TEST(FuseDepth, BallIsClosedAndAccurate) {
   EXPECT_LT(worst_deviation(result.mesh), 0.3);  // three sigma of the noise
   EXPECT_LT(share_beyond(result.mesh, 0.1), 0.1);
   EXPECT_GT(result.report.measured_share, 0.97);
+  EXPECT_EQ(self_intersections(result.mesh), 0U);
   EXPECT_GT(result.report.points_used, points.size() * 9 / 10);
 }
 
@@ -415,6 +479,47 @@ TEST(Holes, ReasonsFollowFromWhoSeesAndWhoLights) {
   // What the depth stage found stays; rays past the ball are background.
   EXPECT_EQ(maps[0].nodes[map.index(80, 80)].reason, HoleReason::kContradicted);
   EXPECT_EQ(maps[0].nodes[0].reason, HoleReason::kBackground);
+}
+
+TEST(Silhouettes, InventedBulgeIsDrawnIn) {
+  Rig rig = ball_rig();
+  rig.cameras.pop_back();  // nobody sees it from below
+  std::vector<Silhouette> silhouettes;
+  for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
+    cv::Mat image(rig.cameras[c].height, rig.cameras[c].width, CV_32FC3, cv::Scalar::all(0.01));
+    for (int v = 0; v < image.rows; ++v) {
+      for (int u = 0; u < image.cols; ++u) {
+        if (hit_ball(rig.cameras[c].ray(Vec2(u, v)))) image.at<cv::Vec3f>(v, u)[1] = 0.5F;
+      }
+    }
+    silhouettes.push_back(silhouette(static_cast<int>(c), image, 4));
+  }
+  TriangleMesh mesh = make_sphere(kRadius, 48);
+  const TriangleMesh ball = mesh;
+  constexpr double kBulge = 20;
+  for (Vec3& x : mesh.vertices) {
+    const double down = std::max(0.0, -x.z() / kRadius - 0.5);
+    x += kBulge * std::min(1.0, 4 * down) * x.normalized();
+    mesh.confidence.push_back(down > 0 ? 0.F : 1.F);
+  }
+  mesh.sigma.assign(mesh.vertices.size(), 0.1F);
+  const TriangleMesh bulged = mesh;
+  ASSERT_EQ(self_intersections(bulged), 0U);
+  EXPECT_GT(draw_in(rig, silhouettes, {}, mesh), 100U);
+  EXPECT_EQ(count_edges(mesh).boundary, 0U);
+  const double excess = signed_volume(bulged) - signed_volume(ball);
+  EXPECT_LT(signed_volume(mesh) - signed_volume(ball), 0.35 * excess);
+  EXPECT_GT(signed_volume(mesh), 0.9 * signed_volume(ball));
+  EXPECT_EQ(self_intersections(mesh), 0U);
+  for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
+    if (mesh.confidence[v] > 0) {
+      EXPECT_EQ((mesh.vertices[v] - bulged.vertices[v]).norm(), 0);
+    }
+  }
+  // What is within the silhouettes stays.
+  TriangleMesh still = ball;
+  still.confidence.assign(still.vertices.size(), 0.F);
+  EXPECT_EQ(draw_in(rig, silhouettes, {}, still), 0U);
 }
 
 /// Images of the ball under all patterns: albedo times light, one sample per pixel.
