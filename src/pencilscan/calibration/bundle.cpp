@@ -27,6 +27,16 @@ struct PriorCost {
   }
 };
 
+Mat3 rotation(const BundleDevice& device) {
+  Mat3 R;
+  ceres::AngleAxisToRotationMatrix(device.pose.data(), R.data());
+  return R;
+}
+
+Vec3 center(const BundleDevice& device) {
+  return -rotation(device).transpose() * Vec3(device.pose[3], device.pose[4], device.pose[5]);
+}
+
 double prior_weight(double sigma) { return sigma > 0 && std::isfinite(sigma) ? 1 / sigma : 0; }
 
 /// Inner parameters that stay: not asked for, or known exactly.
@@ -71,7 +81,7 @@ class ProblemBuilder {
   }
 
   void add_devices() {
-    bool held = false;
+    std::size_t first = from_.devices.size();
     for (std::size_t d = 0; d < from_.devices.size(); ++d) {
       if (in_use_[d] == 0) continue;
       BundleDevice& device = from_.devices[d];
@@ -83,13 +93,35 @@ class ProblemBuilder {
         problem_->SetManifold(device.inner.data(),
                               new ceres::SubsetManifold(kIntrinsics, constant));
       }
-      problem_->SetParameterLowerBound(device.inner.data(), kFx, 1);
-      problem_->SetParameterLowerBound(device.inner.data(), kFy, 1);
-      if (!held || !options_.free_poses) problem_->SetParameterBlockConstant(device.pose.data());
-      held = true;
+      if (first == from_.devices.size() || !options_.free_poses)
+        problem_->SetParameterBlockConstant(device.pose.data());
+      if (first == from_.devices.size()) first = d;
       ordering_->AddElementToGroup(device.pose.data(), 1);
       ordering_->AddElementToGroup(device.inner.data(), 1);
     }
+    if (options_.free_poses && from_.board_views.empty()) hold_scale(first);
+  }
+
+  /// Keeps the translation component that scaling the scene about the first device changes most.
+  void hold_scale(std::size_t first) {
+    if (first == from_.devices.size()) return;
+    const Vec3 origin = center(from_.devices[first]);
+    double farthest = 0;
+    std::size_t device = first;
+    int component = 0;
+    for (std::size_t d = first + 1; d < from_.devices.size(); ++d) {
+      if (in_use_[d] == 0) continue;
+      const Vec3 offset = rotation(from_.devices[d]) * (center(from_.devices[d]) - origin);
+      int largest = 0;
+      const double size = offset.cwiseAbs().maxCoeff(&largest);
+      if (size <= farthest) continue;
+      farthest = size;
+      device = d;
+      component = 3 + largest;
+    }
+    if (device != first)
+      problem_->SetManifold(from_.devices[device].pose.data(),
+                            new ceres::SubsetManifold(6, {component}));
   }
 
   BundleSummary solve() {
@@ -98,7 +130,7 @@ class ProblemBuilder {
     solver.linear_solver_ordering = ordering_;
     solver.num_threads = 1;
     solver.max_num_iterations = options_.max_iterations;
-    solver.function_tolerance = 1e-8;
+    solver.function_tolerance = options_.function_tolerance;
     solver.parameter_tolerance = 1e-10;
     solver.logging_type = ceres::SILENT;
     ceres::Solver::Summary summary;

@@ -55,7 +55,8 @@ struct BundleOptions {
   double loss_scale = 2;      ///< of Cauchy's loss, in deviations, > 0
   double extra_sigma_px = 0;  ///< added to every view's deviation in squares, >= 0
   int max_iterations = 50;
-  std::size_t max_tracks = 0;  ///< 0: all; else an even choice of these
+  double function_tolerance = 1e-6;  ///< relative change of the cost to stop at
+  std::size_t max_tracks = 0;        ///< 0: all; else an even choice of these
 };
 
 struct BundleSummary {
@@ -68,8 +69,8 @@ struct BundleSummary {
 /// Minimises, over poses, chosen inner parameters and points,
 ///   sum_views rho(|pi(X) - u|^2 / sigma^2) + sum_priors ((p - p0) / sigma_p)^2,
 /// rho Cauchy's loss, by Levenberg-Marquardt with the points eliminated (Ceres). The first present
-/// device's pose is held; scale is left to the damping. One thread: sums of more differ from run to
-/// run.
+/// device's pose is held, and one coordinate of another for the scale. One thread: sums of more
+/// differ from run to run.
 BundleSummary adjust(BundleProblem& problem, const BundleOptions& options);
 
 /// Reprojection error of a view, pixels; nothing when the point is behind the device.

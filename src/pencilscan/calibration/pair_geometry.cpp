@@ -14,21 +14,22 @@ namespace pencilscan {
 namespace {
 
 struct Match {
+  std::size_t capture;
   Vec2 in_camera;
   Vec2 in_projector;
 };
 
-using PairKey = std::array<std::size_t, 3>;  ///< capture, camera, projector
+using PairKey = std::array<std::size_t, 2>;  ///< camera, projector
 
 PairKey key_of(const Track& track, const TrackView& view) {
   const std::size_t hub = track.views[0].device;
-  return {track.capture, std::min(hub, view.device), std::max(hub, view.device)};
+  return {std::min(hub, view.device), std::max(hub, view.device)};
 }
 
 Match match_of(const Track& track, const TrackView& view) {
   const bool hub_is_camera = track.views[0].device < view.device;
-  return hub_is_camera ? Match{track.views[0].pixel, view.pixel}
-                       : Match{view.pixel, track.views[0].pixel};
+  return hub_is_camera ? Match{track.capture, track.views[0].pixel, view.pixel}
+                       : Match{track.capture, view.pixel, track.views[0].pixel};
 }
 
 /// Distance of a match to its epipolar lines as the share of each image's width, the larger one.
@@ -73,10 +74,19 @@ void solve_pair(const Rig& rig, const std::vector<Match>& matches, PairGeometry&
   pair.fundamental = to_p.asDiagonal() * F * to_c.asDiagonal();
   std::vector<cv::Point2d> inlier_a;
   std::vector<cv::Point2d> inlier_b;
+  std::map<std::size_t, std::pair<std::size_t, std::size_t>> per_capture;  // all, inliers
   for (std::size_t i = 0; i < matches.size(); ++i) {
+    auto& [all, agreeing] = per_capture[matches[i].capture];
+    ++all;
     if (epipolar_distance(rig, pair, matches[i]) > options.tolerance) continue;
+    ++agreeing;
     inlier_a.push_back(a[i]);
     inlier_b.push_back(b[i]);
+  }
+  for (const auto& [capture, counts] : per_capture) {
+    if (counts.first < options.least_matches) continue;
+    pair.by_capture.emplace_back(
+        capture, static_cast<double>(counts.second) / static_cast<double>(counts.first));
   }
   pair.inliers = inlier_a.size();
   pair.planar_share = planar_share(inlier_a, inlier_b, 1000 * options.planar_tolerance);
@@ -112,7 +122,8 @@ std::vector<PairGeometry> pair_geometries(const Rig& rig, std::span<const Track>
   std::vector<PairGeometry> pairs;
   std::vector<const std::vector<Match>*> lists;
   for (const auto& [key, list] : matches) {
-    pairs.push_back({key[0], key[1], key[2]});
+    pairs.emplace_back().camera = key[0];
+    pairs.back().projector = key[1];
     lists.push_back(&list);
   }
   parallel_for(pairs.size(), [&](std::size_t i) { solve_pair(rig, *lists[i], pairs[i], options); });
@@ -122,8 +133,7 @@ std::vector<PairGeometry> pair_geometries(const Rig& rig, std::span<const Track>
 void drop_epipolar_outliers(const Rig& rig, std::span<const PairGeometry> pairs, double least_share,
                             std::vector<Track>& tracks, const PairGeometryOptions& options) {
   std::map<PairKey, const PairGeometry*> by_key;
-  for (const PairGeometry& pair : pairs)
-    by_key[{pair.capture, pair.camera, pair.projector}] = &pair;
+  for (const PairGeometry& pair : pairs) by_key[{pair.camera, pair.projector}] = &pair;
   std::vector<Track> kept;
   for (Track& track : tracks) {
     Track cleaned{{track.views[0]}, track.capture};

@@ -8,16 +8,17 @@
 
 namespace pencilscan {
 
-/// How a camera and a projector of one capture see each other through their correspondences, before
-/// anything is calibrated.
+/// How a camera and a projector see each other through their correspondences of all captures,
+/// before anything is calibrated.
 struct PairGeometry {
-  std::size_t capture = 0;
   std::size_t camera = 0;     ///< device
   std::size_t projector = 0;  ///< device
   std::size_t matches = 0;
   std::size_t inliers = 0;          ///< agree with one fundamental matrix
   double planar_share = 0;          ///< of the inliers that one homography explains as well
   Mat3 fundamental = Mat3::Zero();  ///< x_projector' F x_camera = 0; pixels
+  /// (capture, share of its matches that are inliers), where the capture has enough of them.
+  std::vector<std::pair<std::size_t, double>> by_capture;
   [[nodiscard]] double inlier_share() const {
     return matches == 0 ? 0 : static_cast<double>(inliers) / static_cast<double>(matches);
   }
@@ -31,7 +32,7 @@ struct PairGeometryOptions {
 };
 
 /// RANSAC of the fundamental matrix (seven points; Hartley and Zisserman, "Multiple View Geometry",
-/// alg. 11.4) for every pair of every capture.
+/// alg. 11.4) for every pair.
 [[nodiscard]] std::vector<PairGeometry> pair_geometries(const Rig& rig,
                                                         std::span<const Track> tracks,
                                                         const PairGeometryOptions& options = {});

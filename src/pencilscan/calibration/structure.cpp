@@ -5,7 +5,9 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
+#include <numeric>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core/eigen.hpp>
 
@@ -162,6 +164,31 @@ void triangulate_tracks(BundleProblem& problem, const std::vector<std::size_t>& 
   }
 }
 
+/// Joins absent devices, the one that sees most points first, until none can be.
+void grow(BundleProblem& problem, const std::vector<std::size_t>& tracks,
+          const BundleOptions& bundle, const StructureOptions& options) {
+  std::vector<char> failed(problem.devices.size(), 0);
+  for (;;) {
+    std::vector<std::size_t> seen(problem.devices.size(), 0);
+    for (const std::size_t t : tracks)
+      if (problem.used[t] != 0)
+        for (const TrackView& view : problem.tracks[t].views) ++seen[view.device];
+    std::size_t next = problem.devices.size();
+    for (std::size_t d = 0; d < problem.devices.size(); ++d) {
+      if (problem.devices[d].present || failed[d] != 0) continue;
+      if (next == problem.devices.size() || seen[d] > seen[next]) next = d;
+    }
+    if (next == problem.devices.size()) break;
+    if (!join_device(problem, next, tracks, options)) {
+      failed[next] = 1;
+      continue;
+    }
+    std::fill(failed.begin(), failed.end(), 0);  // new points may join those that failed
+    triangulate_tracks(problem, tracks, options.least_angle_rad);
+    adjust(problem, bundle);
+  }
+}
+
 }  // namespace
 
 Mat3 rotation_of(const BundleDevice& device) {
@@ -240,29 +267,18 @@ double build_structure(BundleProblem& problem, unsigned free_inner,
     problem.devices[seed.a].present = problem.devices[seed.b].present = true;
   }
   triangulate_tracks(problem, tracks, options.least_angle_rad);
-  BundleSummary summary = adjust(problem, bundle);
-  std::vector<char> failed(problem.devices.size(), 0);
-  for (;;) {
-    std::vector<std::size_t> seen(problem.devices.size(), 0);
-    for (const std::size_t t : tracks)
-      if (problem.used[t] != 0)
-        for (const TrackView& view : problem.tracks[t].views) ++seen[view.device];
-    std::size_t next = problem.devices.size();
-    for (std::size_t d = 0; d < problem.devices.size(); ++d) {
-      if (problem.devices[d].present || failed[d] != 0) continue;
-      if (next == problem.devices.size() || seen[d] > seen[next]) next = d;
-    }
-    if (next == problem.devices.size()) break;
-    if (!join_device(problem, next, tracks, options)) {
-      failed[next] = 1;
-      continue;
-    }
-    std::fill(failed.begin(), failed.end(), 0);  // new points may join those that failed
-    triangulate_tracks(problem, tracks, options.least_angle_rad);
-    summary = adjust(problem, bundle);
+  adjust(problem, bundle);
+  grow(problem, tracks, bundle, options);
+  if (std::any_of(problem.devices.begin(), problem.devices.end(),
+                  [](const BundleDevice& d) { return !d.present; })) {
+    std::vector<std::size_t> all(problem.tracks.size());
+    std::iota(all.begin(), all.end(), std::size_t{0});
+    triangulate_tracks(problem, all, options.least_angle_rad);
+    bundle.max_tracks = 2 * options.tracks;
+    grow(problem, all, bundle, options);
   }
   bundle.max_iterations = 60;
-  summary = adjust(problem, bundle);
+  const BundleSummary summary = adjust(problem, bundle);
   return summary.cost / static_cast<double>(std::max<std::size_t>(summary.views, 1));
 }
 

@@ -30,6 +30,8 @@ void print_figures(const CommonOptions& options, const nlohmann::ordered_json& f
 void add_pattern_command(CLI::App& app);
 void add_rig_command(CLI::App& app);
 void add_simulate_command(CLI::App& app);
+void add_calibrate_command(CLI::App& app);
+void add_scan_command(CLI::App& app);
 void add_reconstruct_command(CLI::App& app);
 void add_evaluate_command(CLI::App& app);
 void add_report_command(CLI::App& app);

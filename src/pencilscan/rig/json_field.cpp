@@ -17,7 +17,7 @@ std::string shown(const nlohmann::json& value) {
   return text;
 }
 
-bool contains(std::initializer_list<const char*> keys, const std::string& key) {
+bool contains(const std::vector<const char*>& keys, const std::string& key) {
   return std::any_of(keys.begin(), keys.end(), [&](const char* known) { return key == known; });
 }
 
@@ -39,6 +39,11 @@ bool JsonField::is_array() const { return value_->is_array(); }
 
 void JsonField::check_keys(std::initializer_list<const char*> required,
                            std::initializer_list<const char*> optional) const {
+  check_keys(std::vector<const char*>(required), std::vector<const char*>(optional));
+}
+
+void JsonField::check_keys(const std::vector<const char*>& required,
+                           const std::vector<const char*>& optional) const {
   if (!value_->is_object()) fail("must be an object");
   for (const auto& [key, value] : value_->items()) {
     if (!contains(required, key) && !contains(optional, key)) {

@@ -21,6 +21,8 @@ class JsonField {
   /// An object whose keys all are known and which has the required ones.
   void check_keys(std::initializer_list<const char*> required,
                   std::initializer_list<const char*> optional) const;
+  void check_keys(const std::vector<const char*>& required,
+                  const std::vector<const char*>& optional) const;
   [[nodiscard]] bool has(const char* key) const;
   [[nodiscard]] bool is_object() const;
   [[nodiscard]] bool is_array() const;

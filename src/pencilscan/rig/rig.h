@@ -47,6 +47,20 @@ struct Rig {
 
 /// Reads rig.json; InputError names file, field, value and rule.
 [[nodiscard]] Rig read_rig(const std::filesystem::path& path);
+/// Which parts of a device's calibration a file states; each may be rough.
+struct GivenCalibration {
+  bool K = false;
+  bool distortion = false;
+  bool pose = false;  ///< R and t
+};
+/// Devices that are still to be calibrated.
+struct UncalibratedRig {
+  Rig rig;                              ///< what is missing: K = I, no distortion, pose = I
+  std::vector<GivenCalibration> given;  ///< cameras, then projectors
+};
+/// Reads a rig.json in which K, distortion, and R with t may be missing.
+[[nodiscard]] UncalibratedRig read_devices(const std::filesystem::path& path);
+
 /// Writes rig.json whole or not at all; read_rig() of it gives the same doubles.
 void write_rig(const Rig& rig, const std::filesystem::path& path);
 

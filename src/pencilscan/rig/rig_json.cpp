@@ -60,15 +60,31 @@ std::string parse_name(const JsonField& field) {
   return name;
 }
 
-/// What cameras and projectors have in common.
-void parse_device(const JsonField& field, Device& device) {
+/// What cameras and projectors have in common. With `given`, the calibration may be missing.
+void parse_device(const JsonField& field, Device& device, GivenCalibration* given) {
   device.name = parse_name(field.at("name"));
   device.width = field.at("width").integer(1, kLargestImage);
   device.height = field.at("height").integer(1, kLargestImage);
-  device.K = parse_camera_matrix(field.at("K"));
-  const auto distortion = field.at("distortion").entries(5);
-  for (std::size_t k = 0; k < 5; ++k) device.distortion[k] = distortion[k].number();
-  device.device_from_world = {parse_rotation(field.at("R")), field.at("t").vector3()};
+  if (given != nullptr) {
+    *given = {field.has("K"), field.has("distortion"), field.has("R") || field.has("t")};
+  }
+  if (given == nullptr || given->K) device.K = parse_camera_matrix(field.at("K"));
+  if (given == nullptr || given->distortion) {
+    const auto distortion = field.at("distortion").entries(5);
+    for (std::size_t k = 0; k < 5; ++k) device.distortion[k] = distortion[k].number();
+  }
+  if (given == nullptr || given->pose)
+    device.device_from_world = {parse_rotation(field.at("R")), field.at("t").vector3()};
+}
+
+/// Keys of a device's calibration: all of them, or none is required.
+void check_device_keys(const JsonField& field, std::initializer_list<const char*> optional,
+                       bool calibrated) {
+  std::vector<const char*> required{"name", "width", "height"};
+  std::vector<const char*> others(optional);
+  for (const char* key : {"K", "distortion", "R", "t"})
+    (calibrated ? required : others).push_back(key);
+  field.check_keys(required, others);
 }
 
 /// Shortest length at which all windows of the cyclic sequence differ (the whole period if none).
@@ -166,10 +182,10 @@ LinePattern parse_pattern(const JsonField& field, const Projector& projector) {
   return pattern;
 }
 
-Projector parse_projector(const JsonField& field) {
-  field.check_keys({"name", "width", "height", "K", "distortion", "R", "t"}, {"pattern"});
+Projector parse_projector(const JsonField& field, GivenCalibration* given) {
+  check_device_keys(field, {"pattern"}, given == nullptr);
   Projector projector;
-  parse_device(field, projector);
+  parse_device(field, projector, given);
   if (!field.has("pattern")) return projector;
   const JsonField pattern = field.at("pattern");
   if (pattern.is_object()) {
@@ -184,11 +200,11 @@ Projector parse_projector(const JsonField& field) {
   return projector;
 }
 
-Camera parse_camera(const JsonField& field, const std::vector<Projector>& projectors) {
-  field.check_keys({"name", "width", "height", "K", "distortion", "R", "t"},
-                   {"color_matrix", "gamma", "role"});
+Camera parse_camera(const JsonField& field, const std::vector<Projector>& projectors,
+                    GivenCalibration* given) {
+  check_device_keys(field, {"color_matrix", "gamma", "role"}, given == nullptr);
   Camera camera;
-  parse_device(field, camera);
+  parse_device(field, camera, given);
   if (field.has("gamma")) camera.gamma = field.at("gamma").positive();
   if (field.has("role")) {
     if (field.at("role").text() != "texture") field.at("role").fail("must be \"texture\"");
@@ -321,7 +337,10 @@ std::string pretty(const Json& value, int depth = 0) {
 
 }  // namespace
 
-Rig read_rig(const std::filesystem::path& path) {
+namespace {
+
+/// A rig, or with `given` one whose devices may lack their calibration.
+Rig parse_rig(const std::filesystem::path& path, std::vector<GivenCalibration>* given) {
   const nlohmann::json json = read_json(path);
   const JsonField root(path.string(), json);
   root.check_keys({"format", "unit", "cameras", "projectors"}, {"volume"});
@@ -330,14 +349,28 @@ Rig read_rig(const std::filesystem::path& path) {
   if (unit != "mm" && unit != "unknown") root.at("unit").fail("must be \"mm\" or \"unknown\"");
   Rig rig;
   rig.unit_known = unit == "mm";
+  std::vector<GivenCalibration> of_projectors;
   for (const JsonField& entry : parse_device_list(root.at("projectors"))) {
-    rig.projectors.push_back(parse_projector(entry));
+    of_projectors.emplace_back();
+    rig.projectors.push_back(parse_projector(entry, given ? &of_projectors.back() : nullptr));
   }
   for (const JsonField& entry : parse_device_list(root.at("cameras"))) {
-    rig.cameras.push_back(parse_camera(entry, rig.projectors));
+    if (given != nullptr) given->emplace_back();
+    rig.cameras.push_back(parse_camera(entry, rig.projectors, given ? &given->back() : nullptr));
   }
+  if (given != nullptr) given->insert(given->end(), of_projectors.begin(), of_projectors.end());
   if (root.has("volume")) rig.volume = parse_volume(root.at("volume"));
   return rig;
+}
+
+}  // namespace
+
+Rig read_rig(const std::filesystem::path& path) { return parse_rig(path, nullptr); }
+
+UncalibratedRig read_devices(const std::filesystem::path& path) {
+  UncalibratedRig result;
+  result.rig = parse_rig(path, &result.given);
+  return result;
 }
 
 void write_rig(const Rig& rig, const std::filesystem::path& path) {

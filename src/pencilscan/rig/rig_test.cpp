@@ -250,6 +250,22 @@ TEST_F(RigFile, OptionalCameraKeysAreChecked) {
               HasSubstr("volume.radius = 0: must be > 0"));
 }
 
+TEST_F(RigFile, DevicesMayLackTheirCalibration) {
+  write_text(folder_ / "devices.json",
+             R"({"format": "rig/1", "unit": "mm",
+  "cameras": [{"name": "a", "width": 40, "height": 30},
+              {"name": "b", "width": 40, "height": 30, "K": [[50, 0, 20], [0, 50, 15], [0, 0, 1]]}],
+  "projectors": [{"name": "p", "width": 64, "height": 32}]})");
+  const UncalibratedRig devices = read_devices(folder_ / "devices.json");
+  ASSERT_EQ(devices.given.size(), 3U);
+  EXPECT_FALSE(devices.given[0].K);
+  EXPECT_TRUE(devices.given[1].K);
+  EXPECT_FALSE(devices.given[1].distortion);
+  EXPECT_FALSE(devices.given[2].pose);
+  EXPECT_EQ(devices.rig.cameras[1].K(0, 0), 50);
+  EXPECT_THROW((void)read_rig(folder_ / "devices.json"), InputError);
+}
+
 TEST(WorkingVolume, IsWhereTheAxesMeet) {
   Rig rig = example_rig();
   const Sphere stated = working_volume(rig);

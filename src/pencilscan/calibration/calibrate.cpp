@@ -1,0 +1,362 @@
+#include "pencilscan/calibration/calibrate.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "pencilscan/calibration/priors.h"
+#include "pencilscan/calibration/structure.h"
+#include "pencilscan/core/parallel.h"
+
+namespace pencilscan {
+namespace {
+
+constexpr unsigned bit(Intrinsic i) { return 1U << static_cast<unsigned>(i); }
+constexpr unsigned kFocal = bit(kFx) | bit(kFy);
+constexpr unsigned kCenter = bit(kCx) | bit(kCy);
+constexpr unsigned kAll = kFocal | kCenter | bit(kK1) | bit(kK2) | bit(kP1) | bit(kP2);
+constexpr double kLeastAngle = 0.02;  ///< rad between rays of a point
+
+double quantile(std::vector<double>& values, double share) {
+  if (values.empty()) return 0;
+  const auto at =
+      values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), at, values.end());
+  return *at;
+}
+
+/// Robust standard deviation of one coordinate's error. A track of n measured views has 2 n - 1
+/// degrees of freedom left, since they choose the depth on the hub's ray.
+double error_scale(const BundleProblem& problem) {
+  std::vector<double> errors;
+  for (std::size_t t = 0; t < problem.tracks.size(); ++t) {
+    if (problem.used[t] == 0) continue;
+    const Track& track = problem.tracks[t];
+    const double n = static_cast<double>(track.views.size()) - 1;
+    for (std::size_t i = 1; i < track.views.size(); ++i) {
+      const BundleDevice& device = problem.devices[track.views[i].device];
+      if (!device.present) continue;
+      const auto error = view_error(device, problem.points[t], track.views[i]);
+      if (!error) continue;
+      for (Eigen::Index k = 0; k < 2; ++k)
+        errors.push_back(std::abs((*error)[k]) * std::sqrt(2 * n / (2 * n - 1)));
+    }
+  }
+  return 1.4826 * quantile(errors, 0.5);
+}
+
+double median_sigma(const BundleProblem& problem) {
+  std::vector<double> sigmas;
+  for (const Track& track : problem.tracks)
+    for (std::size_t i = 1; i < track.views.size(); ++i) sigmas.push_back(track.views[i].sigma_px);
+  return quantile(sigmas, 0.5);
+}
+
+/// Drops views beyond `limit` pixels, and tracks that are left with one view.
+std::size_t drop_outliers(BundleProblem& problem, double limit) {
+  std::size_t dropped = 0;
+  for (std::size_t t = 0; t < problem.tracks.size(); ++t) {
+    if (problem.used[t] == 0) continue;
+    auto& views = problem.tracks[t].views;
+    const auto is_wrong = [&](const TrackView& view) {
+      const BundleDevice& device = problem.devices[view.device];
+      if (!device.present) return false;
+      const auto error = view_error(device, problem.points[t], view);
+      return !error || error->norm() > limit;
+    };
+    const auto keep = std::stable_partition(views.begin() + 1, views.end(),
+                                            [&](const TrackView& v) { return !is_wrong(v); });
+    dropped += static_cast<std::size_t>(views.end() - keep);
+    views.erase(keep, views.end());
+    const auto present = std::count_if(views.begin(), views.end(), [&](const TrackView& v) {
+      return problem.devices[v.device].present;
+    });
+    if (present < 2 || !problem.devices[views[0].device].present) problem.used[t] = 0;
+  }
+  return dropped;
+}
+
+class Calibration {
+ public:
+  Calibration(const CalibrationInput& input, const CalibrateOptions& options,
+              const Progress& progress)
+      : input_(input), options_(options), progress_(progress) {}
+
+  CalibrationResult run() {
+    split_tracks();
+    say("finding the geometry of pairs", 0);
+    result_.pairs = pair_geometries(input_.rig, result_.problem.tracks);
+    const std::size_t before = views();
+    drop_epipolar_outliers(input_.rig, result_.pairs, options_.least_inlier_share,
+                           result_.problem.tracks);
+    result_.views_dropped = before - views();
+    if (!find_structure()) return finish(false);
+    refine();
+    keep_given_values();
+    last_stage();
+    return finish(true);
+  }
+
+ private:
+  void say(const char* what, double fraction) const {
+    if (progress_) progress_(what, fraction);
+  }
+
+  [[nodiscard]] std::size_t views() const {
+    std::size_t sum = 0;
+    for (const Track& track : result_.problem.tracks) sum += track.views.size() - 1;
+    return sum;
+  }
+
+  void split_tracks() {
+    const auto every = options_.held_out_share > 0
+                           ? static_cast<std::size_t>(std::round(1 / options_.held_out_share))
+                           : input_.tracks.size() + 1;
+    for (std::size_t t = 0; t < input_.tracks.size(); ++t) {
+      const bool held = t % every == every - 1;
+      (held ? result_.held_out : result_.problem.tracks).push_back(input_.tracks[t]);
+    }
+  }
+
+  /// Devices with inner parameters as guessed or given, no poses unless given for all.
+  [[nodiscard]] std::vector<BundleDevice> start(const FocalGuess& guess) const {
+    std::vector<char> known;
+    for (const GivenCalibration& k : input_.known) known.push_back(k.K ? 1 : 0);
+    const Rig rig = rig_with_guess(input_.rig, guess, known);
+    const bool posed = std::all_of(input_.known.begin(), input_.known.end(),
+                                   [](const GivenCalibration& k) { return k.pose; });
+    std::vector<BundleDevice> devices;
+    for (std::size_t d = 0; d < device_total(rig); ++d) {
+      devices.push_back(bundle_device(calibrated_device(rig, d)));
+      set_priors(input_.known[d], d < rig.cameras.size(), calibrated_device(rig, d),
+                 devices.back());
+      devices.back().present = posed;
+    }
+    return devices;
+  }
+
+  [[nodiscard]] std::vector<FocalGuess> guesses() const {
+    std::vector<char> known;
+    for (const GivenCalibration& k : input_.known) known.push_back(k.K ? 1 : 0);
+    auto all = guess_focal_lengths(input_.rig, result_.pairs, known);
+    // Neighbours on the grid lead to the same place: each guess differs from the better ones.
+    std::vector<FocalGuess> chosen;
+    for (const FocalGuess& guess : all) {
+      const bool is_near = std::any_of(chosen.begin(), chosen.end(), [&](const FocalGuess& other) {
+        return std::abs(std::log(guess.camera_scale / other.camera_scale)) < 0.45 &&
+               std::abs(std::log(guess.projector_scale / other.projector_scale)) < 0.45 &&
+               std::abs(guess.lens_shift - other.lens_shift) < 0.4;
+      });
+      if (!is_near) chosen.push_back(guess);
+      if (chosen.size() == options_.hypotheses) break;
+    }
+    return chosen;
+  }
+
+  /// The best of several structures: most devices, then least cost.
+  bool find_structure() {
+    const auto tried = guesses();
+    std::vector<BundleProblem> problems(tried.size(), result_.problem);
+    std::vector<double> costs(tried.size());
+    say("finding a first structure", 0);
+    parallel_for(tried.size(), [&](std::size_t i) {
+      problems[i].devices = start(tried[i]);
+      costs[i] = build_structure(problems[i], kFocal | bit(kCy));
+    });
+    std::size_t best = tried.size();
+    std::size_t most = 1;
+    for (std::size_t i = 0; i < tried.size(); ++i) {
+      const auto placed = static_cast<std::size_t>(
+          std::count_if(problems[i].devices.begin(), problems[i].devices.end(),
+                        [](const BundleDevice& d) { return d.present; }));
+      if (placed < most || !std::isfinite(costs[i])) continue;
+      if (placed == most && best < tried.size() && costs[i] >= costs[best]) continue;
+      best = i;
+      most = placed;
+    }
+    if (best == tried.size()) return false;
+    result_.problem = std::move(problems[best]);
+    return true;
+  }
+
+  void stage(unsigned free_inner, std::size_t tracks, int iterations) {
+    BundleProblem& problem = result_.problem;
+    const double scale = error_scale(problem);
+    const double own = median_sigma(problem);
+    BundleOptions bundle;
+    bundle.free_inner = free_inner;
+    bundle.extra_sigma_px = std::sqrt(std::max(0.0, scale * scale - own * own));
+    bundle.max_tracks = tracks;
+    bundle.max_iterations = iterations;
+    bundle.function_tolerance = tracks == 0 ? 1e-8 : 1e-6;
+    adjust(problem, bundle);
+    result_.free_inner = free_inner;
+    result_.extra_sigma_px = bundle.extra_sigma_px;
+  }
+
+  void drop() {
+    BundleProblem& problem = result_.problem;
+    const double scale = error_scale(problem);
+    result_.views_dropped +=
+        drop_outliers(problem, std::max(options_.outlier_deviations * scale, 0.3));
+  }
+
+  void refine() {
+    BundleProblem& problem = result_.problem;
+    triangulate_all(problem, kLeastAngle);
+    const std::array<unsigned, 4> stages{kFocal | bit(kCy), kFocal | kCenter,
+                                         kFocal | kCenter | bit(kK1), kAll};
+    for (std::size_t s = 0; s < stages.size(); ++s) {
+      say("adjusting", static_cast<double>(s) / 8);
+      stage(stages[s], options_.stage_tracks, 50);
+      triangulate_all(problem, kLeastAngle);
+      drop();
+    }
+  }
+
+  /// Values that were given and explain the data as well as free ones do are a calibration and are
+  /// kept; others were only rough.
+  void keep_given_values() {
+    result_.inner_held.assign(input_.known.size(), 0);
+    const std::size_t cameras = input_.rig.cameras.size();
+    triangulate_all(result_.problem, kLeastAngle);
+    const double free_scale = error_scale(result_.problem);
+    for (const int attempt : {0, 1, 2}) {  // all given ones, the cameras' alone, the projectors'
+      BundleProblem trial = result_.problem;
+      std::vector<char> held(input_.known.size(), 0);
+      for (std::size_t d = 0; d < held.size(); ++d) {
+        const bool in_group = attempt == 0 || (attempt == 1) == (d < cameras);
+        if (!input_.known[d].K || !in_group) continue;
+        held[d] = 1;
+        const Device& given = calibrated_device(input_.rig, d);
+        BundleDevice exact = bundle_device(given);
+        for (std::size_t i = 0; i < kIntrinsics; ++i)
+          if (i < kK1 || input_.known[d].distortion) trial.devices[d].inner[i] = exact.inner[i];
+        hold_given(input_.known[d], trial.devices[d]);
+      }
+      if (std::none_of(held.begin(), held.end(), [](char h) { return h != 0; })) continue;
+      std::swap(trial, result_.problem);
+      const double extra = result_.extra_sigma_px;
+      // Twice: the weights of the first round are those of errors not yet adapted to.
+      for (int round = 0; round < 2; ++round) {
+        stage(kAll, options_.stage_tracks, 50);
+        triangulate_all(result_.problem, kLeastAngle);
+      }
+      if (error_scale(result_.problem) <=
+          options_.given_tolerance * free_scale + options_.given_slack_px) {
+        result_.inner_held = held;
+        return;
+      }
+      std::swap(trial, result_.problem);
+      result_.extra_sigma_px = extra;
+    }
+  }
+
+  void last_stage() {
+    for (const int round : {0, 1}) {
+      say("adjusting all correspondences", 0.6 + 0.2 * round);
+      triangulate_all(result_.problem, kLeastAngle);
+      drop();
+      stage(kAll, 0, round == 0 ? 30 : 50);
+    }
+  }
+
+  CalibrationResult finish(bool solved) {
+    result_.solved = solved;
+    result_.rig = input_.rig;
+    result_.placed.assign(device_total(input_.rig), 0);
+    result_.residuals.resize(device_total(input_.rig));
+    result_.inner_held.resize(device_total(input_.rig), 0);
+    if (!solved) return std::move(result_);
+    result_.rig.unit_known = fix_frame(input_, result_.problem);
+    for (std::size_t d = 0; d < result_.placed.size(); ++d) {
+      result_.placed[d] = result_.problem.devices[d].present ? 1 : 0;
+      if (result_.placed[d] != 0)
+        set_device(result_.problem.devices[d], calibrated_device(result_.rig, d));
+    }
+    measure();
+    return std::move(result_);
+  }
+
+  void measure() {
+    const BundleProblem& problem = result_.problem;
+    std::vector<std::vector<double>> errors(problem.devices.size());
+    double sum = 0;
+    for (std::size_t t = 0; t < problem.tracks.size(); ++t) {
+      if (problem.used[t] == 0) continue;
+      const auto& views = problem.tracks[t].views;
+      for (std::size_t i = 1; i < views.size(); ++i) {
+        if (!problem.devices[views[i].device].present) continue;
+        const auto error =
+            view_error(problem.devices[views[i].device], problem.points[t], views[i]);
+        if (!error) continue;
+        errors[views[i].device].push_back(error->norm());
+        sum += error->squaredNorm();
+        ++result_.views;
+      }
+    }
+    result_.rms_px = std::sqrt(sum / static_cast<double>(std::max<std::size_t>(result_.views, 1)));
+    for (std::size_t d = 0; d < errors.size(); ++d) {
+      DeviceResiduals& r = result_.residuals[d];
+      r.views = errors[d].size();
+      double squares = 0;
+      for (const double e : errors[d]) squares += e * e;
+      r.rms_px = std::sqrt(squares / static_cast<double>(std::max<std::size_t>(r.views, 1)));
+      r.median_px = quantile(errors[d], 0.5);
+      r.p95_px = quantile(errors[d], 0.95);
+    }
+    measure_held_out();
+  }
+
+  void measure_held_out() {
+    drop_epipolar_outliers(input_.rig, result_.pairs, options_.least_inlier_share,
+                           result_.held_out);
+    BundleProblem check;
+    check.devices = result_.problem.devices;
+    check.tracks = result_.held_out;
+    triangulate_all(check, kLeastAngle);
+    const double limit = std::max(options_.outlier_deviations * error_scale(result_.problem), 0.3);
+    BundleOptions points_only;
+    points_only.free_poses = false;
+    points_only.extra_sigma_px = result_.extra_sigma_px;
+    points_only.max_iterations = 20;
+    adjust(check, points_only);
+    drop_outliers(check, limit);  // as for the others: wrong codes are no error of the rig
+    double sum = 0;
+    std::size_t count = 0;
+    for (std::size_t t = 0; t < check.tracks.size(); ++t) {
+      if (check.used[t] == 0) continue;
+      for (const double e : track_errors(check, check.tracks[t], check.points[t])) {
+        sum += e * e;
+        ++count;
+      }
+    }
+    result_.held_out_rms_px = std::sqrt(sum / static_cast<double>(std::max<std::size_t>(count, 1)));
+  }
+
+  const CalibrationInput& input_;
+  const CalibrateOptions& options_;
+  const Progress& progress_;
+  CalibrationResult result_;
+};
+
+}  // namespace
+
+std::vector<double> track_errors(const BundleProblem& problem, const Track& track,
+                                 const Vec3& point) {
+  std::vector<double> errors;
+  for (std::size_t i = 1; i < track.views.size(); ++i) {
+    const BundleDevice& device = problem.devices[track.views[i].device];
+    if (!device.present) continue;
+    const auto error = view_error(device, point, track.views[i]);
+    if (error) errors.push_back(error->norm());
+  }
+  return errors;
+}
+
+CalibrationResult calibrate(const CalibrationInput& input, const CalibrateOptions& options,
+                            const Progress& progress) {
+  return Calibration(input, options, progress).run();
+}
+
+}  // namespace pencilscan

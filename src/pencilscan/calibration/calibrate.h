@@ -1,0 +1,76 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "pencilscan/calibration/bundle.h"
+#include "pencilscan/calibration/pair_geometry.h"
+#include "pencilscan/core/progress.h"
+#include "pencilscan/rig/rig.h"
+
+namespace pencilscan {
+
+/// Distance of the centres of two devices.
+struct KnownDistance {
+  std::size_t a = 0;  ///< device
+  std::size_t b = 0;
+  double mm = 0;  ///< > 0
+};
+
+struct CalibrationInput {
+  Rig rig;  ///< names, sizes, patterns; K, distortion and poses where known
+  std::vector<GivenCalibration> known;  ///< per device, cameras first
+  std::vector<Track> tracks;            ///< of all captures
+  std::optional<KnownDistance> distance;
+  std::vector<BoardView> board_views;  ///< corners of a board; their mm give the scale
+  std::size_t boards = 0;              ///< placings of the board
+};
+
+struct CalibrateOptions {
+  std::size_t hypotheses = 5;        ///< guesses of unknown focal lengths that are tried, >= 1
+  double least_inlier_share = 0.35;  ///< of a pair that is used at all
+  double held_out_share = 0.1;       ///< of the tracks, kept to check, in [0, 0.5]
+  double outlier_deviations = 4;     ///< views beyond are dropped
+  std::size_t stage_tracks = 3000;   ///< of all stages but the last
+  double given_tolerance = 1.1;  ///< given values are kept if the scatter grows by less than this
+  double given_slack_px = 0.01;  ///< factor, and by this much more
+};
+
+/// Reprojection errors of one device's views, hubs left out, of used tracks.
+struct DeviceResiduals {
+  std::size_t views = 0;
+  double rms_px = 0;
+  double median_px = 0;
+  double p95_px = 0;
+};
+
+struct CalibrationResult {
+  Rig rig;                   ///< every placed device; see `placed`
+  std::vector<char> placed;  ///< per device
+  BundleProblem problem;     ///< at the solution, in the rig's frame and scale; tracks as used
+  std::vector<Track> held_out;
+  std::vector<PairGeometry> pairs;
+  std::vector<char> inner_held;  ///< per device: given inner parameters fit the data and were kept
+  unsigned free_inner = 0;
+  double extra_sigma_px = 0;  ///< scatter beyond the views' own deviations
+  double rms_px = 0;          ///< over all views of used tracks but the hubs, which are exact
+  double held_out_rms_px = 0;
+  std::size_t views = 0;
+  std::size_t views_dropped = 0;
+  std::vector<DeviceResiduals> residuals;  ///< per device
+  bool solved = false;
+};
+
+/// From correspondences to a rig: guesses of focal lengths, structure for the best few of them,
+/// bundle adjustment in stages (focal lengths; principal points; aspect and k1; the other terms),
+/// outliers dropped between them.
+[[nodiscard]] CalibrationResult calibrate(const CalibrationInput& input,
+                                          const CalibrateOptions& options = {},
+                                          const Progress& progress = {});
+
+/// Errors of all views of a track but the hub at the point that fits them best.
+[[nodiscard]] std::vector<double> track_errors(const BundleProblem& problem, const Track& track,
+                                               const Vec3& point);
+
+}  // namespace pencilscan

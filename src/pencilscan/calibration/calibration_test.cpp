@@ -1,0 +1,298 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "pencilscan/calibration/calibrate.h"
+#include "pencilscan/calibration/calibration_report.h"
+#include "pencilscan/calibration/reprojection.h"
+#include "pencilscan/calibration/structure.h"
+#include "pencilscan/core/random.h"
+
+namespace pencilscan {
+namespace {
+
+using ::testing::HasSubstr;
+
+/// A ring of cameras and projectors in turn, 30 degrees apart, that look at the middle.
+Rig ring(int cameras, int projectors) {
+  Rig rig;
+  const int total = cameras + projectors;
+  for (int i = 0; i < total; ++i) {
+    const bool is_camera = i % 2 == 0 && i / 2 < cameras;
+    Device device;
+    const double azimuth = i * M_PI / 6;
+    const double elevation = is_camera ? 0.26 : (i % 4 == 1 ? 0.14 : 0.59);
+    const double distance = 1000 + 60.0 * (i % 3);
+    const Vec3 eye(distance * std::cos(azimuth) * std::cos(elevation),
+                   distance * std::sin(azimuth) * std::cos(elevation),
+                   distance * std::sin(elevation));
+    device.device_from_world = look_at(eye, Vec3(10.0 * (i % 2), 15.0 * (i % 3), 0));
+    device.width = 1280;
+    device.height = is_camera ? 960 : 1024;
+    const double focal = (is_camera ? 2250 : 2400) + 20 * (i % 4);
+    device.K << focal, 0, 645 - 3 * (i % 4), 0, focal, is_camera ? 470 : 700, 0, 0, 1;
+    device.distortion = {is_camera ? -0.1 : -0.05, is_camera ? 0.1 : 0, 0, 0, 0};
+    if (is_camera) {
+      device.name = "cam" + std::to_string(rig.cameras.size());
+      rig.cameras.emplace_back();
+      static_cast<Device&>(rig.cameras.back()) = device;
+    } else {
+      device.name = "proj" + std::to_string(rig.projectors.size());
+      rig.projectors.emplace_back();
+      static_cast<Device&>(rig.projectors.back()) = device;
+    }
+  }
+  return rig;
+}
+
+struct TrackScene {
+  int count = 900;
+  double noise_px = 0.05;
+  double outliers = 0;  ///< share of views anywhere in the image
+  bool planar = false;
+  double radius = 165;
+  std::uint64_t seed = 3;
+};
+
+/// Tracks of points in the volume with normals; a device sees what faces it.
+std::vector<Track> tracks_of(const Rig& rig, const TrackScene& scene) {
+  Random random(scene.seed);
+  std::vector<Track> tracks;
+  const auto cameras = rig.cameras.size();
+  while (tracks.size() < static_cast<std::size_t>(scene.count)) {
+    const Vec3 normal = Vec3(random.normal(), random.normal(), 0.3 * random.normal()).normalized();
+    Vec3 point = scene.radius * std::cbrt(random.uniform()) * normal;
+    if (scene.planar) point = Vec3(0, random.uniform(-150, 150), random.uniform(-150, 150));
+    std::vector<TrackView> views;
+    for (std::size_t d = 0; d < device_total(rig); ++d) {
+      const Device& device = calibrated_device(rig, d);
+      const Vec3 to_device = (device.center() - point).normalized();
+      if (to_device.dot(scene.planar ? Vec3(Vec3::UnitX()) : normal) < 0.3) continue;
+      const auto pixel = device.project(point);
+      if (pixel && device.contains(*pixel)) views.push_back({d, *pixel, scene.noise_px});
+    }
+    // One hub, the others of the other kind.
+    const bool camera_hub = random.below(2) == 0;
+    Track track;
+    for (const TrackView& view : views)
+      if ((view.device < cameras) == camera_hub && track.views.empty()) track.views = {view};
+    if (track.views.empty()) continue;
+    track.views[0].sigma_px = 0.02;
+    for (TrackView view : views) {
+      if ((view.device < cameras) == camera_hub) continue;
+      view.pixel += Vec2(random.normal(0, scene.noise_px), random.normal(0, scene.noise_px));
+      if (random.uniform() < scene.outliers)
+        view.pixel = Vec2(random.uniform(0, 1279), random.uniform(0, 959));
+      track.views.push_back(view);
+    }
+    if (track.views.size() > 1) tracks.push_back(track);
+  }
+  return tracks;
+}
+
+CalibrationInput input_of(const Rig& truth, std::vector<Track> tracks, bool cameras_known) {
+  CalibrationInput input;
+  input.rig = truth;
+  input.known.resize(device_total(truth));
+  for (std::size_t d = 0; d < input.known.size(); ++d) {
+    Device& device = calibrated_device(input.rig, d);
+    const bool known = cameras_known && d < truth.cameras.size();
+    input.known[d].K = input.known[d].distortion = known;
+    device.device_from_world = {};
+    if (known) continue;
+    device.K = Mat3::Identity();
+    device.distortion = {};
+  }
+  input.tracks = std::move(tracks);
+  input.distance = KnownDistance{
+      0, 1, (truth.cameras[0].center() - calibrated_device(truth, 1).center()).norm()};
+  return input;
+}
+
+/// Distances of projections of points in the volume, median, px. Free of gauge: the similarity that
+/// takes the points to where the found rig measures them comes first.
+double projection_error(const Rig& truth, const Rig& found) {
+  constexpr Eigen::Index kPoints = 100;
+  BundleProblem problem;
+  for (std::size_t d = 0; d < device_total(found); ++d) {
+    problem.devices.push_back(bundle_device(calibrated_device(found, d)));
+    problem.devices.back().present = true;
+  }
+  Random random(1);
+  Eigen::Matrix3Xd a(3, kPoints);
+  Eigen::Matrix3Xd b(3, kPoints);
+  for (Eigen::Index i = 0; i < kPoints; ++i) {
+    a.col(i) << random.uniform(-90, 90), random.uniform(-90, 90), random.uniform(-90, 90);
+    Track track;
+    for (std::size_t d = 0; d < device_total(truth); ++d)
+      track.views.push_back({d, *calibrated_device(truth, d).project(a.col(i)), 1});
+    b.col(i) = triangulate(problem, track, 0.01).value_or(Vec3::Constant(1e6));
+  }
+  const Eigen::Matrix4d S = Eigen::umeyama(a, b, true);
+  std::vector<double> errors;
+  for (Eigen::Index i = 0; i < kPoints; ++i) {
+    const Vec3 moved = (S * a.col(i).homogeneous()).head<3>();
+    for (std::size_t d = 0; d < device_total(truth); ++d) {
+      const auto p = calibrated_device(truth, d).project(a.col(i));
+      const auto q = calibrated_device(found, d).project(moved);
+      if (p && q) errors.push_back((*p - *q).norm());
+    }
+  }
+  std::nth_element(errors.begin(), errors.begin() + std::ptrdiff_t(errors.size() / 2),
+                   errors.end());
+  return errors[errors.size() / 2];
+}
+
+/// Small scenes need no more, and tests shall be quick.
+constexpr CalibrateOptions kQuick{.hypotheses = 2};
+
+TEST(Reprojection, JacobianMatchesFiniteDifferences) {
+  const Rig rig = ring(1, 1);
+  BundleDevice device = bundle_device(rig.cameras[0]);
+  device.inner[kP1] = 0.01;
+  device.inner[kP2] = -0.02;
+  device.inner[kK3] = 0.05;
+  const Vec3 point(40, -60, 30);
+  const TrackView view{0, Vec2(600, 500), 0.1};
+  const ViewLinearization at = linearize(device, point, view);
+  constexpr double kTolerance = 1e-4;  // of central differences with these steps
+  for (Eigen::Index i = 0; i < 18; ++i) {
+    const double step = i < 6 ? 1e-6 : i < 10 ? 1e-3 : 1e-6;
+    const auto moved = [&](double by) {
+      BundleDevice d = device;
+      Vec3 x = point;
+      if (i < 6)
+        d.pose[static_cast<std::size_t>(i)] += by;
+      else if (i < 15)
+        d.inner[static_cast<std::size_t>(i - 6)] += by;
+      else
+        x[i - 15] += by;
+      return linearize(d, x, view).residual;
+    };
+    const Vec2 numeric = (moved(step) - moved(-step)) / (2 * step);
+    Vec2 analytic = at.point.col(std::max<Eigen::Index>(i - 15, 0));
+    if (i < 6) analytic = at.pose.col(i);
+    if (i >= 6 && i < 15) analytic = at.inner.col(i - 6);
+    EXPECT_LT((numeric - analytic).norm(), kTolerance * (1 + analytic.norm())) << i;
+  }
+}
+
+TEST(Reprojection, AgreesWithTheDeviceModel) {
+  const Rig rig = ring(1, 1);
+  const Vec3 point(40, -60, 30);
+  const auto error = view_error(bundle_device(rig.projectors[0]), point,
+                                {0, *rig.projectors[0].project(point), 1});
+  ASSERT_TRUE(error.has_value());
+  EXPECT_LT(error->norm(), 1e-9);
+}
+
+TEST(Calibrate, RingIsFoundFromImageSizesDespiteOutliers) {
+  const Rig truth = ring(4, 4);
+  const auto result =
+      calibrate(input_of(truth, tracks_of(truth, {.count = 1000, .outliers = 0.3}), false), kQuick);
+  ASSERT_TRUE(result.solved);
+  EXPECT_LT(result.rms_px, 0.15);
+  for (std::size_t d = 0; d < device_total(truth); ++d) {
+    ASSERT_NE(result.placed[d], 0) << d;
+    const double focal = calibrated_device(truth, d).K(0, 0);
+    // A third of a ring with 900 points: weaker than what is asked of whole rings.
+    EXPECT_NEAR(calibrated_device(result.rig, d).K(0, 0) / focal, 1, 0.02) << d;
+  }
+  EXPECT_TRUE(result.rig.unit_known);
+  EXPECT_LT(projection_error(truth, result.rig), 1.0);
+}
+
+TEST(Calibrate, KnownCamerasAreKeptAndGiveAPreciseRig) {
+  const Rig truth = ring(3, 3);
+  const auto result = calibrate(input_of(truth, tracks_of(truth, {.count = 500}), true), kQuick);
+  ASSERT_TRUE(result.solved);
+  EXPECT_NE(result.inner_held[0], 0);
+  EXPECT_EQ(result.rig.cameras[1].K, truth.cameras[1].K);
+  EXPECT_LT(result.rms_px, 0.15);
+  EXPECT_LT(projection_error(truth, result.rig), 0.15);
+}
+
+TEST(Verdict, PlanarSceneIsUnusable) {
+  const Rig truth = ring(1, 1);
+  const CalibrationInput input =
+      input_of(truth, tracks_of(truth, {.count = 400, .planar = true}), false);
+  const auto result = calibrate(input, kQuick);
+  Uncertainty sigma;
+  sigma.devices.resize(2);
+  const Verdict verdict = judge(input, result, sigma, {});
+  EXPECT_EQ(verdict.grade, Grade::kUnusable);
+  std::string all;
+  for (const Finding& finding : verdict.findings) all += finding.what + "\n";
+  EXPECT_THAT(all, HasSubstr("planar scene"));
+}
+
+TEST(Verdict, SwappedFoldersAreNamed) {
+  const Rig truth = ring(4, 4);
+  std::vector<Track> tracks = tracks_of(truth, {.count = 700});
+  // What cam1 and cam2 saw of proj1, exchanged: their pixels are the same size.
+  const std::size_t projector = truth.cameras.size() + 1;
+  std::vector<Track> mixed;
+  for (const Track& track : tracks) {
+    Track rest{{track.views[0]}, 0};
+    for (std::size_t i = 1; i < track.views.size(); ++i) {
+      Track pair{{track.views[0], track.views[i]}, 0};
+      bool swapped = false;
+      const bool is_pair = pair.views[0].device == projector || pair.views[1].device == projector;
+      for (TrackView& view : pair.views) {
+        if (!is_pair || (view.device != 1 && view.device != 2)) continue;
+        view.device = 3 - view.device;
+        swapped = true;
+      }
+      if (swapped)
+        mixed.push_back(pair);
+      else
+        rest.views.push_back(track.views[i]);
+    }
+    if (rest.views.size() > 1) mixed.push_back(rest);
+  }
+  const CalibrationInput input = input_of(truth, mixed, true);
+  const auto result = calibrate(input, kQuick);
+  ASSERT_TRUE(result.solved);
+  Uncertainty sigma;
+  sigma.devices.resize(device_total(truth));
+  const Verdict verdict = judge(input, result, sigma, {});
+  std::string all;
+  for (const Finding& finding : verdict.findings) all += finding.what + "\n";
+  EXPECT_THAT(all, HasSubstr("the folders proj1/cam1 and proj1/cam2 are swapped"));
+}
+
+TEST(Uncertainty, CoversTheErrorsOfTheResult) {
+  const Rig truth = ring(3, 3);
+  const auto result = calibrate(input_of(truth, tracks_of(truth, {.count = 600}), true), kQuick);
+  const Uncertainty sigma =
+      uncertainty(result.problem, result.free_inner, 2, result.extra_sigma_px);
+  for (std::size_t d = 3; d < 6; ++d) {
+    const double error =
+        calibrated_device(result.rig, d).K(0, 0) - calibrated_device(truth, d).K(0, 0);
+    EXPECT_GT(sigma.devices[d].inner[kFx], 0);
+    EXPECT_LT(std::abs(error), 4 * sigma.devices[d].inner[kFx]);
+  }
+  EXPECT_GT(sigma.volume_median, 0);
+  EXPECT_LT(sigma.volume_median, 0.2);  // mm: 0.05 px is 0.025 mm in this volume
+}
+
+TEST(CalibrationReport, IsOnePageAndValidJson) {
+  const Rig truth = ring(2, 2);
+  const CalibrationInput input = input_of(truth, tracks_of(truth, {.count = 400}), true);
+  const auto result = calibrate(input, kQuick);
+  const Uncertainty sigma =
+      uncertainty(result.problem, result.free_inner, 2, result.extra_sigma_px);
+  const Verdict verdict = judge(input, result, sigma, {});
+  const CalibrationReport report{input, result, sigma, verdict, {}};
+  const std::string html = calibration_html(report);
+  EXPECT_THAT(html, HasSubstr("<svg"));
+  EXPECT_EQ(html.find("http"), std::string::npos);  // nothing from elsewhere
+  const auto json = calibration_json(report);
+  EXPECT_EQ(json["devices"].size(), 4U);
+  EXPECT_EQ(json["verdict"], to_string(verdict.grade));
+}
+
+}  // namespace
+}  // namespace pencilscan

@@ -1,0 +1,95 @@
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <numbers>
+
+#include "pencilscan/calibration/calibration_report.h"
+
+namespace pencilscan {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json list(const Vec3& v) { return {v.x(), v.y(), v.z()}; }
+
+Json device_json(const CalibrationReport& report, std::size_t d) {
+  const CalibrationResult& result = report.result;
+  Json json;
+  json["name"] = calibrated_device(report.input.rig, d).name;
+  json["placed"] = result.placed[d] != 0;
+  if (result.placed[d] == 0) return json;
+  const BundleDevice& device = result.problem.devices[d];
+  const DeviceUncertainty& u = report.uncertainty.devices[d];
+  const DeviceResiduals& residuals = result.residuals[d];
+  json["views"] = residuals.views;
+  json["rms_px"] = residuals.rms_px;
+  json["median_px"] = residuals.median_px;
+  json["p95_px"] = residuals.p95_px;
+  json["given_values_kept"] = result.inner_held[d] != 0;
+  for (std::size_t i = 0; i < kIntrinsics; ++i) {
+    Json parameter{{"value", device.inner[i]}, {"sigma", u.inner[i]}};
+    if (u.is_prior[i]) parameter["held_at_prior"] = true;
+    json[kIntrinsicNames[i]] = parameter;
+  }
+  json["rotation_sigma_deg"] = u.rotation_rad * 180 / std::numbers::pi;
+  json["position_sigma"] = list(u.position);
+  return json;
+}
+
+Json pairs_json(const CalibrationReport& report) {
+  Json pairs = Json::array();
+  for (const PairGeometry& pair : report.result.pairs) {
+    pairs.push_back({{"projector", calibrated_device(report.input.rig, pair.projector).name},
+                     {"camera", calibrated_device(report.input.rig, pair.camera).name},
+                     {"correspondences", pair.matches},
+                     {"inlier_share", pair.inlier_share()},
+                     {"planar_share", pair.planar_share}});
+  }
+  return pairs;
+}
+
+Json decoding_json(const CalibrationReport& report) {
+  Json decoding = Json::array();
+  for (const DecodeSummary& summary : report.decoded) {
+    Json entry{{"capture", summary.capture},
+               {"projector", report.input.rig.projectors[summary.projector].name},
+               {"camera", report.input.rig.cameras[summary.camera].name},
+               {"valid_share_of_lit", summary.valid_share},
+               {"correspondences", summary.samples}};
+    for (std::size_t s = 0; s < kPixelStates; ++s)
+      entry["pixels"][to_string(static_cast<PixelState>(s))] = summary.counts[s];
+    if (!summary.wrong_order.empty()) entry["wrong_order"] = summary.wrong_order;
+    decoding.push_back(entry);
+  }
+  return decoding;
+}
+
+}  // namespace
+
+nlohmann::ordered_json calibration_json(const CalibrationReport& report) {
+  const CalibrationResult& result = report.result;
+  Json json;
+  json["format"] = "calibration/1";
+  json["verdict"] = to_string(report.verdict.grade);
+  json["reasons"] = Json::array();
+  for (const Finding& finding : report.verdict.findings)
+    json["reasons"].push_back(
+        {{"grade", to_string(finding.grade)}, {"what", finding.what}, {"advice", finding.advice}});
+  json["unit"] = result.rig.unit_known ? "mm" : "unknown";
+  json["rms_px"] = result.rms_px;
+  json["held_out_rms_px"] = result.held_out_rms_px;
+  json["tracks"] = std::count(result.problem.used.begin(), result.problem.used.end(), 1);
+  json["views"] = result.views;
+  json["views_dropped"] = result.views_dropped;
+  json["extra_sigma_px"] = result.extra_sigma_px;
+  json["volume"] = {{"radius", report.uncertainty.volume_radius},
+                    {"point_sigma_median", report.uncertainty.volume_median},
+                    {"point_sigma_p95", report.uncertainty.volume_p95}};
+  json["devices"] = Json::array();
+  for (std::size_t d = 0; d < result.placed.size(); ++d)
+    json["devices"].push_back(device_json(report, d));
+  json["pairs"] = pairs_json(report);
+  json["decoding"] = decoding_json(report);
+  return json;
+}
+
+}  // namespace pencilscan

@@ -1,0 +1,174 @@
+#include "pencilscan/calibration/suspects.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+
+#include "pencilscan/calibration/structure.h"
+
+namespace pencilscan {
+namespace {
+
+constexpr double kFitsShare = 0.6;         ///< of a pair that agrees with the rig
+constexpr double kContradictsShare = 0.4;  ///< of one that does not
+constexpr std::size_t kLeastMatches = 24;
+
+struct Match {
+  std::size_t capture;
+  Vec2 in_camera;
+  Vec2 in_projector;
+};
+using Pair = std::pair<std::size_t, std::size_t>;  ///< camera, projector (devices)
+using Matches = std::map<Pair, std::vector<Match>>;
+
+Matches matches_of(const CalibrationInput& input) {
+  Matches matches;
+  for (const Track& track : input.tracks) {
+    const TrackView& hub = track.views[0];
+    for (std::size_t i = 1; i < track.views.size(); ++i) {
+      const TrackView& view = track.views[i];
+      const bool hub_is_camera = hub.device < view.device;
+      const Pair pair = std::minmax(hub.device, view.device);
+      matches[pair].push_back({track.capture, hub_is_camera ? hub.pixel : view.pixel,
+                               hub_is_camera ? view.pixel : hub.pixel});
+    }
+  }
+  return matches;
+}
+
+/// The devices of the solution, and how well correspondences agree with them.
+class PairFit {
+ public:
+  explicit PairFit(const CalibrationResult& result)
+      : devices_(result.problem.devices), tolerance_px_(std::max(2.0, 8 * result.rms_px)) {}
+
+  [[nodiscard]] bool placed(std::size_t d) const { return devices_[d].present; }
+
+  /// Share of matches near their epipolar planes, if taken as those of the given devices.
+  [[nodiscard]] double share(const std::vector<Match>& matches, std::size_t camera,
+                             std::size_t projector, std::size_t* count = nullptr,
+                             std::size_t capture = SIZE_MAX) const {
+    const BundleDevice& c = devices_[camera];
+    const BundleDevice& p = devices_[projector];
+    const Mat3 world_from_c = rotation_of(c).transpose();
+    const Mat3 world_from_p = rotation_of(p).transpose();
+    const Vec3 baseline = (center_of(p) - center_of(c)).normalized();
+    std::size_t all = 0;
+    std::size_t near = 0;
+    for (const Match& m : matches) {
+      if (capture != SIZE_MAX && m.capture != capture) continue;
+      ++all;
+      const Vec3 a = (world_from_c * device_ray(c, m.in_camera)).normalized();
+      const Vec3 b = (world_from_p * device_ray(p, m.in_projector)).normalized();
+      const Vec3 plane = baseline.cross(a).normalized();
+      near += std::abs(plane.dot(b)) * p.inner[kFx] < tolerance_px_ ? 1U : 0U;
+    }
+    if (count != nullptr) *count = all;
+    return all == 0 ? 1 : static_cast<double>(near) / static_cast<double>(all);
+  }
+
+ private:
+  const std::vector<BundleDevice>& devices_;
+  double tolerance_px_;
+};
+
+std::string folder(const Rig& rig, const Pair& pair) {
+  return calibrated_device(rig, pair.second).name + "/" + calibrated_device(rig, pair.first).name;
+}
+
+std::vector<Finding> find_swaps(const CalibrationInput& input, const Matches& matches,
+                                const PairFit& fit, std::set<Pair>& bad) {
+  std::vector<Finding> findings;
+  const std::vector<Pair> all(bad.begin(), bad.end());
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    for (std::size_t j = i + 1; j < all.size(); ++j) {
+      if (!bad.contains(all[i]) || !bad.contains(all[j])) continue;
+      if (fit.share(matches.at(all[i]), all[j].first, all[j].second) < kFitsShare ||
+          fit.share(matches.at(all[j]), all[i].first, all[i].second) < kFitsShare)
+        continue;
+      findings.push_back({Grade::kDoubtful,
+                          "the folders " + folder(input.rig, all[i]) + " and " +
+                              folder(input.rig, all[j]) +
+                              " are swapped: each fits the rig in the other's place",
+                          "exchange the two folders and calibrate again"});
+      bad.erase(all[i]);
+      bad.erase(all[j]);
+    }
+  }
+  return findings;
+}
+
+std::string join(const std::vector<std::string>& names) {
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
+  return text;
+}
+
+/// The device that most of the contradicting pairs have in common.
+Finding name_mover(const CalibrationInput& input, const std::set<Pair>& bad,
+                   const std::map<Pair, std::vector<std::size_t>>& captures) {
+  std::map<std::size_t, std::size_t> count;
+  for (const Pair& pair : bad) {
+    ++count[pair.first];
+    ++count[pair.second];
+  }
+  const auto mover = std::max_element(
+      count.begin(), count.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
+  std::vector<std::string> partners;
+  std::set<std::size_t> when;
+  for (const Pair& pair : bad) {
+    if (pair.first != mover->first && pair.second != mover->first) continue;
+    const std::size_t partner = pair.first == mover->first ? pair.second : pair.first;
+    partners.push_back(calibrated_device(input.rig, partner).name);
+    const auto found = captures.find(pair);
+    if (found != captures.end()) when.insert(found->second.begin(), found->second.end());
+  }
+  const bool is_camera = mover->first < input.rig.cameras.size();
+  std::string text = std::string(is_camera ? "camera " : "projector ") +
+                     calibrated_device(input.rig, mover->first).name + " has moved: its images " +
+                     (is_camera ? "of " : "in ") + join(partners) +
+                     " do not fit the rest of the rig";
+  if (!when.empty()) {
+    std::vector<std::string> names;
+    for (const std::size_t capture : when) names.push_back(std::to_string(capture + 1));
+    text += " (--captures number " + join(names) + ")";
+  }
+  return {Grade::kDoubtful, text,
+          "fix the device, and take the captures again; those that do not fit were left out"};
+}
+
+}  // namespace
+
+std::vector<Finding> find_suspects(const CalibrationInput& input, const CalibrationResult& result) {
+  if (!result.solved) return {};
+  const Matches matches = matches_of(input);
+  const PairFit fit(result);
+  std::set<Pair> bad;
+  std::map<Pair, std::vector<std::size_t>> captures;  // where only some contradict
+  for (const auto& [pair, list] : matches) {
+    if (!fit.placed(pair.first) || !fit.placed(pair.second)) continue;
+    if (list.size() >= kLeastMatches &&
+        fit.share(list, pair.first, pair.second) < kContradictsShare) {
+      bad.insert(pair);
+      continue;
+    }
+    std::set<std::size_t> numbers;
+    for (const Match& m : list) numbers.insert(m.capture);
+    for (const std::size_t capture : numbers) {
+      std::size_t count = 0;
+      const double share = fit.share(list, pair.first, pair.second, &count, capture);
+      if (count < kLeastMatches || share >= kContradictsShare) continue;
+      bad.insert(pair);
+      captures[pair].push_back(capture);
+    }
+  }
+  std::vector<Finding> findings = find_swaps(input, matches, fit, bad);
+  // Pairs without sense in themselves (their fundamental matrix fits few) are named elsewhere.
+  for (const PairGeometry& geometry : result.pairs)
+    if (geometry.inlier_share() < 0.35) bad.erase({geometry.camera, geometry.projector});
+  if (!bad.empty()) findings.push_back(name_mover(input, bad, captures));
+  return findings;
+}
+
+}  // namespace pencilscan

@@ -1,0 +1,285 @@
+#include "pencilscan/calibration/verdict.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+
+#include "pencilscan/calibration/suspects.h"
+
+namespace pencilscan {
+namespace {
+
+constexpr int kCells = 4;
+
+std::string number(double value, const char* format = "%.2g") {
+  std::array<char, 40> text{};
+  std::snprintf(text.data(), text.size(), format, value);
+  return text.data();
+}
+
+std::string percent(double share) { return number(100 * share, "%.3g") + " %"; }
+
+class Judge {
+ public:
+  Judge(const CalibrationInput& input, const CalibrationResult& result,
+        const Uncertainty& uncertainty, const VerdictOptions& options)
+      : input_(input), result_(result), uncertainty_(uncertainty), options_(options) {}
+
+  std::vector<Finding> findings() {
+    judge_scene();
+    if (!result_.solved) {
+      add(Grade::kUnusable, "no structure could be found that explains the correspondences",
+          "give rough K of the devices, or captures that overlap more");
+      return std::move(findings_);
+    }
+    judge_knowledge();
+    judge_placement();
+    judge_pairs();
+    judge_residuals();
+    judge_devices();
+    judge_volume();
+    judge_scale();
+    return std::move(findings_);
+  }
+
+ private:
+  void add(Grade grade, const std::string& what, const std::string& advice = {}) {
+    findings_.push_back({grade, what, advice});
+  }
+  [[nodiscard]] const std::string& name(std::size_t d) const {
+    return calibrated_device(input_.rig, d).name;
+  }
+
+  void judge_scene() {
+    if (input_.tracks.size() < 100) {
+      add(Grade::kUnusable,
+          "only " + std::to_string(input_.tracks.size()) + " correspondences were found",
+          "check exposure and focus: see the decoding table");
+    }
+    double planar = 0;
+    double all = 0;
+    for (const PairGeometry& pair : result_.pairs) {
+      planar += pair.planar_share * static_cast<double>(pair.inliers);
+      all += static_cast<double>(pair.inliers);
+    }
+    // One camera and one projector have a single fundamental matrix, and its epipole hangs on what
+    // lies off the dominant plane.
+    const double limit =
+        result_.pairs.size() == 1 ? options_.planar_share_one_pair : options_.planar_share;
+    if (all == 0 || planar / all < limit) return;
+    const bool helped = !input_.board_views.empty();
+    add(helped ? Grade::kDoubtful : Grade::kUnusable,
+        "planar scene: one plane explains " + percent(planar / all) +
+            " of the correspondences, and every rig sees a plane alike",
+        "capture an object with depth, or the plane in several poses that differ in tilt "
+        "(one --captures each)");
+  }
+
+  /// One fundamental matrix has seven degrees of freedom: the pose takes five.
+  void judge_knowledge() {
+    if (result_.placed.size() > 2 || !input_.board_views.empty()) return;
+    if (input_.known[0].K || input_.known[1].K) return;
+    add(Grade::kDoubtful,
+        "one camera and one projector without a known K: two views fix two inner parameters, all "
+        "others are what is usual",
+        "give K of the camera, or add a second camera");
+  }
+
+  void judge_placement() {
+    for (std::size_t d = 0; d < result_.placed.size(); ++d) {
+      if (result_.placed[d] != 0) continue;
+      add(Grade::kUnusable,
+          name(d) + " shares too few correspondences with the others to be placed",
+          "put an object where " + name(d) + " and its neighbours see it");
+    }
+  }
+
+  void judge_pairs() {
+    for (const PairGeometry& pair : result_.pairs) {
+      if (pair.matches < 24 || pair.inlier_share() >= options_.low_inlier_share) continue;
+      add(Grade::kDoubtful,
+          "only " + percent(pair.inlier_share()) + " of the correspondences of " +
+              name(pair.projector) + "/" + name(pair.camera) +
+              " fit a rigid scene seen by one camera and one projector",
+          "look at these images: something moved, or files are mixed up");
+    }
+    for (const Finding& finding : find_suspects(input_, result_)) findings_.push_back(finding);
+  }
+
+  void judge_residuals() {
+    const double rms = result_.rms_px;
+    if (rms > options_.good_rms_px) {
+      add(rms > options_.usable_rms_px ? Grade::kUnusable : Grade::kDoubtful,
+          "the reprojection error is " + number(rms) + " px (RMS)",
+          "check focus, and that nothing moved while capturing");
+    }
+    if (result_.held_out_rms_px > 1.5 * rms + 0.05) {
+      add(Grade::kDoubtful,
+          "correspondences that were held out miss by " + number(result_.held_out_rms_px) +
+              " px, the others by " + number(rms) + " px: the rig fits its own data only",
+          "add captures that fill the volume");
+    }
+    const auto trends = residual_trends(result_);
+    for (std::size_t d = 0; d < trends.size(); ++d) {
+      double worst = 0;
+      for (const TrendCell& cell : trends[d])
+        if (cell.views >= 30) worst = std::max(worst, cell.mean.norm());
+      if (worst > options_.trend_px)
+        add(Grade::kDoubtful,
+            "errors of " + name(d) + " point the same way in parts of its image (" + number(worst) +
+                " px): the lens model does not fit, or it moved",
+            "add captures that reach the corners of the image");
+    }
+  }
+
+  void judge_devices() {
+    double worst = 0;
+    std::size_t worst_device = 0;
+    std::vector<std::string> at_prior;
+    for (std::size_t d = 0; d < result_.placed.size(); ++d) {
+      if (result_.placed[d] == 0) continue;
+      const BundleDevice& device = result_.problem.devices[d];
+      const DeviceUncertainty& u = uncertainty_.devices[d];
+      const double sigma = u.inner[kFx] / device.inner[kFx];
+      if (sigma > worst) {
+        worst = sigma;
+        worst_device = d;
+      }
+      for (const std::size_t i : {kFx, kCx, kCy})
+        if (u.is_prior[i]) at_prior.push_back(name(d) + " " + kIntrinsicNames[i]);
+      judge_lens(d);
+      const Device& placed = calibrated_device(result_.rig, d);
+      const double scale = device.inner[kFx] / placed.width;
+      if (scale < 0.3 || scale > 10)
+        add(Grade::kUnusable,
+            "the focal length of " + name(d) + ", " + number(device.inner[kFx], "%.0f") +
+                " px, is implausible for an image " + std::to_string(placed.width) + " px wide",
+            "give a rough K for it in the devices file");
+    }
+    if (worst > options_.good_focal_sigma) {
+      add(worst > options_.usable_focal_sigma ? Grade::kUnusable : Grade::kDoubtful,
+          "focal lengths are known weakly: that of " + name(worst_device) + " to " +
+              percent(worst) + " (one standard deviation)",
+          "add captures with the object moved through the whole volume, or give K of the cameras");
+    }
+    if (!at_prior.empty()) {
+      std::string list;
+      for (std::size_t i = 0; i < std::min<std::size_t>(at_prior.size(), 6); ++i)
+        list += (i == 0 ? "" : ", ") + at_prior[i];
+      if (at_prior.size() > 6) list += " and " + std::to_string(at_prior.size() - 6) + " more";
+      add(Grade::kDoubtful,
+          "the data do not determine " + list + ": held near what is plausible or was given",
+          "add captures with the object moved and turned, or give K");
+    }
+  }
+
+  /// Aspect and decentring far from what lenses have: something else is wrong.
+  void judge_lens(std::size_t d) {
+    const BundleDevice& device = result_.problem.devices[d];
+    double worst = 0;
+    const char* which = "";
+    for (const std::size_t i : {kFy, kP1, kP2, kCx, kK1, kK2}) {
+      const double sigma = device.prior_sigma[i];
+      if (sigma == 0 || !std::isfinite(sigma)) continue;
+      const double value = i == kFy ? device.inner[kFy] / device.inner[kFx] : device.inner[i];
+      const double pull = std::abs(value - device.prior[i]) / sigma;
+      if (pull <= worst) continue;
+      worst = pull;
+      which = i == kFy ? "fy / fx" : kIntrinsicNames[i];
+    }
+    if (worst < 3) return;
+    add(Grade::kDoubtful,
+        std::string(which) + " of " + name(d) + " lies " + number(worst) +
+            " standard deviations from what such devices have: the data contradict the model",
+        "check that nothing moved and that no glass or mirror is in the way, and add captures");
+  }
+
+  void judge_volume() {
+    if (uncertainty_.volume_radius <= 0) return;
+    const double share = uncertainty_.volume_median / uncertainty_.volume_radius;
+    if (share <= options_.good_volume_sigma) return;
+    const std::string unit = result_.rig.unit_known ? " mm" : "";
+    add(share > options_.usable_volume_sigma ? Grade::kUnusable : Grade::kDoubtful,
+        "a measured point is off by " + number(uncertainty_.volume_median) + unit +
+            " (one standard deviation) from the rig's errors alone, in a volume of radius " +
+            number(uncertainty_.volume_radius, "%.3g") + unit,
+        "add captures that fill the volume");
+  }
+
+  void judge_scale() {
+    if (!result_.rig.unit_known)
+      add(Grade::kGood, "the scale is not known: the rig's unit is \"unknown\"",
+          "give --known-distance, or a --board");
+    for (std::size_t d = 0; d < result_.placed.size(); ++d) {
+      if (!input_.known[d].K || result_.inner_held[d] != 0 || result_.placed[d] == 0) continue;
+      add(Grade::kGood, "the given K of " + name(d) +
+                            " explains the data worse than a free one: it was only a start");
+    }
+  }
+
+  const CalibrationInput& input_;
+  const CalibrationResult& result_;
+  const Uncertainty& uncertainty_;
+  const VerdictOptions& options_;
+  std::vector<Finding> findings_;
+};
+
+}  // namespace
+
+std::string to_string(Grade grade) {
+  switch (grade) {
+    case Grade::kGood:
+      return "good";
+    case Grade::kDoubtful:
+      return "doubtful";
+    case Grade::kUnusable:
+      return "unusable";
+  }
+  return "unknown";
+}
+
+std::vector<std::vector<TrendCell>> residual_trends(const CalibrationResult& result) {
+  std::vector<std::vector<TrendCell>> trends(result.placed.size(),
+                                             std::vector<TrendCell>(kCells * kCells));
+  const BundleProblem& problem = result.problem;
+  for (std::size_t t = 0; t < problem.points.size(); ++t) {
+    if (problem.used[t] == 0) continue;
+    const auto& views = problem.tracks[t].views;
+    for (std::size_t i = 1; i < views.size(); ++i) {
+      const std::size_t d = views[i].device;
+      if (!problem.devices[d].present) continue;
+      const auto error = view_error(problem.devices[d], problem.points[t], views[i]);
+      if (!error) continue;
+      const Device& device = calibrated_device(result.rig, d);
+      const auto cell = [](double x, int size) {
+        return std::clamp(static_cast<int>((x + 0.5) * kCells / size), 0, kCells - 1);
+      };
+      TrendCell& at =
+          trends[d][static_cast<std::size_t>(kCells * cell(views[i].pixel.y(), device.height) +
+                                             cell(views[i].pixel.x(), device.width))];
+      ++at.views;
+      at.mean += *error;
+    }
+  }
+  for (auto& cells : trends)
+    for (TrendCell& cell : cells)
+      if (cell.views > 0) cell.mean /= cell.views;
+  return trends;
+}
+
+Verdict judge(const CalibrationInput& input, const CalibrationResult& result,
+              const Uncertainty& uncertainty, std::vector<Finding> found_before,
+              const VerdictOptions& options) {
+  Verdict verdict;
+  verdict.findings = std::move(found_before);
+  for (Finding& finding : Judge(input, result, uncertainty, options).findings())
+    verdict.findings.push_back(std::move(finding));
+  std::stable_sort(verdict.findings.begin(), verdict.findings.end(),
+                   [](const Finding& a, const Finding& b) { return a.grade > b.grade; });
+  for (const Finding& finding : verdict.findings)
+    verdict.grade = std::max(verdict.grade, finding.grade);
+  return verdict;
+}
+
+}  // namespace pencilscan

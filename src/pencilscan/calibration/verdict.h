@@ -1,0 +1,52 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "pencilscan/calibration/calibrate.h"
+#include "pencilscan/calibration/uncertainty.h"
+
+namespace pencilscan {
+
+enum class Grade { kGood, kDoubtful, kUnusable };
+[[nodiscard]] std::string to_string(Grade grade);
+
+/// Something to know about a calibration, in plain words.
+struct Finding {
+  Grade grade = Grade::kGood;  ///< what it makes of the calibration; good: a note
+  std::string what;
+  std::string advice;  ///< what to do; may be empty
+};
+
+struct Verdict {
+  Grade grade = Grade::kGood;  ///< the worst of the findings
+  std::vector<Finding> findings;
+};
+
+struct VerdictOptions {
+  double planar_share = 0.85;          ///< a scene with more on one plane per pair fixes no rig
+  double planar_share_one_pair = 0.5;  ///< the same where there is one pair only
+  double good_rms_px = 0.4;            ///< of all views
+  double usable_rms_px = 1.5;
+  double good_focal_sigma = 0.005;  ///< over the focal length
+  double usable_focal_sigma = 0.05;
+  double good_volume_sigma = 0.002;  ///< of a point, over the radius of what was measured
+  double usable_volume_sigma = 0.03;
+  double low_inlier_share = 0.7;  ///< of a pair
+  double trend_px = 0.15;         ///< mean error in a part of the image
+};
+
+/// Mean residual in one cell of a device's image.
+struct TrendCell {
+  int views = 0;
+  Vec2 mean = Vec2::Zero();  ///< px
+};
+/// 4 x 4 cells per device, row by row.
+[[nodiscard]] std::vector<std::vector<TrendCell>> residual_trends(const CalibrationResult& result);
+
+/// Judges a result. `found_before`: what was already noticed in the images (orders, missing files).
+[[nodiscard]] Verdict judge(const CalibrationInput& input, const CalibrationResult& result,
+                            const Uncertainty& uncertainty, std::vector<Finding> found_before,
+                            const VerdictOptions& options = {});
+
+}  // namespace pencilscan

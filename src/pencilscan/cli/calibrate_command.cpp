@@ -1,0 +1,196 @@
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "pencilscan/calibration/calibration_report.h"
+#include "pencilscan/calibration/gray_decode.h"
+#include "pencilscan/calibration/tracks.h"
+#include "pencilscan/cli/command.h"
+#include "pencilscan/core/error.h"
+#include "pencilscan/core/parallel.h"
+#include "pencilscan/core/stopwatch.h"
+#include "pencilscan/io/file.h"
+
+namespace pencilscan::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct CalibrateCommand {
+  CommonOptions common;
+  std::vector<std::string> captures;
+  std::string devices;
+  std::string out;
+  std::vector<std::string> known_distance;
+  std::size_t max_tracks = TrackOptions{}.max_tracks;
+  bool overwrite = false;
+};
+
+std::size_t device_by_name(const Rig& rig, const std::string& name) {
+  for (std::size_t d = 0; d < device_total(rig); ++d)
+    if (calibrated_device(rig, d).name == name) return d;
+  throw InputError("command line", "--known-distance", name, "must be the name of a device");
+}
+
+std::optional<KnownDistance> known_distance(const CalibrateCommand& command, const Rig& rig) {
+  if (command.known_distance.empty()) return std::nullopt;
+  KnownDistance distance;
+  distance.a = device_by_name(rig, command.known_distance[0]);
+  distance.b = device_by_name(rig, command.known_distance[1]);
+  std::size_t used = 0;
+  try {
+    distance.mm = std::stod(command.known_distance[2], &used);
+  } catch (const std::exception&) {
+    used = 0;
+  }
+  if (used != command.known_distance[2].size() || !(distance.mm > 0) ||
+      !std::isfinite(distance.mm) || distance.a == distance.b)
+    throw InputError("command line", "--known-distance", command.known_distance[2],
+                     "must be two different devices and a distance > 0 in mm");
+  return distance;
+}
+
+/// Decodes one pair and adds its correspondences, unless the codes make no sense.
+DecodeSummary decode_pair(const CapturePair& pair, std::size_t capture, const Rig& rig,
+                          TrackBuilder& tracks, std::vector<Finding>& findings) {
+  const Projector& projector = rig.projectors[pair.projector];
+  const DecodedView view = decode_gray_stack(read_gray_stack(pair, rig));
+  DecodeSummary summary{capture, pair.projector, pair.camera, view.counts, view.valid_share(), 0,
+                        {}};
+  summary.wrong_order = explain_wrong_order(
+      projector.width, projector.height, pair.inverses,
+      [&](std::size_t i) { return read_gray_image(pair, rig, i); }, view);
+  if (!summary.wrong_order.empty()) {
+    findings.push_back({Grade::kDoubtful,
+                        "the images of " + projector.name + "/" + rig.cameras[pair.camera].name +
+                            " (--captures number " + std::to_string(capture + 1) +
+                            ") are in the wrong order: " + summary.wrong_order,
+                        "put them in the documented order; they were left out"});
+    return summary;
+  }
+  const std::size_t before = tracks.samples();
+  tracks.add(capture, pair.camera, pair.projector, view);
+  summary.samples = tracks.samples() - before;
+  return summary;
+}
+
+void check_command(const CalibrateCommand& command) {
+  std::error_code ignored;
+  if (fs::equivalent(command.out, command.devices, ignored))
+    throw InputError("command line", "--out", command.out, "must not be the devices file");
+  if (!command.overwrite && fs::exists(command.out, ignored))
+    throw InputError("command line", "--out", command.out,
+                     "must be a new file (or give --overwrite)");
+}
+
+void print_verdict(const Verdict& verdict) {
+  for (const Finding& finding : verdict.findings) {
+    std::cerr << to_string(finding.grade) << ": " << finding.what << "\n";
+    if (!finding.advice.empty()) std::cerr << "  what to do: " << finding.advice << "\n";
+  }
+}
+
+nlohmann::ordered_json figures_of(const CalibrationResult& result, const Uncertainty& uncertainty,
+                                  const Verdict& verdict, double seconds) {
+  nlohmann::ordered_json figures;
+  figures["verdict"] = to_string(verdict.grade);
+  for (std::size_t i = 0; i < verdict.findings.size(); ++i)
+    if (verdict.findings[i].grade == verdict.grade && verdict.grade != Grade::kGood)
+      figures["reasons"].push_back(verdict.findings[i].what);
+  figures["rms_px"] = result.rms_px;
+  figures["held_out_rms_px"] = result.held_out_rms_px;
+  figures["views"] = result.views;
+  figures["views_dropped"] = result.views_dropped;
+  figures["point_sigma"] = uncertainty.volume_median;
+  figures["unit"] = result.rig.unit_known ? "mm" : "unknown";
+  figures["seconds"] = seconds;
+  return figures;
+}
+
+void run_calibrate(const CalibrateCommand& command) {
+  const ThreadLimit threads(command.common.threads);
+  const Stopwatch watch;
+  check_command(command);
+  const UncalibratedRig devices = read_devices(command.devices);
+  CalibrationInput input;
+  input.rig = devices.rig;
+  input.known = devices.given;
+  input.distance = known_distance(command, input.rig);
+
+  const Progress progress = stderr_progress();
+  TrackOptions track_options;
+  track_options.max_tracks = command.max_tracks;
+  TrackBuilder tracks(input.rig, track_options);
+  std::vector<DecodeSummary> decoded;
+  std::vector<Finding> findings;
+  std::vector<std::vector<CapturePair>> captures;
+  for (const std::string& folder : command.captures)
+    captures.push_back(list_captures(folder, input.rig));
+  for (std::size_t k = 0; k < captures.size(); ++k) {
+    for (std::size_t i = 0; i < captures[k].size(); ++i) {
+      progress("decoding", (static_cast<double>(k) +
+                            static_cast<double>(i) / static_cast<double>(captures[k].size())) /
+                               static_cast<double>(captures.size()));
+      decoded.push_back(decode_pair(captures[k][i], k, input.rig, tracks, findings));
+    }
+  }
+  input.tracks = tracks.tracks();
+
+  CalibrateOptions options;
+  const CalibrationResult result = calibrate(input, options, progress);
+  progress("judging", 0.9);
+  Uncertainty sigma;
+  sigma.devices.resize(device_total(input.rig));
+  if (result.solved) {
+    sigma = uncertainty(result.problem, result.free_inner, BundleOptions{}.loss_scale,
+                        result.extra_sigma_px, command.common.seed);
+  }
+  const Verdict verdict = judge(input, result, sigma, std::move(findings));
+  progress("judging", 1);
+  const CalibrationReport report{input, result, sigma, verdict, decoded};
+  const fs::path folder = fs::path(command.out).parent_path();
+  write_json(folder / "calibration.json", calibration_json(report));
+  write_text(folder / "calibration.html", calibration_html(report));
+  if (verdict.grade != Grade::kUnusable) write_rig(result.rig, command.out);
+  print_verdict(verdict);
+  print_figures(command.common, figures_of(result, sigma, verdict, watch.seconds()));
+  if (verdict.grade == Grade::kUnusable) {
+    std::cout.flush();
+    throw StageError("unusable: " + verdict.findings.front().what);
+  }
+}
+
+}  // namespace
+
+void add_calibrate_command(CLI::App& app) {
+  auto options = std::make_shared<CalibrateCommand>();
+  CLI::App* command =
+      app.add_subcommand("calibrate", "Find the rig from Gray-code captures, and judge it");
+  command
+      ->add_option("--captures", options->captures,
+                   "Folder <projector>/<camera>/NNN.png; repeat it for more poses of the object")
+      ->required();
+  command
+      ->add_option("--devices", options->devices,
+                   "A rig.json in which K, distortion, R and t may be missing or rough")
+      ->required();
+  command
+      ->add_option("--out", options->out,
+                   "The rig file to write; calibration.html and calibration.json go beside it")
+      ->required();
+  command
+      ->add_option("--known-distance", options->known_distance,
+                   "Two devices and the distance of their centres in mm: cam0 cam1 850")
+      ->expected(3);
+  command->add_option("--max-tracks", options->max_tracks, "Surface points to use at most")
+      ->check(CLI::Range(std::size_t{200}, std::size_t{1000000}))
+      ->capture_default_str();
+  command->add_flag("--overwrite", options->overwrite, "Replace an earlier rig");
+  add_common_options(*command, options->common,
+                     "pencilscan calibrate --captures pose1 --captures pose2 --devices "
+                     "devices.json --known-distance cam0 cam1 850 --out rig.json");
+  command->callback([options] { run_calibrate(*options); });
+}
+
+}  // namespace pencilscan::cli

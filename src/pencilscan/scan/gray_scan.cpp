@@ -1,0 +1,136 @@
+#include "pencilscan/scan/gray_scan.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "pencilscan/calibration/local_map.h"
+#include "pencilscan/core/parallel.h"
+#include "pencilscan/surface/poisson.h"
+
+namespace pencilscan {
+namespace {
+
+constexpr std::size_t kLeastSamples = 50;
+
+/// Windows smaller than for calibration: what is wanted is detail, not one coordinate.
+constexpr LocalMapOptions kWindow{.radius_px = 3, .largest_radius_px = 5, .least_crossings = 10};
+
+struct Meeting {
+  Vec3 point;        ///< on the camera ray
+  double miss_px;    ///< distance of the point's projection from the panel coordinate
+  double mm_per_px;  ///< along the camera ray per panel pixel
+  double angle;      ///< between the rays
+};
+
+std::optional<Meeting> meet(const Device& camera, const Device& projector, const Vec2& pixel,
+                            const Vec2& panel) {
+  const Ray a = camera.ray(pixel);
+  const Ray b = projector.ray(panel);
+  const Vec3 baseline = b.origin - a.origin;
+  const double cosine = a.direction.dot(b.direction);
+  const double sine2 = 1 - cosine * cosine;
+  if (sine2 < 1e-8) return std::nullopt;
+  const double depth = (baseline.dot(a.direction) - cosine * baseline.dot(b.direction)) / sine2;
+  if (!(depth > 0)) return std::nullopt;
+  Meeting result;
+  result.point = a.origin + depth * a.direction;
+  const auto projected = projector.project(result.point);
+  const auto farther = projector.project(result.point + a.direction);
+  if (!projected || !farther) return std::nullopt;
+  result.miss_px = (*projected - panel).norm();
+  result.mm_per_px = 1 / std::max((*farther - *projected).norm(), 1e-9);
+  result.angle = std::asin(std::sqrt(std::min(sine2, 1.0)));
+  return result;
+}
+
+struct Measured {
+  MeasuredPoint point;
+  SurfaceSample sample;
+};
+
+}  // namespace
+
+GrayScan gray_scan(const Rig& rig, std::size_t camera, std::size_t projector,
+                   const DecodedView& decoded, const GrayScanOptions& options) {
+  const Camera& eye = rig.cameras[camera];
+  const Projector& light = rig.projectors[projector];
+  const auto across = static_cast<std::size_t>((decoded.state.cols - 1) / options.step_px + 1);
+  const auto down = static_cast<std::size_t>((decoded.state.rows - 1) / options.step_px + 1);
+  std::vector<std::optional<Measured>> found(across * down);
+  std::vector<char> missed(found.size(), 0);
+  const Vec3 center = eye.center();
+  parallel_for(down, [&](std::size_t row) {
+    for (std::size_t column = 0; column < across; ++column) {
+      const int u = static_cast<int>(column) * options.step_px;
+      const int v = static_cast<int>(row) * options.step_px;
+      const auto map = LocalMap::fit(decoded, u, v, kWindow);
+      if (!map) continue;
+      const Vec2 pixel(u, v);
+      const Vec2 panel = map->panel_from_camera(pixel);
+      const auto at = meet(eye, light, pixel, panel);
+      const Vec2 right = pixel + Vec2(1, 0);
+      const Vec2 below = pixel + Vec2(0, 1);
+      const auto beside = meet(eye, light, right, map->panel_from_camera(right));
+      const auto under = meet(eye, light, below, map->panel_from_camera(below));
+      const std::size_t i = row * across + column;
+      if (!at || !beside || !under || at->miss_px > options.worst_miss_px ||
+          at->angle < options.least_angle_rad) {
+        missed[i] = 1;
+        continue;
+      }
+      Measured m;
+      m.sample.position = at->point;
+      m.sample.to_camera = (center - at->point).normalized();
+      m.sample.normal = (under->point - at->point).cross(beside->point - at->point).normalized();
+      if (!m.sample.normal.allFinite()) continue;
+      if (m.sample.normal.dot(m.sample.to_camera) < 0) m.sample.normal = -m.sample.normal;
+      m.sample.sigma = at->mm_per_px * map->sigma_panel_px().norm() / std::sqrt(2.0);
+      m.sample.spacing = (beside->point - at->point).norm() * options.step_px;
+      m.sample.confidence = 1;
+      m.sample.camera = static_cast<std::uint8_t>(camera);
+      m.sample.projector = static_cast<std::uint8_t>(projector);
+      m.sample.count = 1;
+      const Vec3& x = at->point;
+      m.point = {static_cast<float>(x.x()),
+                 static_cast<float>(x.y()),
+                 static_cast<float>(x.z()),
+                 static_cast<float>(u),
+                 static_cast<float>(v),
+                 m.sample.camera,
+                 m.sample.projector,
+                 0,
+                 static_cast<std::uint16_t>(std::max(std::lround(panel.x()), 0L)),
+                 static_cast<float>(m.sample.sigma),
+                 1.F,
+                 static_cast<float>(panel.x())};
+      found[i] = m;
+    }
+  });
+  GrayScan scan;
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    scan.missed += missed[i] != 0 ? 1U : 0U;
+    if (!found[i]) continue;
+    scan.points.push_back(found[i]->point);
+    scan.samples.push_back(found[i]->sample);
+  }
+  return scan;
+}
+
+TriangleMesh scan_mesh(std::span<const SurfaceSample> samples, double cell_mm) {
+  if (samples.size() < kLeastSamples) return {};
+  Vec3 low = samples[0].position;
+  Vec3 high = low;
+  for (const SurfaceSample& sample : samples) {
+    low = low.cwiseMin(sample.position);
+    high = high.cwiseMax(sample.position);
+  }
+  constexpr double kScale = 1.5;
+  const double size = kScale * (high - low).maxCoeff();
+  const int depth =
+      std::clamp(static_cast<int>(std::ceil(std::log2(size / std::max(cell_mm, 1e-9)))), 5, 9);
+  return poisson_surface(samples, depth, kScale);
+}
+
+}  // namespace pencilscan
