@@ -6,7 +6,9 @@
 #include "pencilscan/cli/command.h"
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/parallel.h"
+#include "pencilscan/io/file.h"
 #include "pencilscan/io/image.h"
+#include "pencilscan/pattern/gray_code.h"
 #include "pencilscan/pattern/line_pattern.h"
 #include "pencilscan/rig/rig.h"
 
@@ -17,10 +19,47 @@ struct PatternOptions {
   CommonOptions common;
   std::string rig_path;
   std::string out;
+  bool gray_code = false;
+  bool no_inverses = false;
 };
+
+std::string file_name(std::size_t number) {
+  const std::string digits = std::to_string(number);
+  return std::string(digits.size() < 3 ? 3 - digits.size() : 0, '0') + digits + ".png";
+}
+
+/// <projector>/NNN.png in the order of docs/formats.md, and index.json that says what each shows.
+void write_gray_codes(const PatternOptions& options) {
+  const std::filesystem::path out(options.out);
+  nlohmann::ordered_json figures;
+  for (const Projector& projector : read_devices(options.rig_path).rig.projectors) {
+    const auto sequence =
+        gray_code_sequence(projector.width, projector.height, !options.no_inverses);
+    nlohmann::ordered_json index = nlohmann::ordered_json::array();
+    for (std::size_t i = 0; i < sequence.size(); ++i) {
+      const GrayCodeImage& image = sequence[i];
+      write_image(out / projector.name / file_name(i),
+                  render_gray_code(image, projector.width, projector.height));
+      nlohmann::ordered_json entry{{"file", file_name(i)}};
+      if (image.kind == GrayCodeImage::Kind::kBit) {
+        entry["axis"] = image.axis == Axis::kColumn ? "column" : "row";
+        entry["bit"] = image.bit;
+        entry["inverse"] = image.inverse;
+      } else {
+        entry["shows"] = image.kind == GrayCodeImage::Kind::kWhite ? "white" : "black";
+      }
+      index.push_back(entry);
+    }
+    write_json(out / projector.name / "index.json",
+               {{"width", projector.width}, {"height", projector.height}, {"images", index}});
+    figures[projector.name] = {{"images", sequence.size()}};
+  }
+  print_figures(options.common, figures);
+}
 
 void run_pattern(const PatternOptions& options) {
   const ThreadLimit threads(options.common.threads);
+  if (options.gray_code) return write_gray_codes(options);
   const Rig rig = read_rig(options.rig_path);
   for (std::size_t i = 0; i < rig.projectors.size(); ++i) {
     if (rig.projectors[i].patterns.empty()) {
@@ -49,6 +88,9 @@ void add_pattern_command(CLI::App& app) {
   command->add_option("--rig", options->rig_path, "The rig (rig.json)")->required();
   command->add_option("--out", options->out, "Folder for <projector>.png, 8 bit, linear light")
       ->required();
+  command->add_flag("--gray-code", options->gray_code,
+                    "Gray codes instead, <projector>/NNN.png with an index.json; sizes suffice");
+  command->add_flag("--no-inverses", options->no_inverses, "Gray codes without inverse images");
   add_common_options(*command, options->common, "pencilscan pattern --rig rig.json --out patterns");
   command->callback([options] { run_pattern(*options); });
 }

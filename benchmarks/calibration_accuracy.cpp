@@ -1,0 +1,94 @@
+// How far a calibrated rig lies from the true one, free of gauge:
+//   calibration_accuracy <true rig.json> <found rig.json>
+// Points all over the working volume are projected into all devices of the true rig and measured
+// with the found one; one similarity takes the points there; then both rigs' projections are
+// compared.
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <vector>
+
+#include "pencilscan/calibration/structure.h"
+#include "pencilscan/core/random.h"
+
+namespace {
+
+using namespace pencilscan;
+
+constexpr std::size_t kPoints = 500;
+
+std::vector<Vec3> points_in(const Sphere& volume) {
+  Random random(1);
+  std::vector<Vec3> points;
+  while (points.size() < kPoints) {
+    const Vec3 x(random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-1, 1));
+    if (x.norm() <= 1) points.push_back(volume.center + volume.radius * x);
+  }
+  return points;
+}
+
+void compare(const Rig& truth, const Rig& found) {
+  BundleProblem problem;
+  for (std::size_t d = 0; d < device_total(found); ++d) {
+    problem.devices.push_back(bundle_device(calibrated_device(found, d)));
+    problem.devices.back().present = true;
+  }
+  std::vector<Vec3> points;
+  std::vector<Vec3> measured;
+  for (const Vec3& x : points_in(working_volume(truth))) {
+    Track track;
+    for (std::size_t d = 0; d < device_total(truth); ++d) {
+      const auto pixel = calibrated_device(truth, d).project(x);
+      if (pixel && calibrated_device(truth, d).contains(*pixel))
+        track.views.push_back({d, *pixel, 1});
+    }
+    const auto y = triangulate(problem, track, 0.01);
+    if (!y) continue;
+    points.push_back(x);
+    measured.push_back(*y);
+  }
+  const auto n = static_cast<Eigen::Index>(points.size());
+  Eigen::Matrix3Xd a(3, n);
+  Eigen::Matrix3Xd b(3, n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    a.col(i) = points[static_cast<std::size_t>(i)];
+    b.col(i) = measured[static_cast<std::size_t>(i)];
+  }
+  const Eigen::Matrix4d S = Eigen::umeyama(a, b, true);
+  std::vector<double> errors;
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const Vec3 moved = (S * a.col(i).homogeneous()).head<3>();
+    for (std::size_t d = 0; d < device_total(truth); ++d) {
+      const auto p = calibrated_device(truth, d).project(a.col(i));
+      const auto q = calibrated_device(found, d).project(moved);
+      if (p && q && calibrated_device(truth, d).contains(*p)) errors.push_back((*p - *q).norm());
+    }
+  }
+  std::sort(errors.begin(), errors.end());
+  double focal = 0;
+  for (std::size_t d = 0; d < device_total(truth); ++d) {
+    const double error =
+        calibrated_device(found, d).K(0, 0) / calibrated_device(truth, d).K(0, 0) - 1;
+    focal = std::max(focal, std::abs(error));
+  }
+  std::printf("points                %zu\n", points.size());
+  std::printf("scale                 %.6f\n", S.block<3, 1>(0, 0).norm());
+  std::printf("focal_error_worst     %.4f %%\n", 100 * focal);
+  if (errors.empty()) return;
+  std::printf("projection_median_px  %.4f\n", errors[errors.size() / 2]);
+  std::printf("projection_p95_px     %.4f\n", errors[errors.size() * 95 / 100]);
+  std::printf("projection_max_px     %.4f\n", errors.back());
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc != 3) {
+    std::fprintf(stderr, "usage: calibration_accuracy <true rig.json> <found rig.json>\n");
+    return 2;
+  }
+  compare(pencilscan::read_rig(argv[1]), pencilscan::read_rig(argv[2]));
+  return 0;
+}
