@@ -20,7 +20,7 @@ bool inside(const Vec2& pixel, const Vec2& size) {
 
 }  // namespace
 
-TrackBuilder::TrackBuilder(const Rig& rig, const TrackOptions& options)
+TrackBuilder::TrackBuilder(const Rig& rig, const GrayTrackOptions& options)
     : options_(options), cameras_(rig.cameras.size()) {
   PENCILSCAN_CHECK(options.spacing_px >= 8);
   for (std::size_t d = 0; d < device_total(rig); ++d) {

@@ -38,7 +38,7 @@ struct Track {
   return rig.projectors[device - rig.cameras.size()];
 }
 
-struct TrackOptions {
+struct GrayTrackOptions {
   int spacing_px = 16;             ///< of the lattices of hub pixels, >= 8: windows do not overlap
   double hub_sigma_px = 0.02;      ///< stands for "exact", > 0
   double least_sigma_px = 0.03;    ///< of a measured view: what the window's fit cannot know, > 0
@@ -49,7 +49,7 @@ struct TrackOptions {
 /// Collects what the pairs of one capture contribute, then joins views of the same hub pixel.
 class TrackBuilder {
  public:
-  TrackBuilder(const Rig& rig, const TrackOptions& options);
+  TrackBuilder(const Rig& rig, const GrayTrackOptions& options);
 
   /// Adds the views of one camera-projector pair. Not for several threads at once.
   void add(std::size_t capture, std::size_t camera, std::size_t projector,
@@ -72,7 +72,7 @@ class TrackBuilder {
   void add_projector_hubs(std::size_t capture, std::size_t camera, std::size_t projector,
                           const DecodedView& decoded);
 
-  TrackOptions options_;
+  GrayTrackOptions options_;
   std::size_t cameras_;
   std::vector<int> columns_;  ///< of each device's lattice
   std::vector<Vec2> size_;    ///< of each device's image

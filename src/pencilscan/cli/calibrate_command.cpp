@@ -23,7 +23,7 @@ struct CalibrateCommand {
   std::string devices;
   std::string out;
   std::vector<std::string> known_distance;
-  std::size_t max_tracks = TrackOptions{}.max_tracks;
+  std::size_t max_tracks = GrayTrackOptions{}.max_tracks;
   bool overwrite = false;
 };
 
@@ -119,7 +119,7 @@ void run_calibrate(const CalibrateCommand& command) {
   input.distance = known_distance(command, input.rig);
 
   const Progress progress = stderr_progress();
-  TrackOptions track_options;
+  GrayTrackOptions track_options;
   track_options.max_tracks = command.max_tracks;
   TrackBuilder tracks(input.rig, track_options);
   std::vector<DecodeSummary> decoded;
