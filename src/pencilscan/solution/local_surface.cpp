@@ -5,13 +5,14 @@
 #include <array>
 #include <cmath>
 
+#include "pencilscan/core/lanes.h"
+
 namespace pencilscan {
 namespace {
 
 using Eigen::Vector2f;
 using Vector6f = Eigen::Matrix<float, 6, 1>;
 using Matrix6f = Eigen::Matrix<float, 6, 6>;
-using Lanes = Eigen::Array<float, 8, 1>;
 
 Vector6f terms(const Vector2f& d) {
   Vector6f row;
@@ -19,58 +20,112 @@ Vector6f terms(const Vector2f& d) {
   return row;
 }
 
-/// Weighted least squares of z on the six terms: normal matrix and right side. The matrix holds the
-/// 15 moments sum(w x^a y^b), a + b <= 4.
-void accumulate(const float* x, const float* y, const float* z, const float* w, std::size_t n,
-                Matrix6f& N, Vector6f& b) {
-  std::array<Lanes, 15> m;
-  std::array<Lanes, 6> r;
-  for (Lanes& lanes : m) lanes.setZero();
-  for (Lanes& lanes : r) lanes.setZero();
-  for (std::size_t i = 0; i < n; i += Lanes::SizeAtCompileTime) {
-    const Lanes lx = Eigen::Map<const Lanes>(x + i);
-    const Lanes ly = Eigen::Map<const Lanes>(y + i);
-    const Lanes lz = Eigen::Map<const Lanes>(z + i);
-    const Lanes m0 = Eigen::Map<const Lanes>(w + i);
-    const Lanes mx = m0 * lx;
-    const Lanes my = m0 * ly;
-    const Lanes mxx = mx * lx;
-    const Lanes mxy = mx * ly;
-    const Lanes myy = my * ly;
-    const Lanes x2 = lx * lx;
-    const Lanes y2 = ly * ly;
-    const Lanes xy = lx * ly;
-    m[0] += m0;
-    m[1] += mx;
-    m[2] += my;
-    m[3] += mxx;
-    m[4] += mxy;
-    m[5] += myy;
-    m[6] += mxx * lx;
-    m[7] += mxx * ly;
-    m[8] += mxy * ly;
-    m[9] += myy * ly;
-    m[10] += mxx * x2;
-    m[11] += mxx * xy;
-    m[12] += mxx * y2;
-    m[13] += myy * xy;
-    m[14] += myy * y2;
-    r[0] += m0 * lz;
-    r[1] += mx * lz;
-    r[2] += my * lz;
-    r[3] += mxx * lz;
-    r[4] += mxy * lz;
-    r[5] += myy * lz;
+/// Points around a pixel in columns, a multiple of kLanes of them; padding weighs nothing.
+struct Columns {
+  const float* x;
+  const float* y;
+  const float* z;
+  const float* inverse_sigma;
+  const float* near;
+  float* deviation;
+  std::size_t size;
+};
+
+/// The 15 moments sum(w x^a y^b), a + b <= 4, and the 6 of z. Robust weights by the deviations of
+/// the last fit, in units of 1 / `inverse_scale`.
+struct Moments {
+  std::array<float, 15> of_terms;
+  std::array<float, 6> of_z;
+};
+
+PENCILSCAN_CLONES void sum_moments(const Columns& points, bool by_distance, float inverse_scale,
+                                   Moments& sums) {
+  Lanes m[15] = {};
+  Lanes r[6] = {};
+  for (std::size_t i = 0; i < points.size; i += kLanes) {
+    Lanes x, y, z, inverse_sigma, near, deviation;
+    load(points.x + i, x);
+    load(points.y + i, y);
+    load(points.z + i, z);
+    load(points.inverse_sigma + i, inverse_sigma);
+    load(points.near + i, near);
+    load(points.deviation + i, deviation);
+    const Lanes e = deviation * inverse_scale;
+    const Lanes robust = inverse_sigma / (1 + e * e);
+    Lanes w = robust * robust;
+    if (by_distance) w *= near;
+    const Lanes wx = w * x;
+    const Lanes wy = w * y;
+    const Lanes wxx = wx * x;
+    const Lanes wxy = wx * y;
+    const Lanes wyy = wy * y;
+    const Lanes xx = x * x;
+    const Lanes xy = x * y;
+    const Lanes yy = y * y;
+    m[0] += w;
+    m[1] += wx;
+    m[2] += wy;
+    m[3] += wxx;
+    m[4] += wxy;
+    m[5] += wyy;
+    m[6] += wxx * x;
+    m[7] += wxx * y;
+    m[8] += wxy * y;
+    m[9] += wyy * y;
+    m[10] += wxx * xx;
+    m[11] += wxx * xy;
+    m[12] += wxx * yy;
+    m[13] += wyy * xy;
+    m[14] += wyy * yy;
+    r[0] += w * z;
+    r[1] += wx * z;
+    r[2] += wy * z;
+    r[3] += wxx * z;
+    r[4] += wxy * z;
+    r[5] += wyy * z;
   }
-  std::array<float, 15> s;
-  for (std::size_t k = 0; k < s.size(); ++k) s[k] = m[k].sum();
-  for (std::size_t k = 0; k < r.size(); ++k) b[static_cast<Eigen::Index>(k)] = r[k].sum();
+  for (std::size_t k = 0; k < 15; ++k) {
+    sums.of_terms[k] = 0;
+    for (int lane = 0; lane < kLanes; ++lane) sums.of_terms[k] += m[k][lane];
+  }
+  for (std::size_t k = 0; k < 6; ++k) {
+    sums.of_z[k] = 0;
+    for (int lane = 0; lane < kLanes; ++lane) sums.of_z[k] += r[k][lane];
+  }
+}
+
+/// Deviations from the surface of coefficients c, in the points' standard deviations. Returns the
+/// largest change.
+PENCILSCAN_CLONES float update_deviations(const float* c, const Columns& points) {
+  Lanes most = {};
+  for (std::size_t i = 0; i < points.size; i += kLanes) {
+    Lanes x, y, z, inverse_sigma, before;
+    load(points.x + i, x);
+    load(points.y + i, y);
+    load(points.z + i, z);
+    load(points.inverse_sigma + i, inverse_sigma);
+    load(points.deviation + i, before);
+    const Lanes fitted = c[0] + x * (c[1] + c[3] * x + c[4] * y) + y * (c[2] + c[5] * y);
+    const Lanes deviation = (z - fitted) * inverse_sigma;
+    store(deviation, points.deviation + i);
+    const Lanes change = deviation - before;
+    most = change > most ? change : most;
+    most = -change > most ? -change : most;
+  }
+  float largest = 0;
+  for (int lane = 0; lane < kLanes; ++lane) largest = std::max(largest, most[lane]);
+  return largest;
+}
+
+Matrix6f normal_matrix(const std::array<float, 15>& s) {
+  Matrix6f N;
   N << s[0], s[1], s[2], s[3], s[4], s[5],    //
       s[1], s[3], s[4], s[6], s[7], s[8],     //
       s[2], s[4], s[5], s[7], s[8], s[9],     //
       s[3], s[6], s[7], s[10], s[11], s[12],  //
       s[4], s[7], s[8], s[11], s[12], s[13],  //
       s[5], s[8], s[9], s[12], s[13], s[14];
+  return N;
 }
 
 }  // namespace
@@ -86,108 +141,166 @@ Vector2f SurfacePatch::gradient(const Vector2f& at) const {
          Vector2f(c[1] + 2 * c[3] * d.x() + c[4] * d.y(), c[2] + c[4] * d.x() + 2 * c[5] * d.y());
 }
 
-/// Points around a pixel as columns, padded by points without weight to full registers.
+/// Points around a pixel.
 struct LocalSurface::Neighborhood {
-  std::vector<float> x, y, z, sigma, near, weight, deviation, scratch;
+  std::vector<float> x, y, z, inverse_sigma, near, deviation, scratch;
   std::size_t count = 0;
 
   void clear() {
-    for (auto* v : {&x, &y, &z, &sigma, &near}) v->clear();
+    for (auto* v : {&x, &y, &z, &inverse_sigma}) v->clear();
     count = 0;
   }
-  void add(const Vector2f& d, float w, float s) {
+  void add(const Vector2f& d, const Sample& sample) {
     x.push_back(d.x());
     y.push_back(d.y());
-    z.push_back(w);
-    sigma.push_back(s);
-    near.push_back(std::exp(-0.5F * d.squaredNorm()));
+    z.push_back(sample.w);
+    inverse_sigma.push_back(1 / sample.sigma);
     ++count;
   }
   void pad() {
-    while (x.size() % static_cast<std::size_t>(Lanes::SizeAtCompileTime) != 0) {
-      for (auto* v : {&x, &y, &z, &near}) v->push_back(0);
-      sigma.push_back(1);
+    while (x.size() % kLanes != 0) {
+      for (auto* v : {&x, &y, &z, &inverse_sigma}) v->push_back(0);
     }
-    weight.resize(x.size());
+    near.resize(x.size());
     deviation.assign(x.size(), 0.F);
   }
-  [[nodiscard]] float median(const std::vector<float>& values) {
-    scratch.assign(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(count));
+  Columns columns() {
+    return {x.data(),    y.data(),         z.data(), inverse_sigma.data(),
+            near.data(), deviation.data(), x.size()};
+  }
+  /// 1.5 times the median of the absolute deviations, at least 1.
+  [[nodiscard]] float scale_of_deviations() {
+    constexpr float kPerMedian = 1.5F;
+    const auto first = deviation.begin();
+    const auto last = first + static_cast<std::ptrdiff_t>(count);
+    const auto below = std::count_if(first, last,
+                                     [](float v) { return kPerMedian * std::abs(v) <= 1; });
+    if (2 * static_cast<std::size_t>(below) > count) return 1;
+    scratch.assign(first, last);
     for (float& v : scratch) v = std::abs(v);
     const auto middle = scratch.begin() + static_cast<std::ptrdiff_t>(count / 2);
     std::nth_element(scratch.begin(), middle, scratch.end());
-    return *middle;
+    return std::max(1.F, kPerMedian * *middle);
   }
 };
 
-LocalSurface::LocalSurface(const Camera& camera, std::span<const MeasuredPoint> points,
-                           const LocalSurfaceOptions& options)
+namespace {
+
+PENCILSCAN_CLONES void weigh_by_distance(const float* x, const float* y, std::size_t size,
+                                         float* near) {
+  for (std::size_t i = 0; i < size; i += kLanes) {
+    Lanes lx, ly, weight;
+    load(x + i, lx);
+    load(y + i, ly);
+    exponential(-0.5F * (lx * lx + ly * ly), weight);
+    store(weight, near + i);
+  }
+}
+
+/// Pixels of a lattice that every line of pixels, upright, flat or diagonal, meets as often.
+bool is_used(float u, float v, int used_of_seven) {
+  constexpr std::array<int, 7> kOrder = {0, 4, 2, 1, 5, 3, 6};
+  constexpr float kMargin = 1024;  // curves may leave the image a little
+  const auto column = static_cast<unsigned>(std::max(0.F, u + kMargin + 0.5F));
+  const auto row = static_cast<unsigned>(std::max(0.F, v + kMargin + 0.5F));
+  return kOrder[(column + 2 * row) % 7] < used_of_seven;
+}
+
+}  // namespace
+
+LocalSurface::LocalSurface(const Camera& camera, const LocalSurfaceOptions& options)
     : options_(options),
+      center_(camera.center()),
+      forward_(camera.forward()),
+      floor_(static_cast<float>(options.floor_px / camera.K(0, 0))),
       columns_((camera.width + options.step_px - 1) / options.step_px),
       rows_((camera.height + options.step_px - 1) / options.step_px),
       cell_columns_(camera.width / kCell + 1),
-      cell_rows_(camera.height / kCell + 1) {
-  cells_.resize(static_cast<std::size_t>(cell_columns_ * cell_rows_));
-  const Vec3 center = camera.center();
-  const Vec3 forward = camera.forward();
-  const auto floor = static_cast<float>(options.floor_px / camera.K(0, 0));
-  for (std::size_t i = 0; i < points.size(); i += static_cast<std::size_t>(options.thinning)) {
-    const MeasuredPoint& p = points[i];
-    const Vec3 way = Vec3(p.x, p.y, p.z) - center;
-    const int x = std::clamp(static_cast<int>(p.u) / kCell, 0, cell_columns_ - 1);
-    const int y = std::clamp(static_cast<int>(p.v) / kCell, 0, cell_rows_ - 1);
-    cells_[static_cast<std::size_t>(y * cell_columns_ + x)].push_back(
-        {Vector2f(p.u, p.v), static_cast<float>(1 / way.dot(forward)),
-         std::hypot(p.sigma / static_cast<float>(way.norm()), floor)});
+      cell_rows_(camera.height / kCell + 1),
+      cells_(static_cast<std::size_t>(cell_columns_ * cell_rows_)),
+      patches_(static_cast<std::size_t>(columns_ * rows_)),
+      refitted_(patches_.size(), 0) {}
+
+int LocalSurface::cell_column(float x) const {
+  return std::clamp(static_cast<int>(x) / kCell, 0, cell_columns_ - 1);
+}
+
+int LocalSurface::cell_row(float y) const {
+  return std::clamp(static_cast<int>(y) / kCell, 0, cell_rows_ - 1);
+}
+
+void LocalSurface::add(std::span<const MeasuredPoint> points) {
+  for (Cell& cell : cells_) cell.has_news = false;
+  for (const MeasuredPoint& p : points) {
+    if (!is_used(p.u, p.v, options_.used_of_seven)) continue;
+    const Vec3 way = Vec3(p.x, p.y, p.z) - center_;
+    const float relative = p.sigma / static_cast<float>(way.norm());
+    Cell& cell = cells_[static_cast<std::size_t>(cell_row(p.v) * cell_columns_ + cell_column(p.u))];
+    cell.samples.push_back({Vector2f(p.u, p.v), static_cast<float>(1 / way.dot(forward_)),
+                            std::sqrt(relative * relative + floor_ * floor_)});
+    cell.has_news = true;
   }
   Neighborhood around;
-  patches_.resize(static_cast<std::size_t>(columns_ * rows_));
-  const auto step = static_cast<float>(options.step_px);
+  const auto step = static_cast<float>(options_.step_px);
+  const auto reach = static_cast<float>(options_.reach_px);
   for (int y = 0; y < rows_; ++y) {
     for (int x = 0; x < columns_; ++x) {
       const Vector2f pixel((static_cast<float>(x) + 0.5F) * step - 0.5F,
                            (static_cast<float>(y) + 0.5F) * step - 0.5F);
-      SurfacePatch& patch = patches_[static_cast<std::size_t>(y * columns_ + x)];
+      const auto index = static_cast<std::size_t>(y * columns_ + x);
+      refitted_[index] = gather(pixel, reach, around) ? 1 : 0;
+      if (refitted_[index] == 0) continue;
+      patches_[index] = fit(pixel, reach, around);
+      if (patches_[index].exists()) continue;
       // Near a depth step, a smaller neighbourhood may lie on one side of it.
-      for (const float share : {1.F, 0.6F}) {
-        gather(pixel, share * static_cast<float>(options.reach_px), around);
-        patch = fit(pixel, share * static_cast<float>(options.reach_px), around);
-        if (patch.exists()) break;
-      }
+      constexpr float kSmaller = 0.6F;
+      gather(pixel, kSmaller * reach, around);
+      patches_[index] = fit(pixel, kSmaller * reach, around);
     }
   }
+}
+
+std::size_t LocalSurface::patch_index(const Vector2f& pixel) const {
+  const auto step = static_cast<float>(options_.step_px);
+  const int x = std::clamp(static_cast<int>((pixel.x() + 0.5F) / step), 0, columns_ - 1);
+  const int y = std::clamp(static_cast<int>((pixel.y() + 0.5F) / step), 0, rows_ - 1);
+  return static_cast<std::size_t>(y * columns_ + x);
 }
 
 const SurfacePatch* LocalSurface::nearest(const Vector2f& pixel) const {
-  const int x = static_cast<int>((pixel.x() + 0.5F) / static_cast<float>(options_.step_px));
-  const int y = static_cast<int>((pixel.y() + 0.5F) / static_cast<float>(options_.step_px));
-  if (x < 0 || y < 0 || x >= columns_ || y >= rows_) return nullptr;
-  const SurfacePatch& patch = patches_[static_cast<std::size_t>(y * columns_ + x)];
+  const SurfacePatch& patch = patches_[patch_index(pixel)];
   return patch.exists() ? &patch : nullptr;
 }
 
-void LocalSurface::gather(const Vector2f& pixel, float scale, Neighborhood& around) const {
+bool LocalSurface::gather(const Vector2f& pixel, float scale, Neighborhood& around) const {
   around.clear();
   const float reach = 2 * scale;
-  const auto column = [&](float x) {
-    return std::clamp(static_cast<int>(x) / kCell, 0, cell_columns_ - 1);
-  };
-  const auto row = [&](float y) {
-    return std::clamp(static_cast<int>(y) / kCell, 0, cell_rows_ - 1);
-  };
-  for (int y = row(pixel.y() - reach); y <= row(pixel.y() + reach); ++y) {
-    for (int x = column(pixel.x() - reach); x <= column(pixel.x() + reach); ++x) {
-      for (const Sample& s : cells_[static_cast<std::size_t>(y * cell_columns_ + x)]) {
+  const int left = cell_column(pixel.x() - reach);
+  const int right = cell_column(pixel.x() + reach);
+  const int top = cell_row(pixel.y() - reach);
+  const int bottom = cell_row(pixel.y() + reach);
+  bool has_news = false;
+  for (int y = top; y <= bottom; ++y) {
+    for (int x = left; x <= right; ++x)
+      has_news = has_news || cells_[static_cast<std::size_t>(y * cell_columns_ + x)].has_news;
+  }
+  if (!has_news) return false;
+  for (int y = top; y <= bottom; ++y) {
+    for (int x = left; x <= right; ++x) {
+      for (const Sample& s : cells_[static_cast<std::size_t>(y * cell_columns_ + x)].samples) {
         const Vector2f d = (s.pixel - pixel) / scale;
-        if (d.squaredNorm() < 4) around.add(d, s.w, s.sigma);
+        if (d.squaredNorm() < 4) around.add(d, s);
       }
     }
   }
-  if (around.count > 0) around.pad();
+  around.pad();
+  weigh_by_distance(around.x.data(), around.y.data(), around.x.size(), around.near.data());
+  return true;
 }
 
 SurfacePatch LocalSurface::fit(const Vector2f& pixel, float scale_px, Neighborhood& around) const {
   constexpr int kIterations = 5;
+  constexpr float kSettled = 0.02F;  // largest change of a deviation after which fitting ends
   constexpr float kTuning = 2;       // deviations beyond so many scales count little
   constexpr float kMaxScale = 1.5F;  // points that agree deviate by their sigma
   SurfacePatch patch;
@@ -195,35 +308,29 @@ SurfacePatch LocalSurface::fit(const Vector2f& pixel, float scale_px, Neighborho
   if (n < static_cast<std::size_t>(options_.min_points)) return {};
   patch.pixel = pixel;
   patch.scale_px = scale_px;
-  const float reference = around.median(around.z);
+  float reference = 0;
+  for (std::size_t i = 0; i < n; ++i) reference += around.z[i] / static_cast<float>(n);
   for (std::size_t i = 0; i < n; ++i) around.z[i] = around.z[i] / reference - 1;
-  const auto curvature = static_cast<float>(options_.curvature);
-  const auto alike = static_cast<float>(options_.alike_points);
-  Matrix6f N;
-  Vector6f b;
+  const float curvature_weight =
+      static_cast<float>(1 / (options_.curvature * options_.curvature));
+  const auto share = static_cast<float>(1 / options_.alike_points);
+  const Columns columns = around.columns();
+  Moments sums;
+  Eigen::LLT<Matrix6f> factor;
   float scale = 1;
   for (int iteration = 0; iteration < kIterations; ++iteration) {
-    for (std::size_t i = 0; i < around.x.size(); ++i) {
-      const float e = around.deviation[i] / (kTuning * scale);
-      const float robust = 1 / (1 + e * e);
-      // First a plane and all points alike, so that one wrong line does not bend it alone.
-      const float near = iteration == 0 ? 1.F : around.near[i];
-      around.weight[i] = near * robust * robust / (alike * around.sigma[i] * around.sigma[i]);
-    }
-    accumulate(around.x.data(), around.y.data(), around.z.data(), around.weight.data(),
-               around.x.size(), N, b);
+    // First a plane and all points alike, so that one wrong line does not bend it alone.
+    const bool first = iteration == 0;
+    sum_moments(columns, !first, 1 / (kTuning * scale), sums);
+    Matrix6f N = share * normal_matrix(sums.of_terms);
     N.diagonal().head<3>().array() += 1e-2F;
-    N.diagonal().tail<3>().array() += iteration == 0 ? 1e12F : 1 / (curvature * curvature);
-    patch.coefficients = N.selfadjointView<Eigen::Lower>().ldlt().solve(b);
-    const Vector6f& c = patch.coefficients;
-    for (std::size_t i = 0; i < n; ++i) {
-      const float x = around.x[i];
-      const float y = around.y[i];
-      const float predicted =
-          c[0] + c[1] * x + c[2] * y + c[3] * x * x + c[4] * x * y + c[5] * y * y;
-      around.deviation[i] = (around.z[i] - predicted) / around.sigma[i];
-    }
-    scale = std::max(1.F, 1.5F * around.median(around.deviation));
+    N.diagonal().tail<3>().array() += first ? 1e12F : curvature_weight;
+    factor.compute(N);
+    patch.coefficients = factor.solve(share * Vector6f(sums.of_z.data()));
+    const float change = update_deviations(patch.coefficients.data(), columns);
+    const float before = scale;
+    scale = around.scale_of_deviations();
+    if (!first && change < kSettled && scale == before) break;
   }
   float agreeing = 0;
   float chi2 = 0;
@@ -243,8 +350,7 @@ SurfacePatch LocalSurface::fit(const Vector2f& pixel, float scale_px, Neighborho
   patch.reference = reference;
   patch.spread = std::sqrt(chi2 / agreeing);
   patch.one_sidedness = mean.norm() / agreeing;
-  const Vector6f center = Vector6f::Unit(0);
-  const float variance = N.selfadjointView<Eigen::Lower>().ldlt().solve(center)[0];
+  const float variance = factor.solve(Vector6f::Unit(0))[0];
   patch.sigma = std::sqrt(std::max(0.F, variance)) * std::max(1.F, patch.spread);
   return patch;
 }

@@ -13,10 +13,10 @@ namespace pencilscan {
 struct LocalSurfaceOptions {
   double reach_px = 6;         ///< standard deviation of the weight of points around; > 0
   int step_px = 6;             ///< between patches; >= 1
-  int thinning = 3;            ///< every how many points are used: neighbours are alike; >= 1
+  int used_of_seven = 2;       ///< pixels of seven whose points are used: neighbours are alike
   double floor_px = 0.1;       ///< error that every point has: depth in pixel footprints
   double curvature = 4e-3;     ///< prior deviation of quadratic terms, relative depth per reach^2
-  double alike_points = 2;     ///< thinned neighbours on a curve that share one error
+  double alike_points = 1.7;   ///< thinned neighbours on a curve that share one error
   int min_points = 4;          ///< that agree
   double min_agreement = 0.6;  ///< share of the points within twice the reach
 };
@@ -40,16 +40,21 @@ struct SurfacePatch {
 
 /// The surface that the labelled points of one camera show: patches on a lattice of its pixels,
 /// each fitted robustly to the points of all projectors around it. There is no patch where too few
-/// points agree on one surface.
+/// points agree on one surface. Grows with the points that are added.
 class LocalSurface {
  public:
-  /// `points` of this camera only.
-  LocalSurface(const Camera& camera, std::span<const MeasuredPoint> points,
-               const LocalSurfaceOptions& options = {});
+  explicit LocalSurface(const Camera& camera, const LocalSurfaceOptions& options = {});
+
+  /// Adds points of this camera and fits the patches that they change.
+  void add(std::span<const MeasuredPoint> points);
 
   /// The patch nearest to a pixel; nullptr: none.
   [[nodiscard]] const SurfacePatch* nearest(const Eigen::Vector2f& pixel) const;
   [[nodiscard]] std::span<const SurfacePatch> patches() const { return patches_; }
+  /// Per patch, 1 where the last add() fitted it, 0 where it was left as it was.
+  [[nodiscard]] std::span<const char> refitted() const { return refitted_; }
+  /// Index in patches() of the patch nearest to a pixel of the image.
+  [[nodiscard]] std::size_t patch_index(const Eigen::Vector2f& pixel) const;
   [[nodiscard]] int step_px() const { return options_.step_px; }
 
  private:
@@ -58,20 +63,31 @@ class LocalSurface {
     float w;      ///< inverse depth
     float sigma;  ///< relative
   };
+  struct Cell {
+    std::vector<Sample> samples;
+    bool has_news = false;  ///< of the last add()
+  };
   struct Neighborhood;
   static constexpr int kCell = 8;
 
-  void gather(const Eigen::Vector2f& pixel, float scale_px, Neighborhood& around) const;
+  /// Collects the samples around a pixel; false if none of their cells has news.
+  bool gather(const Eigen::Vector2f& pixel, float scale_px, Neighborhood& around) const;
   [[nodiscard]] SurfacePatch fit(const Eigen::Vector2f& pixel, float scale_px,
                                  Neighborhood& around) const;
+  [[nodiscard]] int cell_column(float x) const;
+  [[nodiscard]] int cell_row(float y) const;
 
   LocalSurfaceOptions options_;
-  int columns_ = 0;
-  int rows_ = 0;
-  int cell_columns_ = 0;
-  int cell_rows_ = 0;
-  std::vector<std::vector<Sample>> cells_;
+  Vec3 center_;
+  Vec3 forward_;
+  float floor_;  ///< least relative sigma
+  int columns_;
+  int rows_;
+  int cell_columns_;
+  int cell_rows_;
+  std::vector<Cell> cells_;
   std::vector<SurfacePatch> patches_;  ///< row by row
+  std::vector<char> refitted_;
 };
 
 }  // namespace pencilscan

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include "pencilscan/detection/color_family.h"
@@ -15,19 +16,20 @@ struct PredictedPoint {
   Eigen::Vector2f normal = Eigen::Vector2f::UnitX();   ///< across the line
   float spacing_px = 0;                                ///< of the pattern's lines here
   float sigma_px = 0;                                  ///< across the line
+  std::size_t patch = 0;                               ///< of the surface, that says so
 };
 
 struct PredictionOptions {
   double min_spacing_px = 2.6;      ///< denser lines cannot be told apart
-  double max_sigma_lines = 0.15;    ///< of the prediction
+  double max_sigma_lines = 0.2;     ///< of the prediction
   double min_incidence_cos = 0.17;  ///< to the projector
 };
 
-/// One point per image row (column for lines flatter than 45 degrees) of every line of a pattern
-/// on the surface. Ordered by patch.
+/// One point per image row (column for lines flatter than 45 degrees) of every line of the patterns
+/// on those patches of the surface that its last add() fitted. Ordered by patch.
 [[nodiscard]] std::vector<PredictedPoint> predict_lines(const Rig& rig, const Camera& camera,
                                                         const LocalSurface& surface,
-                                                        PatternRef pattern,
+                                                        std::span<const PatternRef> patterns,
                                                         const PredictionOptions& options = {});
 
 }  // namespace pencilscan

@@ -78,10 +78,18 @@ class CameraLook {
         graph_(graph),
         runs_(runs),
         tentative_(tentative),
-        options_(options) {}
+        options_(options),
+        surface_(camera_, options.surface) {
+    for (const ColorFamily& family : families) {
+      for (const PatternRef& ref : family.patterns) {
+        if (can_see_pattern(rig, camera_, ref.projector)) patterns_.push_back(ref);
+      }
+    }
+  }
 
-  /// Predicts all lines; keeps those that no labelled point shows.
-  void predict(const Labeling& labeling);
+  /// Predicts all lines on the surface of what is labelled; keeps those that no labelled point
+  /// shows.
+  void predict();
   /// Confirms tentative labels where the predicted line is the same.
   void confirm_tentative();
   /// Gives undecided stretches of curves the predicted line they lie on.
@@ -104,6 +112,7 @@ class CameraLook {
   [[nodiscard]] bool lies_on(const CurvePoint& point, const LineName& name) const;
   [[nodiscard]] std::vector<std::vector<char>> decided_points() const;
   [[nodiscard]] int family_of(PatternRef ref) const;
+  [[nodiscard]] std::vector<MeasuredPoint> newly_labeled_points();
   void sort_runs();
 
   const Rig& rig_;
@@ -113,6 +122,10 @@ class CameraLook {
   std::vector<LabeledRun>& runs_;
   std::span<const LabeledRun> tentative_;
   const SecondLookOptions& options_;
+  std::vector<PatternRef> patterns_;  ///< that the camera can see
+  LocalSurface surface_;
+  std::vector<LabeledRun> triangulated_;  ///< whose points the surface holds
+  std::vector<PredictedPoint> predicted_;
   std::optional<Places<KnownPoint>> known_;
   std::vector<PredictedPoint> missing_;
   std::optional<Places<PredictedPoint>> missing_places_;
@@ -127,11 +140,11 @@ int CameraLook::family_of(PatternRef ref) const {
   return -1;
 }
 
-void CameraLook::sort_runs() {
-  std::sort(runs_.begin(), runs_.end(), [](const LabeledRun& a, const LabeledRun& b) {
-    return std::tie(a.curve, a.begin) < std::tie(b.curve, b.begin);
-  });
+bool is_before(const LabeledRun& a, const LabeledRun& b) {
+  return std::tie(a.curve, a.begin) < std::tie(b.curve, b.begin);
 }
+
+void CameraLook::sort_runs() { std::sort(runs_.begin(), runs_.end(), is_before); }
 
 void CameraLook::index_known_points() {
   known_.emplace(camera_.width, camera_.height);
@@ -154,23 +167,30 @@ bool CameraLook::is_known(const PredictedPoint& p) const {
   return found;
 }
 
-void CameraLook::predict(const Labeling& labeling) {
-  const std::vector<MeasuredPoint> points = triangulate(rig_, {&graph_, 1}, labeling);
-  const LocalSurface surface(camera_, points, options_.surface);
+void CameraLook::predict() {
+  surface_.add(newly_labeled_points());
+  std::erase_if(predicted_,
+                [&](const PredictedPoint& p) { return surface_.refitted()[p.patch] != 0; });
+  const auto news = predict_lines(rig_, camera_, surface_, patterns_, options_.prediction);
+  predicted_.insert(predicted_.end(), news.begin(), news.end());
   index_known_points();
   missing_.clear();
   missing_places_.emplace(camera_.width, camera_.height);
-  for (const ColorFamily& family : families_) {
-    for (const PatternRef& ref : family.patterns) {
-      if (!can_see_pattern(rig_, camera_, ref.projector)) continue;
-      for (const PredictedPoint& p :
-           predict_lines(rig_, camera_, surface, ref, options_.prediction)) {
-        if (is_known(p)) continue;
-        missing_.push_back(p);
-        missing_places_->add(p.position, p);
-      }
-    }
+  for (const PredictedPoint& p : predicted_) {
+    if (is_known(p)) continue;
+    missing_.push_back(p);
+    missing_places_->add(p.position, p);
   }
+}
+
+std::vector<MeasuredPoint> CameraLook::newly_labeled_points() {
+  Labeling labeling;
+  labeling.runs.resize(rig_.cameras.size());
+  auto& runs = labeling.runs[static_cast<std::size_t>(graph_.camera)];
+  std::set_difference(runs_.begin(), runs_.end(), triangulated_.begin(), triangulated_.end(),
+                      std::back_inserter(runs), is_before);
+  triangulated_ = runs_;
+  return triangulate(rig_, {&graph_, 1}, labeling);
 }
 
 std::optional<LineName> CameraLook::line_at(const CurvePoint& point, int family,
@@ -328,6 +348,8 @@ std::vector<Curve> CameraLook::chains_of_missing(std::vector<LineName>& names) c
         std::reverse(chain.begin(), chain.end());
       }
       if (static_cast<int>(chain.size()) < options_.min_points) continue;
+      const auto is_new = [&](const PredictedPoint* p) { return surface_.refitted()[p->patch] != 0; };
+      if (std::none_of(chain.begin(), chain.end(), is_new)) continue;
       const PatternRef ref = chain[0]->pattern;
       const LinePattern& pattern = rig_.projectors[static_cast<std::size_t>(ref.projector)]
                                        .patterns[static_cast<std::size_t>(ref.pattern)];
@@ -427,7 +449,7 @@ void second_look(const Rig& rig, const std::vector<ColorFamily>& families,
                     labeling.runs[static_cast<std::size_t>(graphs[g].camera)],
                     labeling.tentative[static_cast<std::size_t>(graphs[g].camera)], options);
     for (int pass = 0; pass < options.passes; ++pass) {
-      look.predict(labeling);
+      look.predict();
       look.confirm_tentative();
       look.adopt_curves();
       if (!presence[g].empty()) look.find_missing(presence[g]);

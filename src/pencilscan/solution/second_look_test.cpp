@@ -87,7 +87,8 @@ class LabeledScene : public testing::Test, protected TwoProjectorScene {
 };
 
 TEST_F(LabeledScene, LocalSurfaceIsTheTrueOneWithinItsSigma) {
-  const LocalSurface surface(camera(), points());
+  LocalSurface surface(camera());
+  surface.add(points());
   int patches = 0;
   int within = 0;
   for (const SurfacePatch& patch : surface.patches()) {
@@ -103,10 +104,11 @@ TEST_F(LabeledScene, LocalSurfaceIsTheTrueOneWithinItsSigma) {
 }
 
 TEST_F(LabeledScene, PredictedLinesAreWhereTheCurvesAre) {
-  const LocalSurface surface(camera(), points());
+  LocalSurface surface(camera());
+  surface.add(points());
   for (int p = 0; p < 2; ++p) {
     std::vector<std::pair<int, Eigen::Vector2f>> predicted;
-    for (const PredictedPoint& point : predict_lines(rig, camera(), surface, {p, 0}))
+    for (const PredictedPoint& point : predict_lines(rig, camera(), surface, std::array{PatternRef{p, 0}}))
       predicted.emplace_back(point.line, point.position);
     std::size_t found = 0;
     std::size_t all = 0;

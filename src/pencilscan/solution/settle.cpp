@@ -78,7 +78,8 @@ std::vector<MeasuredPoint> settle_points(const Rig& rig, std::span<const Measure
   for (const MeasuredPoint& p : points) by_camera[p.camera].push_back(p);
   parallel_for(by_camera.size(), [&](std::size_t c) {
     const Camera& camera = rig.cameras[c];
-    const LocalSurface surface(camera, by_camera[c], options.surface);
+    LocalSurface surface(camera, options.surface);
+    surface.add(by_camera[c]);
     const Vec3 center = camera.center();
     const Vec3 forward = camera.forward();
     std::vector<MeasuredPoint> kept;
