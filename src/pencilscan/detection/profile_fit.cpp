@@ -220,13 +220,13 @@ PENCILSCAN_INLINE void odd_variance(const std::array<Lanes, kProfileSize>& measu
 
 }  // namespace
 
-PENCILSCAN_CLONES
 float line_profile_width(float line_px) {
   const float half = 0.5F * line_px;
   return std::clamp(std::sqrt((half * half + kPi2 * kEdge * kEdge) / 3), kMinLineWidth,
                     kMaxLineWidth);
 }
 
+PENCILSCAN_CLONES
 void line_profile(float width, std::array<float, 2 * kLanes>& values) {
   const LineShape<float> shape = make_shape(width);
   const float reach2 = (kModelReach * width) * (kModelReach * width);

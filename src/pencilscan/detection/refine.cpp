@@ -53,8 +53,7 @@ void sample_across(const cv::Mat& image, const CurvePoint& point, Profile& profi
     gather(data + row + 1, at, corner[3]);
     const Lanes value =
         (1 - y) * ((1 - x) * corner[0] + x * corner[1]) + y * ((1 - x) * corner[2] + x * corner[3]);
-    for (int k = 0; k < kLanes; ++k)
-      profile[static_cast<std::size_t>(block * kLanes + k)] = value[k];
+    store(value, profile.data() + block * kLanes);
   }
 }
 
@@ -199,9 +198,10 @@ void cut_and_trim(const Curve& curve, const RefineOptions& options, std::vector<
   finish(points.size());
 }
 
-/// Adds the profile between two points. Every image row (column for flat pieces) that the segment
-/// passes gets it once: the half-open range [from, to) makes neighbouring segments share no row.
-void render_segment(const CurvePoint& p, const CurvePoint& q, cv::Mat& model) {
+/// Adds `sign` times the profile between two points. Every image row (column for flat pieces) that
+/// the segment passes gets it once: the half-open range [from, to) makes neighbouring segments
+/// share no row.
+void render_segment(const CurvePoint& p, const CurvePoint& q, float sign, cv::Mat& model) {
   if (p.amplitude <= 0 || q.amplitude <= 0) return;
   const Vector2f way = q.position - p.position;
   const Eigen::Index major = std::abs(p.normal.y()) < std::abs(p.normal.x()) ? 1 : 0;
@@ -215,7 +215,7 @@ void render_segment(const CurvePoint& p, const CurvePoint& q, cv::Mat& model) {
        m <= last_major && static_cast<float>(m) < to; ++m) {
     const float f = (static_cast<float>(m) - p.position[major]) / way[major];
     const float center = p.position[minor] + f * way[minor];
-    const float amplitude = p.amplitude + f * (q.amplitude - p.amplitude);
+    const float amplitude = sign * (p.amplitude + f * (q.amplitude - p.amplitude));
     const float width = p.width_px + f * (q.width_px - p.width_px);
     const float lean = std::abs(p.normal[minor]);
     const float reach = kModelReach * width / lean;
@@ -237,6 +237,15 @@ CurvePoint beyond(const CurvePoint& end, const CurvePoint& inner) {
   return point;
 }
 
+void render_curve(const Curve& curve, float sign, cv::Mat& model) {
+  const std::size_t n = curve.points.size();
+  if (n < 2) return;
+  const auto& points = curve.points;
+  render_segment(beyond(points[0], points[1]), points[0], sign, model);
+  for (std::size_t i = 0; i + 1 < n; ++i) render_segment(points[i], points[i + 1], sign, model);
+  render_segment(points[n - 1], beyond(points[n - 1], points[n - 2]), sign, model);
+}
+
 }  // namespace
 
 float sample_bilinear(const cv::Mat& image, float x, float y) {
@@ -253,24 +262,21 @@ float sample_bilinear(const cv::Mat& image, float x, float y) {
 
 cv::Mat render_curves(const std::vector<Curve>& curves, cv::Size size) {
   cv::Mat model(size, CV_32F, cv::Scalar(0));
-  for (const Curve& curve : curves) {
-    const std::size_t n = curve.points.size();
-    if (n < 2) continue;
-    render_segment(beyond(curve.points[0], curve.points[1]), curve.points[0], model);
-    for (std::size_t i = 0; i + 1 < n; ++i) {
-      render_segment(curve.points[i], curve.points[i + 1], model);
-    }
-    render_segment(curve.points[n - 1], beyond(curve.points[n - 1], curve.points[n - 2]), model);
-  }
+  for (const Curve& curve : curves) render_curve(curve, 1, model);
   return model;
 }
+
+void subtract_curve(const Curve& curve, cv::Mat& image) { render_curve(curve, -1, image); }
 
 std::vector<Curve> refine_curves(const cv::Mat& presence, std::vector<Curve> curves,
                                  const RefineOptions& options) {
   for (int round = 0; round < options.rounds; ++round) {
     for (Curve& curve : curves) smooth_positions(curve.points);
-    const cv::Mat residual =
-        round > 0 ? cv::Mat(presence - render_curves(curves, presence.size())) : presence;
+    cv::Mat residual = presence;
+    if (round > 0) {
+      residual = presence.clone();
+      for (const Curve& curve : curves) subtract_curve(curve, residual);
+    }
     for (Curve& curve : curves) {
       fit_curve(residual, round == 0, options.half_arc, curve);
       smooth_widths(curve.points);
@@ -282,19 +288,14 @@ std::vector<Curve> refine_curves(const cv::Mat& presence, std::vector<Curve> cur
   return curves;
 }
 
-std::vector<GuidedCurve> fit_guesses(const cv::Mat& presence, const std::vector<Curve>& known,
-                                     std::vector<Curve> guesses, const RefineOptions& options) {
-  const cv::Mat unexplained = presence - render_curves(known, presence.size());
-  std::vector<GuidedCurve> found;
-  for (std::size_t i = 0; i < guesses.size(); ++i) {
-    // Once only: between lines this dense, a second fit to the others' residual moves away.
-    fit_curve(unexplained, true, options.half_arc, guesses[i]);
-    smooth_widths(guesses[i].points);
-    std::vector<Curve> pieces;
-    cut_and_trim(guesses[i], options, pieces);
-    for (Curve& piece : pieces) found.push_back({static_cast<int>(i), std::move(piece)});
-  }
-  return found;
+std::vector<Curve> fit_guess(const cv::Mat& unexplained, Curve guess,
+                             const RefineOptions& options) {
+  // Once only: between lines this dense, a second fit to the others' residual moves away.
+  fit_curve(unexplained, true, options.half_arc, guess);
+  smooth_widths(guess.points);
+  std::vector<Curve> pieces;
+  cut_and_trim(guess, options, pieces);
+  return pieces;
 }
 
 }  // namespace pencilscan

@@ -24,21 +24,16 @@ struct RefineOptions {
 [[nodiscard]] std::vector<Curve> refine_curves(const cv::Mat& presence, std::vector<Curve> curves,
                                                const RefineOptions& options = {});
 
-/// A curve that was looked for.
-struct GuidedCurve {
-  int guess = 0;  ///< which of the guesses it comes from
-  Curve curve;
-};
-
-/// Fits curves whose place, direction and width are roughly known (amplitude 0) to what the `known`
-/// curves leave of the image. A guess may give several pieces or none.
-[[nodiscard]] std::vector<GuidedCurve> fit_guesses(const cv::Mat& presence,
-                                                   const std::vector<Curve>& known,
-                                                   std::vector<Curve> guesses,
-                                                   const RefineOptions& options = {});
+/// Fits a curve whose place, direction and width are roughly known (amplitude 0) to an image from
+/// which all known curves were subtracted. Gives several pieces or none.
+[[nodiscard]] std::vector<Curve> fit_guess(const cv::Mat& unexplained, Curve guess,
+                                           const RefineOptions& options = {});
 
 /// Sum of the profiles of all curves, CV_32FC1.
 [[nodiscard]] cv::Mat render_curves(const std::vector<Curve>& curves, cv::Size size);
+
+/// Takes the profile of a curve from a CV_32FC1 image.
+void subtract_curve(const Curve& curve, cv::Mat& image);
 
 /// Bilinear sample; outside, the nearest pixel's value.
 [[nodiscard]] float sample_bilinear(const cv::Mat& image, float x, float y);

@@ -130,27 +130,26 @@ PointResult measure_points(const Rig& rig, const Frame& frame, const PointOption
   Stopwatch solution_watch;
   result.labeling = solve(rig, result.families, result.graphs, options.solution);
   result.times.push_back({"solution", solution_watch.seconds()});
-  if (options.solution.method == Method::kJoint) {
+  const bool is_joint = options.solution.method == Method::kJoint;
+  std::vector<LocalSurface> surfaces;
+  if (is_joint) {
     const auto tracks = crossing_tracks(rig, result.graphs, result.labeling);
     result.crossings = crossing_disagreement(rig, tracks);
     if (disagrees(result.crossings))
       result.warnings.push_back(disagreement_warning(result.crossings));
-  }
 
-  if (options.solution.method == Method::kJoint) {
     Stopwatch second_look_watch;
     std::vector<std::vector<cv::Mat>> presence;
     for (CameraDetection& detection : result.detections)
       presence.push_back(std::move(detection.presence));
-    second_look(rig, result.families, presence, result.graphs, result.labeling,
-                options.second_look);
+    surfaces = second_look(rig, result.families, presence, result.graphs, result.labeling,
+                           options.second_look);
     result.times.push_back({"second look", second_look_watch.seconds()});
   }
 
   Stopwatch triangulation_watch;
   result.points = triangulate(rig, result.graphs, result.labeling, options.triangulation);
-  if (options.solution.method == Method::kJoint)
-    result.points = settle_points(rig, result.points, options.settle);
+  if (is_joint) result.points = settle_points(rig, result.points, surfaces, options.settle);
   result.times.push_back({"triangulation", triangulation_watch.seconds()});
   return result;
 }

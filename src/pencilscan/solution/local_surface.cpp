@@ -117,6 +117,19 @@ PENCILSCAN_CLONES float update_deviations(const float* c, const Columns& points)
   return largest;
 }
 
+/// Number of deviations of at most `limit`; those of padding, 0, count too.
+PENCILSCAN_CLONES std::size_t count_within(const float* deviation, std::size_t size, float limit) {
+  IntLanes counts = {};
+  for (std::size_t i = 0; i < size; i += kLanes) {
+    Lanes d;
+    load(deviation + i, d);
+    counts -= (d <= limit) & (d >= -limit);
+  }
+  std::size_t count = 0;
+  for (int lane = 0; lane < kLanes; ++lane) count += static_cast<std::size_t>(counts[lane]);
+  return count;
+}
+
 Matrix6f normal_matrix(const std::array<float, 15>& s) {
   Matrix6f N;
   N << s[0], s[1], s[2], s[3], s[4], s[5],    //
@@ -143,7 +156,7 @@ Vector2f SurfacePatch::gradient(const Vector2f& at) const {
 
 /// Points around a pixel.
 struct LocalSurface::Neighborhood {
-  std::vector<float> x, y, z, inverse_sigma, near, deviation, scratch;
+  std::vector<float> x, y, z, inverse_sigma, near, deviation;
   std::size_t count = 0;
 
   void clear() {
@@ -168,19 +181,18 @@ struct LocalSurface::Neighborhood {
     return {x.data(),    y.data(),         z.data(), inverse_sigma.data(),
             near.data(), deviation.data(), x.size()};
   }
-  /// 1.5 times the median of the absolute deviations, at least 1.
-  [[nodiscard]] float scale_of_deviations() {
+  /// 1.5 times the median of the absolute deviations, at least 1, on a scale of steps of a quarter.
+  [[nodiscard]] float scale_of_deviations() const {
     constexpr float kPerMedian = 1.5F;
-    const auto first = deviation.begin();
-    const auto last = first + static_cast<std::ptrdiff_t>(count);
-    const auto below = std::count_if(first, last,
-                                     [](float v) { return kPerMedian * std::abs(v) <= 1; });
-    if (2 * static_cast<std::size_t>(below) > count) return 1;
-    scratch.assign(first, last);
-    for (float& v : scratch) v = std::abs(v);
-    const auto middle = scratch.begin() + static_cast<std::ptrdiff_t>(count / 2);
-    std::nth_element(scratch.begin(), middle, scratch.end());
-    return std::max(1.F, kPerMedian * *middle);
+    constexpr float kStep = 1.25F;
+    constexpr float kMost = 1e6F;
+    float scale = 1;
+    const std::size_t padding = deviation.size() - count;
+    const auto agreeing = [&] {
+      return count_within(deviation.data(), deviation.size(), scale / kPerMedian) - padding;
+    };
+    while (2 * agreeing() <= count && scale < kMost) scale *= kStep;
+    return scale;
   }
 };
 
@@ -311,8 +323,7 @@ SurfacePatch LocalSurface::fit(const Vector2f& pixel, float scale_px, Neighborho
   float reference = 0;
   for (std::size_t i = 0; i < n; ++i) reference += around.z[i] / static_cast<float>(n);
   for (std::size_t i = 0; i < n; ++i) around.z[i] = around.z[i] / reference - 1;
-  const float curvature_weight =
-      static_cast<float>(1 / (options_.curvature * options_.curvature));
+  const float curvature_weight = static_cast<float>(1 / (options_.curvature * options_.curvature));
   const auto share = static_cast<float>(1 / options_.alike_points);
   const Columns columns = around.columns();
   Moments sums;

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <set>
 
+#include "pencilscan/solution/places.h"
+
 namespace pencilscan {
 namespace {
 
@@ -27,21 +29,14 @@ bool lacks_crossings(const PieceGraph& graph) {
 
 std::vector<NextPiece> next_pieces(const Camera& camera, const GridGraph& graph,
                                    const PieceGraph& pieces) {
-  const int columns = camera.width / kCell + 1;
-  const int rows = camera.height / kCell + 1;
-  std::vector<std::vector<Place>> cells(static_cast<std::size_t>(columns * rows));
-  const auto column = [&](float x) {
-    return std::clamp(static_cast<int>(x) / kCell, 0, columns - 1);
-  };
-  const auto row = [&](float y) { return std::clamp(static_cast<int>(y) / kCell, 0, rows - 1); };
+  Places<Place> places(camera.width, camera.height, kCell);
   for (std::size_t p = 0; p < pieces.pieces.size(); ++p) {
     const CurvePiece& piece = pieces.pieces[p];
     for (int i = piece.begin; i < piece.end; ++i) {
       const CurvePoint& point =
           graph.curves[static_cast<std::size_t>(piece.curve)].points[static_cast<std::size_t>(i)];
-      cells[static_cast<std::size_t>(row(point.position.y()) * columns +
-                                     column(point.position.x()))]
-          .push_back({point.position, point.tangent(), piece.curve, static_cast<int>(p)});
+      places.add(point.position,
+                 {point.position, point.tangent(), piece.curve, static_cast<int>(p)});
     }
   }
   std::vector<NextPiece> result;
@@ -57,20 +52,16 @@ std::vector<NextPiece> next_pieces(const Camera& camera, const GridGraph& graph,
       float nearest = kReachPx;
       const Place* found = nullptr;
       const Vector2f& at = middle.position;
-      for (int y = row(at.y() - kReachPx); y <= row(at.y() + kReachPx); ++y) {
-        for (int x = column(at.x() - kReachPx); x <= column(at.x() + kReachPx); ++x) {
-          for (const Place& place : cells[static_cast<std::size_t>(y * columns + x)]) {
-            const Vector2f way = place.pixel - at;
-            const float across = side * way.dot(normal);
-            if (across < 1.5F || across >= nearest || std::abs(way.dot(tangent)) > 1) continue;
-            if (place.curve == piece.curve || std::abs(place.tangent.dot(tangent)) < 0.85F ||
-                graph.curves[static_cast<std::size_t>(place.curve)].family != curve.family)
-              continue;
-            nearest = across;
-            found = &place;
-          }
-        }
-      }
+      places.around(at, kReachPx, [&](const Place& place) {
+        const Vector2f way = place.pixel - at;
+        const float across = side * way.dot(normal);
+        if (across < 1.5F || across >= nearest || std::abs(way.dot(tangent)) > 1) return;
+        if (place.curve == piece.curve || std::abs(place.tangent.dot(tangent)) < 0.85F ||
+            graph.curves[static_cast<std::size_t>(place.curve)].family != curve.family)
+          return;
+        nearest = across;
+        found = &place;
+      });
       if (found == nullptr) continue;
       const int a = static_cast<int>(p);
       if (!seen.insert(std::minmax(a, found->piece)).second) continue;

@@ -53,8 +53,8 @@ struct TangentPlane {
 /// Line coordinate of a pattern around a pixel: (line . h) / h_z with h = ray + w * translation,
 /// the ray turned into the projector's frame. The same for the coordinate along the lines.
 struct LocalCoordinate {
-  Vector3f ray;        ///< through the pixel
-  Vector3f ray_x;      ///< change of the ray per pixel
+  Vector3f ray;    ///< through the pixel
+  Vector3f ray_x;  ///< change of the ray per pixel
   Vector3f ray_y;
   Vector3f translation;
   Vector3f line;
@@ -112,8 +112,8 @@ class PatternOnSurface {
       return (projector_.K.row(row).head<2>() * distorted).transpose() +
              projector_.K(row, 2) * Vec3::UnitZ();
     };
-    local.line = ((panel(axis) - pattern_.offset_px * Vec3::UnitZ()) / pattern_.pitch_px)
-                     .cast<float>();
+    local.line =
+        ((panel(axis) - pattern_.offset_px * Vec3::UnitZ()) / pattern_.pitch_px).cast<float>();
     local.along = panel(1 - axis).cast<float>();
     return local;
   }

@@ -32,10 +32,12 @@ struct SecondLookOptions {
 /// projectors are predicted on the surface around the labelled points; undecided stretches of
 /// curves that lie on a predicted line which nothing shows yet get its label, and where there is no
 /// curve, the line is fitted to what the known curves leave of the image. New curves are appended
-/// to the graphs, new runs to the labelling.
+/// to the graphs, new runs to the labelling. Returns the surface that all labelled points show, per
+/// graph.
 /// `presence`: per graph and colour family the presence image, CV_32FC1, of the whole camera image.
-void second_look(const Rig& rig, const std::vector<ColorFamily>& families,
-                 std::span<const std::vector<cv::Mat>> presence, std::span<GridGraph> graphs,
-                 Labeling& labeling, const SecondLookOptions& options = {});
+std::vector<LocalSurface> second_look(const Rig& rig, const std::vector<ColorFamily>& families,
+                                      std::span<const std::vector<cv::Mat>> presence,
+                                      std::span<GridGraph> graphs, Labeling& labeling,
+                                      const SecondLookOptions& options = {});
 
 }  // namespace pencilscan

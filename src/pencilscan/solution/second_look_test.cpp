@@ -108,7 +108,8 @@ TEST_F(LabeledScene, PredictedLinesAreWhereTheCurvesAre) {
   surface.add(points());
   for (int p = 0; p < 2; ++p) {
     std::vector<std::pair<int, Eigen::Vector2f>> predicted;
-    for (const PredictedPoint& point : predict_lines(rig, camera(), surface, std::array{PatternRef{p, 0}}))
+    for (const PredictedPoint& point :
+         predict_lines(rig, camera(), surface, std::array{PatternRef{p, 0}}))
       predicted.emplace_back(point.line, point.position);
     std::size_t found = 0;
     std::size_t all = 0;
@@ -215,7 +216,9 @@ TEST_F(LabeledScene, MissedLineIsFoundInTheImageWhereItIsAndNotWhereItIsDark) {
 
 TEST_F(LabeledScene, SettledPointsAreCloserToTheSurface) {
   const std::vector<MeasuredPoint> before = points();
-  const std::vector<MeasuredPoint> after = settle_points(rig, before);
+  LocalSurface surface(camera());
+  surface.add(before);
+  const std::vector<MeasuredPoint> after = settle_points(rig, before, {&surface, 1});
   const auto rms = [&](const std::vector<MeasuredPoint>& list) {
     double sum = 0;
     for (const MeasuredPoint& p : list) {
@@ -252,7 +255,9 @@ TEST_F(LabeledScene, SettlingDropsAStretchOfAWrongLine) {
   piece.label.plane += 8;
   runs.insert(run + 1, {piece, rest});
   const std::vector<MeasuredPoint> before = points();
-  const std::vector<MeasuredPoint> after = settle_points(rig, before);
+  LocalSurface surface(camera());
+  surface.add(before);
+  const std::vector<MeasuredPoint> after = settle_points(rig, before, {&surface, 1});
   std::set<std::pair<float, float>> places;
   for (int i = piece.begin; i < piece.end; ++i) {
     const auto& p = graph_.curves[curve].points[static_cast<std::size_t>(i)].position;

@@ -73,18 +73,17 @@ std::optional<MeasuredPoint> settled(const MeasuredPoint& point, const LocalSurf
 }  // namespace
 
 std::vector<MeasuredPoint> settle_points(const Rig& rig, std::span<const MeasuredPoint> points,
+                                         std::span<const LocalSurface> surfaces,
                                          const SettleOptions& options) {
   std::vector<std::vector<MeasuredPoint>> by_camera(rig.cameras.size());
   for (const MeasuredPoint& p : points) by_camera[p.camera].push_back(p);
   parallel_for(by_camera.size(), [&](std::size_t c) {
     const Camera& camera = rig.cameras[c];
-    LocalSurface surface(camera, options.surface);
-    surface.add(by_camera[c]);
     const Vec3 center = camera.center();
     const Vec3 forward = camera.forward();
     std::vector<MeasuredPoint> kept;
     for (const MeasuredPoint& p : by_camera[c]) {
-      if (const auto point = settled(p, surface, camera, center, forward, options))
+      if (const auto point = settled(p, surfaces[c], camera, center, forward, options))
         kept.push_back(*point);
     }
     by_camera[c] = std::move(kept);

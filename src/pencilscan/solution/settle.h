@@ -9,7 +9,6 @@
 namespace pencilscan {
 
 struct SettleOptions {
-  LocalSurfaceOptions surface;
   double model_px = 0.05;  ///< what a quadratic patch misses: depth in pixel footprints, at tilt 0
   double max_deviations = 6;            ///< from the surface around, in standard deviations; > 0
   double min_alone_confidence = 0.995;  ///< of a point where nothing around shows one surface
@@ -19,9 +18,10 @@ struct SettleOptions {
 /// and that of the surface which all points around show (LocalSurface), so that a plane seen nearly
 /// edge-on takes its depth from the others. Points that contradict the surface are left out, and
 /// those of little confidence where there is none. Positions stay on their camera rays, sigma
-/// covers what the patch could not follow. Keeps the order.
+/// covers what the patch could not follow. Keeps the order. `surfaces`: of each camera.
 [[nodiscard]] std::vector<MeasuredPoint> settle_points(const Rig& rig,
                                                        std::span<const MeasuredPoint> points,
+                                                       std::span<const LocalSurface> surfaces,
                                                        const SettleOptions& options = {});
 
 }  // namespace pencilscan

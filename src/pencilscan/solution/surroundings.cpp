@@ -6,6 +6,8 @@
 #include <tuple>
 #include <utility>
 
+#include "pencilscan/solution/places.h"
+
 namespace pencilscan {
 namespace {
 
@@ -24,24 +26,17 @@ struct Place {
 Surroundings::Surroundings(const Camera& camera, const GridGraph& graph,
                            const LabelledPieces& pieces)
     : pieces_(pieces) {
-  const int columns = camera.width / kCell + 1;
-  const int rows = camera.height / kCell + 1;
-  std::vector<std::vector<Place>> cells(static_cast<std::size_t>(columns * rows));
+  Places<Place> places(camera.width, camera.height, kCell);
   const auto point = [&](const CurvePiece& piece, int i) -> const Eigen::Vector2f& {
     return graph.curves[static_cast<std::size_t>(piece.curve)]
         .points[static_cast<std::size_t>(i)]
         .position;
   };
-  const auto column = [&](float x) {
-    return std::clamp(static_cast<int>(x) / kCell, 0, columns - 1);
-  };
-  const auto row = [&](float y) { return std::clamp(static_cast<int>(y) / kCell, 0, rows - 1); };
   const auto& list = pieces.graph.pieces;
   for (std::size_t p = 0; p < list.size(); ++p) {
     for (int i = list[p].begin; i < list[p].end; i += 2) {
       const Eigen::Vector2f& x = point(list[p], i);
-      cells[static_cast<std::size_t>(row(x.y()) * columns + column(x.x()))].push_back(
-          {static_cast<int>(p), list[p].curve, x});
+      places.add(x, {static_cast<int>(p), list[p].curve, x});
     }
   }
   std::vector<std::pair<int, int>> crossing;
@@ -56,25 +51,21 @@ Surroundings::Surroundings(const Camera& camera, const GridGraph& graph,
     const Eigen::Vector2f middle = point(list[p], (list[p].begin + list[p].end) / 2);
     nearest.clear();
     auto known = nearest.end();
-    for (int y = row(middle.y() - kReachPx); y <= row(middle.y() + kReachPx); ++y) {
-      for (int x = column(middle.x() - kReachPx); x <= column(middle.x() + kReachPx); ++x) {
-        for (const Place& place : cells[static_cast<std::size_t>(y * columns + x)]) {
-          const float d = (place.pixel - middle).squaredNorm();
-          if (d > kReachPx * kReachPx || place.curve == list[p].curve) continue;
-          // Places of one piece follow each other.
-          if (known == nearest.end() || std::get<1>(*known) != place.piece) {
-            known = std::find_if(nearest.begin(), nearest.end(),
-                                 [&](const auto& n) { return std::get<1>(n) == place.piece; });
-          }
-          if (known == nearest.end()) {
-            nearest.emplace_back(d, place.piece, place.pixel);
-            known = nearest.end() - 1;
-          } else if (d < std::get<0>(*known)) {
-            *known = {d, place.piece, place.pixel};
-          }
-        }
+    places.around(middle, kReachPx, [&](const Place& place) {
+      const float d = (place.pixel - middle).squaredNorm();
+      if (d > kReachPx * kReachPx || place.curve == list[p].curve) return;
+      // Places of one piece follow each other.
+      if (known == nearest.end() || std::get<1>(*known) != place.piece) {
+        known = std::find_if(nearest.begin(), nearest.end(),
+                             [&](const auto& n) { return std::get<1>(n) == place.piece; });
       }
-    }
+      if (known == nearest.end()) {
+        nearest.emplace_back(d, place.piece, place.pixel);
+        known = nearest.end() - 1;
+      } else if (d < std::get<0>(*known)) {
+        *known = {d, place.piece, place.pixel};
+      }
+    });
     std::erase_if(nearest, [&](const auto& n) {
       return std::binary_search(crossing.begin(), crossing.end(),
                                 std::pair(static_cast<int>(p), std::get<1>(n)));
