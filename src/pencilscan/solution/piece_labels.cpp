@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <numbers>
 #include <tuple>
 
@@ -157,6 +156,27 @@ void keep_supported(LabelledPieces& pieces, const JointOptions& options) {
   }
 }
 
+/// The lines of a pattern in a camera.
+struct VisiblePattern {
+  VisiblePattern(const Rig& rig, const Camera& camera, const ColorFamily& family,
+                 PatternRef pattern)
+      : ref(pattern), sheets(rig, camera, pattern) {
+    const LinePattern& lines = rig.projectors[static_cast<std::size_t>(ref.projector)]
+                                   .patterns[static_cast<std::size_t>(ref.pattern)];
+    const std::vector<int> color_of_symbol = family.color_of_symbol(lines);
+    for (const int symbol : lines.sequence)
+      colors.push_back(static_cast<std::size_t>(color_of_symbol[static_cast<std::size_t>(symbol)]));
+  }
+  /// Index in the family's colours.
+  [[nodiscard]] std::size_t color(int line) const {
+    return colors[static_cast<std::size_t>(line) % colors.size()];
+  }
+
+  PatternRef ref;
+  LineSheets sheets;
+  std::vector<std::size_t> colors;  ///< of one period
+};
+
 }  // namespace
 
 CrossingCost::CrossingCost(float inverse_depth_range, const JointOptions& options)
@@ -171,11 +191,11 @@ LabelledPieces possible_labels(const Rig& rig, const std::vector<ColorFamily>& f
   const Sphere volume = working_volume(rig);
   LabelledPieces result;
   result.graph = cut_into_pieces(camera, graph, options.piece_length);
-  std::map<std::pair<int, int>, LineSheets> sheets;
-  for (const ColorFamily& family : families) {
-    for (const PatternRef& ref : family.patterns) {
+  std::vector<std::vector<VisiblePattern>> visible(families.size());
+  for (std::size_t f = 0; f < families.size(); ++f) {
+    for (const PatternRef& ref : families[f].patterns) {
       if (can_see_pattern(rig, camera, ref.projector))
-        sheets.emplace(std::pair(ref.projector, ref.pattern), LineSheets(rig, camera, ref));
+        visible[f].emplace_back(rig, camera, families[f], ref);
     }
   }
   const double distance = (camera.device_from_world * volume.center).z();
@@ -195,21 +215,14 @@ LabelledPieces possible_labels(const Rig& rig, const std::vector<ColorFamily>& f
     const auto w_high = static_cast<float>(1 / range->near);
     const ColorFamily& family = families[static_cast<std::size_t>(curve.family)];
     const std::vector<float> colors = color_costs(curve, piece, family.colors.size(), options);
-    for (const PatternRef& ref : family.patterns) {
-      const auto it = sheets.find({ref.projector, ref.pattern});
-      if (it == sheets.end()) continue;
-      const LinePattern& pattern = rig.projectors[static_cast<std::size_t>(ref.projector)]
-                                       .patterns[static_cast<std::size_t>(ref.pattern)];
-      const std::vector<int> color_of = family.color_of_symbol(pattern);
-      it->second.candidates(piece.middle, w_low, w_high, lines);
+    for (const VisiblePattern& pattern : visible[static_cast<std::size_t>(curve.family)]) {
+      pattern.sheets.candidates(piece.middle, w_low, w_high, lines);
       for (const int line : lines) {
         LineSheets::Sheet sheet;
-        if (!it->second.find(line, piece.middle, w_low, w_high, sheet)) continue;
-        PieceLabel label{ref, line, sheet.q, sheet.inverse_depth_per_px, 0};
+        if (!pattern.sheets.find(line, piece.middle, w_low, w_high, sheet)) continue;
+        PieceLabel label{pattern.ref, line, sheet.q, sheet.inverse_depth_per_px, 0};
         const float w = sheet.q.dot(piece.middle.homogeneous());
-        label.cost = colors[static_cast<std::size_t>(
-                         color_of[static_cast<std::size_t>(pattern.symbol(line))])] +
-                     slant_cost(piece, label, w);
+        label.cost = colors[pattern.color(line)] + slant_cost(piece, label, w);
         labels.push_back(label);
       }
     }

@@ -99,8 +99,7 @@ class CameraLook {
   LocalSurface surface_;
   std::vector<LabeledRun> not_on_surface_;  ///< runs whose points it does not hold yet
   Places<KnownPoint> known_;
-  std::vector<PredictedPoint> predicted_;
-  std::vector<PredictedPoint> missing_;
+  std::vector<PredictedPoint> missing_;  ///< predicted points that no label explains
   Places<PredictedPoint> missing_places_;
 };
 
@@ -182,17 +181,15 @@ bool CameraLook::is_known(const PredictedPoint& p) const {
 
 void CameraLook::predict() {
   grow_surface();
-  std::erase_if(predicted_,
+  // Those that became known lie where the surface grew.
+  std::erase_if(missing_,
                 [&](const PredictedPoint& p) { return surface_.refitted()[p.patch] != 0; });
-  const auto news = predict_lines(rig_, camera_, surface_, patterns_, options_.prediction);
-  predicted_.insert(predicted_.end(), news.begin(), news.end());
-  missing_.clear();
-  missing_places_.clear();
-  for (const PredictedPoint& p : predicted_) {
-    if (is_known(p)) continue;
-    missing_.push_back(p);
-    missing_places_.add(p.position, p);
+  for (const PredictedPoint& p :
+       predict_lines(rig_, camera_, surface_, patterns_, options_.prediction)) {
+    if (!is_known(p)) missing_.push_back(p);
   }
+  missing_places_.clear();
+  for (const PredictedPoint& p : missing_) missing_places_.add(p.position, p);
 }
 
 /// visit(predicted, across_px) for the missing points beside a curve point, of its direction.

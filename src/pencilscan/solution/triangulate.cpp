@@ -11,38 +11,27 @@
 namespace pencilscan {
 namespace {
 
-/// A camera and a projector whose light it sees.
-struct DevicePair {
-  const Camera& camera;
-  const Projector& projector;
-  RigidTransform projector_from_camera;
-
-  [[nodiscard]] RayInProjector ray(const Vec2& normalized) const {
-    return {projector_from_camera, projector, normalized};
-  }
-};
-
-/// d(line coordinate, projector px)/d(camera px across the curve), by a finite difference at equal
-/// depth.
-double coordinate_per_pixel(const DevicePair& pair, const LinePattern& pattern,
-                            const CurvePoint& point, double depth) {
-  const Vec2 pixel = point.position.cast<double>();
-  const Vec2 normal = point.normal.cast<double>();
-  const auto axis = static_cast<Eigen::Index>(pattern.axis);
-  const auto at = [&](double offset) {
-    return pair.ray(pair.camera.normalized_from_pixel(pixel + offset * normal)).pixel(depth);
-  };
-  const auto a = at(-0.5);
-  const auto b = at(0.5);
-  return a && b ? std::abs((*b)[axis] - (*a)[axis]) : 1.0;
+/// d(line coordinate, projector px)/d(camera px across the curve) at equal depth, lens distortion
+/// neglected. `x`: the point in the camera frame.
+double coordinate_per_pixel(const Camera& camera, const Projector& projector,
+                            const RigidTransform& projector_from_camera, Axis axis,
+                            const Eigen::Vector2f& normal, const Vec3& x) {
+  const Vec3 moved(x.z() * normal.x() / camera.K(0, 0), x.z() * normal.y() / camera.K(1, 1), 0);
+  const Vec3 h = projector_from_camera * x;
+  const Vec3 dh = projector_from_camera.rotation * moved;
+  const Vec2 change = (dh.head<2>() - h.head<2>() * (dh.z() / h.z())) / h.z();
+  return std::abs(projector.K.row(static_cast<Eigen::Index>(axis)).head<2>().dot(change));
 }
+
+/// std::hypot for numbers whose squares neither over- nor underflow.
+double root_of_squares(double a, double b) { return std::sqrt(a * a + b * b); }
 
 /// Standard deviation of a curve point across the curve, px.
 double position_sigma(const Curve& curve, int i, const TriangulationOptions& options) {
   const int from_end = std::min(i, static_cast<int>(curve.points.size()) - 1 - i);
   const double end = options.end_sigma_px * std::exp(-from_end / options.end_reach);
-  return std::hypot(options.position_factor * curve.points[static_cast<std::size_t>(i)].sigma_px,
-                    end);
+  return root_of_squares(
+      options.position_factor * curve.points[static_cast<std::size_t>(i)].sigma_px, end);
 }
 
 void add_run(const Rig& rig, const GridGraph& graph, const LabeledRun& run, const Sphere& volume,
@@ -53,21 +42,23 @@ void add_run(const Rig& rig, const GridGraph& graph, const LabeledRun& run, cons
   const Projector& projector = rig.projectors[static_cast<std::size_t>(label.pattern.projector)];
   const LinePattern& pattern = projector.patterns[static_cast<std::size_t>(label.pattern.pattern)];
   const RigidTransform world_from_camera = camera.device_from_world.inverse();
-  const DevicePair pair{camera, projector, projector.device_from_world * world_from_camera};
+  const RigidTransform projector_from_camera = projector.device_from_world * world_from_camera;
   const double coordinate = pattern.position_px(label.plane);
   for (int i = run.begin; i < run.end; ++i) {
     const CurvePoint& p = curve.points[static_cast<std::size_t>(i)];
     const Vec2 pixel = p.position.cast<double>();
     const Vec3 direction = camera.normalized_from_pixel(pixel).homogeneous();
-    const RayInProjector ray = pair.ray(direction.head<2>());
+    const RayInProjector ray(projector_from_camera, projector, direction.head<2>());
     const auto depth = ray.depth(coordinate, pattern.axis);
     if (!depth) continue;
-    const Vec3 x = world_from_camera * (*depth * direction);
+    const Vec3 x_in_camera = *depth * direction;
+    const Vec3 x = world_from_camera * x_in_camera;
     if ((x - volume.center).norm() > options.volume_margin * volume.radius) continue;
     const double slope = std::abs(ray.slope(*depth, pattern.axis));
-    const double gain = coordinate_per_pixel(pair, pattern, p, *depth);
+    const double gain = coordinate_per_pixel(camera, projector, projector_from_camera, pattern.axis,
+                                             p.normal, x_in_camera);
     const double position = position_sigma(curve, i, options);
-    const double sigma_px = std::hypot(gain * position, options.projection_sigma_px);
+    const double sigma_px = root_of_squares(gain * position, options.projection_sigma_px);
     const double footprint = options.footprint_sigma_px * *depth / camera.K(0, 0);
     const double ray_length = direction.norm();
     MeasuredPoint point;
@@ -80,8 +71,8 @@ void add_run(const Rig& rig, const GridGraph& graph, const LabeledRun& run, cons
     point.projector = static_cast<std::uint8_t>(label.pattern.projector);
     point.pattern = static_cast<std::uint8_t>(label.pattern.pattern);
     point.line = static_cast<std::uint16_t>(label.line);
-    point.sigma =
-        static_cast<float>(std::hypot(sigma_px / std::max(1e-6, slope), footprint) * ray_length);
+    point.sigma = static_cast<float>(root_of_squares(sigma_px / std::max(1e-6, slope), footprint) *
+                                     ray_length);
     point.confidence = label.confidence;
     point.plane = static_cast<float>(label.plane);
     points.push_back(point);
