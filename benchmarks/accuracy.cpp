@@ -130,6 +130,8 @@ struct MethodChoice {
   const char* name;
   Method method;
   MultiviewCost cost;
+  Inference inference = Inference::kMessages;
+  bool has_second_look = true;
 };
 
 int run(const std::filesystem::path& rig_path, const std::filesystem::path& frames,
@@ -158,6 +160,11 @@ int run(const std::filesystem::path& rig_path, const std::filesystem::path& fram
       {"multiview published", Method::kMultiview, MultiviewCost::kPublished},
       {"multiview", Method::kMultiview, MultiviewCost::kNormalized},
       {"joint", Method::kJoint, MultiviewCost::kNormalized},
+      {"joint, first look", Method::kJoint, MultiviewCost::kNormalized, Inference::kMessages,
+       false},
+      {"clusters, first look", Method::kJoint, MultiviewCost::kNormalized, Inference::kClusters,
+       false},
+      {"clusters", Method::kJoint, MultiviewCost::kNormalized, Inference::kClusters},
   };
   bool is_first = true;
   for (std::size_t k = 0; k < std::size(choices); ++k) {
@@ -165,6 +172,8 @@ int run(const std::filesystem::path& rig_path, const std::filesystem::path& fram
     PointOptions options;
     options.solution.method = choices[k].method;
     options.solution.cost = choices[k].cost;
+    options.solution.joint.inference = choices[k].inference;
+    if (!choices[k].has_second_look) options.second_look.passes = 0;
     const PointResult result = measure_points(rig, frame, options);
     if (is_first) {
       print_detection(rig, result, true_lines);

@@ -6,6 +6,7 @@
 
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/grid/local_ids.h"
+#include "pencilscan/solution/cluster_enumeration.h"
 #include "pencilscan/solution/min_sum.h"
 #include "pencilscan/solution/next_lines.h"
 #include "pencilscan/solution/other_views.h"
@@ -231,7 +232,9 @@ Labeling solve_joint(const Rig& rig, const std::vector<ColorFamily>& families,
       // Order and code reach a piece over as many neighbours as the code is long, and more.
       const int rounds = lacks_crossings(pieces[g].graph) ? 6 * options.rounds : options.rounds;
       const std::vector<float> costs =
-          min_sum(energies[g], rounds, static_cast<float>(options.damping));
+          options.inference == Inference::kMessages
+              ? min_sum(energies[g], rounds, static_cast<float>(options.damping))
+              : enumerate_clusters(energies[g]);
       next[g] = beliefs_of(pieces[g], costs);
       decisions[g] = decisions_of(pieces[g], costs);
       if (lacks_crossings(pieces[g].graph)) leave_periodic(rig, pieces[g], decisions[g]);

@@ -81,7 +81,12 @@ enum class MultiviewCost {
   kNormalized,  ///< mean over all reprojected points, unmatched ones counting as the search radius
 };
 
+/// How joint labelling minimises its energy: min-sum messages (min_sum.h), or the labels of whole
+/// clusters tried one by one (cluster_enumeration.h), for comparison.
+enum class Inference { kMessages, kClusters };
+
 struct JointOptions {
+  Inference inference = Inference::kMessages;
   int piece_length = 24;             ///< points labelled as one; >= 4
   int max_labels = 24;               ///< kept per piece before messages are passed; >= 2
   double projection_sigma_px = 0.3;  ///< error of a plane, projector px; > 0
