@@ -96,7 +96,8 @@ std::vector<std::size_t> chosen_tracks(const BundleProblem& problem, std::size_t
   return order;
 }
 
-Seed best_seed(const BundleProblem& problem, const std::vector<std::size_t>& tracks) {
+/// Pairs to start from, the best first.
+std::vector<Seed> seeds_of(const BundleProblem& problem, const std::vector<std::size_t>& tracks) {
   std::map<std::pair<std::size_t, std::size_t>, std::size_t> shared;
   for (const std::size_t t : tracks) {
     const auto& views = problem.tracks[t].views;
@@ -108,12 +109,14 @@ Seed best_seed(const BundleProblem& problem, const std::vector<std::size_t>& tra
   for (const auto& [pair, count] : shared) ranked.push_back({count, pair});
   std::stable_sort(ranked.begin(), ranked.end(),
                    [](const auto& x, const auto& y) { return x.first > y.first; });
-  Seed best;
+  std::vector<Seed> seeds;
   for (std::size_t i = 0; i < std::min<std::size_t>(ranked.size(), 8); ++i) {
     const Seed seed = solve_seed(problem, ranked[i].second.first, ranked[i].second.second, tracks);
-    if (seed.score > best.score) best = seed;
+    if (seed.score > 0) seeds.push_back(seed);
   }
-  return best;
+  std::stable_sort(seeds.begin(), seeds.end(),
+                   [](const Seed& a, const Seed& b) { return a.score > b.score; });
+  return seeds;
 }
 
 /// Pose of an absent device against the points of `tracks`; false when too few agree.
@@ -189,6 +192,28 @@ void grow(BundleProblem& problem, const std::vector<std::size_t>& tracks,
   }
 }
 
+std::size_t present_devices(const BundleProblem& problem) {
+  return static_cast<std::size_t>(std::count_if(problem.devices.begin(), problem.devices.end(),
+                                                [](const BundleDevice& d) { return d.present; }));
+}
+
+/// Triangulates what the present devices see and joins the others, with all tracks where the chosen
+/// ones do not suffice.
+void grow_from_present(BundleProblem& problem, const std::vector<std::size_t>& tracks,
+                       BundleOptions bundle, const StructureOptions& options) {
+  problem.used.assign(problem.tracks.size(), 0);
+  problem.points.assign(problem.tracks.size(), Vec3::Zero());
+  triangulate_tracks(problem, tracks, options.least_angle_rad);
+  adjust(problem, bundle);
+  grow(problem, tracks, bundle, options);
+  if (present_devices(problem) == problem.devices.size()) return;
+  std::vector<std::size_t> all(problem.tracks.size());
+  std::iota(all.begin(), all.end(), std::size_t{0});
+  triangulate_tracks(problem, all, options.least_angle_rad);
+  bundle.max_tracks = 2 * options.tracks;
+  grow(problem, all, bundle, options);
+}
+
 }  // namespace
 
 Mat3 rotation_of(const BundleDevice& device) {
@@ -250,32 +275,31 @@ void triangulate_all(BundleProblem& problem, double least_angle_rad) {
 
 double build_structure(BundleProblem& problem, unsigned free_inner,
                        const StructureOptions& options) {
-  problem.used.assign(problem.tracks.size(), 0);
-  problem.points.assign(problem.tracks.size(), Vec3::Zero());
   const auto tracks = chosen_tracks(problem, options.tracks);
   BundleOptions bundle;
   bundle.free_inner = free_inner;
   bundle.extra_sigma_px = kEarlySigmaPx;
   bundle.max_iterations = 15;
-  const auto present = std::count_if(problem.devices.begin(), problem.devices.end(),
-                                     [](const BundleDevice& d) { return d.present; });
-  if (present < 2) {
-    const Seed seed = best_seed(problem, tracks);
-    if (seed.score == 0) return std::numeric_limits<double>::infinity();
-    set_pose(problem.devices[seed.a], Mat3::Identity(), Vec3::Zero());
-    set_pose(problem.devices[seed.b], seed.rotation, seed.translation);
-    problem.devices[seed.a].present = problem.devices[seed.b].present = true;
-  }
-  triangulate_tracks(problem, tracks, options.least_angle_rad);
-  adjust(problem, bundle);
-  grow(problem, tracks, bundle, options);
-  if (std::any_of(problem.devices.begin(), problem.devices.end(),
-                  [](const BundleDevice& d) { return !d.present; })) {
-    std::vector<std::size_t> all(problem.tracks.size());
-    std::iota(all.begin(), all.end(), std::size_t{0});
-    triangulate_tracks(problem, all, options.least_angle_rad);
-    bundle.max_tracks = 2 * options.tracks;
-    grow(problem, all, bundle, options);
+  if (present_devices(problem) >= 2) {
+    grow_from_present(problem, tracks, bundle, options);
+  } else {
+    // A pair whose captures were exchanged looks sound by itself, but nothing joins it.
+    constexpr std::size_t kMostSeeds = 4;
+    std::vector<Seed> seeds = seeds_of(problem, tracks);
+    if (seeds.empty()) return std::numeric_limits<double>::infinity();
+    seeds.resize(std::min(seeds.size(), kMostSeeds));
+    const BundleProblem nothing = problem;
+    BundleProblem best = problem;
+    for (const Seed& seed : seeds) {
+      problem = nothing;
+      set_pose(problem.devices[seed.a], Mat3::Identity(), Vec3::Zero());
+      set_pose(problem.devices[seed.b], seed.rotation, seed.translation);
+      problem.devices[seed.a].present = problem.devices[seed.b].present = true;
+      grow_from_present(problem, tracks, bundle, options);
+      if (present_devices(problem) > present_devices(best)) best = problem;
+      if (present_devices(best) == problem.devices.size()) break;
+    }
+    problem = std::move(best);
   }
   bundle.max_iterations = 60;
   const BundleSummary summary = adjust(problem, bundle);
