@@ -35,7 +35,8 @@ function verdict(report: Json): HTMLElement {
   const bad = /unusable|bad|fail|poor|refus/i.test(word);
   const good = /^(good|usable|ok|fine|pass)/i.test(word);
   const reasons = [...digList(report, 'reasons'), ...digList(stated, 'reasons'), ...digList(report, 'warnings')]
-    .map((r) => textOf(r) || textOf(dig(r, 'text')) || JSON.stringify(r));
+    .map((r) => textOf(r) || [textOf(dig(r, 'what')), textOf(dig(r, 'advice'))].filter(Boolean).join(': ') ||
+      JSON.stringify(r));
   const rms = digNumber(report, 'rms_px');
   return h('div', {class: `verdict ${bad ? 'bad' : good ? '' : 'unsure'}`, role: 'status'},
     h('strong', {}, word), rms === undefined ? '' : ` · RMS of reprojection ${format(rms)} px`,
@@ -71,7 +72,7 @@ function overlapGraph(report: Json): HTMLElement | null {
   const edges = [...digList(report, 'overlap'), ...digList(report, 'pairs')].flatMap((edge) => {
     const a = textOf(dig(edge, 'a')) || textOf(dig(edge, 'camera'));
     const b = textOf(dig(edge, 'b')) || textOf(dig(edge, 'projector'));
-    const shared = digNumber(edge, 'shared') ?? digNumber(edge, 'points') ?? digNumber(edge, 'matches') ?? 0;
+    const shared = digNumber(edge, 'correspondences') ?? digNumber(edge, 'shared') ?? 0;
     return a && b ? [{a, b, shared}] : [];
   });
   if (!edges.length) return null;

@@ -11,10 +11,34 @@ using Json = nlohmann::ordered_json;
 
 Json list(const Vec3& v) { return {v.x(), v.y(), v.z()}; }
 
+/// A few hundred [u, v, du, dv], px: where the device saw a point, and how far off it is predicted.
+Json residuals_json(const CalibrationReport& report, std::size_t d) {
+  constexpr std::size_t kMost = 400;
+  const BundleProblem& problem = report.result.problem;
+  const std::size_t step = report.result.residuals[d].views / kMost + 1;
+  const auto rounded = [](double px) { return std::round(1000 * px) / 1000; };
+  Json residuals = Json::array();
+  std::size_t seen = 0;
+  for (std::size_t t = 0; t < problem.points.size(); ++t) {
+    if (problem.used[t] == 0) continue;
+    for (std::size_t i = 1; i < problem.tracks[t].views.size(); ++i) {
+      const TrackView& view = problem.tracks[t].views[i];
+      if (view.device != d || seen++ % step != 0) continue;
+      const auto error = view_error(problem.devices[d], problem.points[t], view);
+      if (!error) continue;
+      residuals.push_back({rounded(view.pixel.x()), rounded(view.pixel.y()), rounded(error->x()),
+                           rounded(error->y())});
+    }
+  }
+  return residuals;
+}
+
 Json device_json(const CalibrationReport& report, std::size_t d) {
   const CalibrationResult& result = report.result;
   Json json;
   json["name"] = calibrated_device(report.input.rig, d).name;
+  json["width"] = calibrated_device(report.input.rig, d).width;
+  json["height"] = calibrated_device(report.input.rig, d).height;
   json["placed"] = result.placed[d] != 0;
   if (result.placed[d] == 0) return json;
   const BundleDevice& device = result.problem.devices[d];
@@ -28,10 +52,11 @@ Json device_json(const CalibrationReport& report, std::size_t d) {
   for (std::size_t i = 0; i < kIntrinsics; ++i) {
     Json parameter{{"value", device.inner[i]}, {"sigma", u.inner[i]}};
     if (u.is_prior[i]) parameter["held_at_prior"] = true;
-    json[kIntrinsicNames[i]] = parameter;
+    json["parameters"][kIntrinsicNames[i]] = parameter;
   }
   json["rotation_sigma_deg"] = u.rotation_rad * 180 / std::numbers::pi;
   json["position_sigma"] = list(u.position);
+  json["residuals"] = residuals_json(report, d);
   return json;
 }
 
