@@ -19,6 +19,7 @@ struct ReconstructOptions {
   std::string cost = "normalized";
   bool no_pictures = false;
   bool no_depth = false;
+  bool no_mesh = false;
   bool depth_maps = false;
   std::vector<std::string> mesh_formats;
   bool refine_rig = false;
@@ -48,6 +49,7 @@ void reconstruct(const ReconstructOptions& options) {
   sequence.shape.depth.enabled =
       !options.no_depth && sequence.points.solution.method == Method::kJoint;
   sequence.refine_rig = options.refine_rig;
+  sequence.meshes = !options.no_mesh;
   sequence.pictures = !options.no_pictures;
   sequence.depth_maps = options.depth_maps;
   sequence.mesh_formats = options.mesh_formats;
@@ -57,6 +59,7 @@ void reconstruct(const ReconstructOptions& options) {
                          " depth=" + (sequence.shape.depth.enabled ? "yes" : "no") +
                          " depth-maps=" + (options.depth_maps ? "yes" : "no") +
                          " refine-rig=" + (options.refine_rig ? "yes" : "no");
+  if (options.no_mesh) sequence.description += " mesh=no";
   for (const std::string& format : options.mesh_formats) sequence.description += " " + format;
   const auto [outcomes, refinement] =
       reconstruct_sequence(options.rig, options.frames, options.out, sequence, stderr_progress());
@@ -103,8 +106,9 @@ void add_reconstruct_command(CLI::App& app) {
   command->add_option("--out", options->out, "output folder, one folder per frame")->required();
   command
       ->add_option("--method", options->method,
-                   "how lines are told apart: joint, or the paper's two")
-      ->check(CLI::IsMember({"linear", "multiview", "joint"}))
+                   "how lines are told apart: joint, the paper's two, or the grid of one projector "
+                   "that it compares itself with")
+      ->check(CLI::IsMember({"linear", "multiview", "joint", "single-projector"}))
       ->capture_default_str();
   command
       ->add_option("--multiview-cost", options->cost,
@@ -114,6 +118,7 @@ void add_reconstruct_command(CLI::App& app) {
       ->capture_default_str();
   command->add_flag("--no-depth", options->no_depth,
                     "surface from the labelled curves alone, without depth between them");
+  command->add_flag("--no-mesh", options->no_mesh, "labelled points alone, without a surface");
   command->add_flag("--depth-maps", options->depth_maps,
                     "depth and its deviation per camera: float TIFF and 16-bit PNG");
   command

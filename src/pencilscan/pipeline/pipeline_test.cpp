@@ -144,6 +144,42 @@ TEST_F(PipelineTest, JointAndMultiviewLabelTheBallAndLinearWorksWithOneCamera) {
   EXPECT_LT(label_figures(one_truth, linear.points, linear_verdicts).wrong.value(), 0.5);
 }
 
+TEST_F(PipelineTest, SingleProjectorLabelsTheGridOfOneProjector) {
+  Rig rig = *rig_;
+  rig.cameras.resize(1);
+  rig.projectors.resize(1);
+  rig.projectors[0].device_from_world = look_at({400, 260, 280}, Vec3::Zero());
+  LinePattern across = rig_->projectors[1].patterns.front();
+  across.axis = Axis::kRow;
+  rig.projectors[0].patterns.push_back(across);
+  PointOptions options;
+  options.solution.method = Method::kSingleProjector;
+  const PointResult result = measure_points(rig, render_frame(rig, ball()), options);
+  ASSERT_GT(result.points.size(), 1000U);
+  const TruthScene truth(ball(), rig);
+  const auto verdicts = judge_points(truth, result.points);
+  EXPECT_LT(label_figures(truth, result.points, verdicts).wrong.value(), 0.03);
+}
+
+TEST_F(PipelineTest, SingleProjectorRefusesARigWithoutAGrid) {
+  SequenceOptions options = quick();
+  options.points.solution.method = Method::kSingleProjector;
+  EXPECT_THROW(static_cast<void>(run(*folder_ / "frames", *folder_ / "out_without_grid", options)),
+               InputError);
+}
+
+TEST_F(PipelineTest, PointsAloneAreThoseOfTheWholeResult) {
+  SequenceOptions options = quick();
+  options.points.solution.method = Method::kMultiview;
+  options.shape.depth.enabled = false;
+  ASSERT_TRUE(run(*folder_ / "frames", *folder_ / "out_whole", options).front().done);
+  options.meshes = false;
+  ASSERT_TRUE(run(*folder_ / "frames", *folder_ / "out_points", options).front().done);
+  EXPECT_EQ(read_file(*folder_ / "out_points" / "000000" / "points.ply"),
+            read_file(*folder_ / "out_whole" / "000000" / "points.ply"));
+  EXPECT_FALSE(fs::exists(*folder_ / "out_points" / "000000" / "mesh.ply"));
+}
+
 TEST_F(PipelineTest, BytesAreTheSameForAnyThreadCount) {
   std::vector<std::string> bytes;
   for (const int threads : {1, 2, 4}) {

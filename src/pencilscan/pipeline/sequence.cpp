@@ -14,6 +14,7 @@
 #include "pencilscan/pipeline/frame_files.h"
 #include "pencilscan/pipeline/frame_output.h"
 #include "pencilscan/pipeline/rig_refinement.h"
+#include "pencilscan/solution/single_projector.h"
 
 namespace pencilscan {
 namespace {
@@ -119,21 +120,24 @@ void reconstruct_frame(const Rig& rig, const FrameFiles& files, const fs::path& 
   if (points.points.empty()) {
     throw StageError("no curve could be given its projector line");
   }
-  const ShapeResult shape = measure_shape(rig, frame, points, options.shape);
+  const ShapeResult shape =
+      options.meshes ? measure_shape(rig, frame, points, options.shape) : ShapeResult{};
   const SurfaceResult& surface = shape.surface;
   points.times.insert(points.times.end(), shape.times.begin(), shape.times.end());
   write_points(folder / "points.ply", points.points);
   write_curves(folder / "curves.ply", describe_curves(points));
-  write_mesh(folder / "mesh.ply", surface.mesh);
-  write_mesh(folder / "mesh_measured.ply", surface.measured);
-  for (const std::string& format : options.mesh_formats)
-    export_mesh(folder / ("mesh." + format), surface.mesh);
-  if (options.depth_maps) write_depth_maps(folder, rig, shape);
+  if (options.meshes) {
+    write_mesh(folder / "mesh.ply", surface.mesh);
+    write_mesh(folder / "mesh_measured.ply", surface.measured);
+    for (const std::string& format : options.mesh_formats)
+      export_mesh(folder / ("mesh." + format), surface.mesh);
+  }
+  if (options.meshes && options.depth_maps) write_depth_maps(folder, rig, shape);
   if (options.pictures) {
     const Stopwatch picture_watch;
     write_camera_pictures(folder / "pictures", rig, frame);
     write_frame_pictures(folder / "pictures", rig, frame, points, shape);
-    write_hole_pictures(folder / "pictures", rig, shape);
+    if (options.meshes) write_hole_pictures(folder / "pictures", rig, shape);
     points.times.push_back({"pictures", picture_watch.seconds()});
   }
   ordered_json timing;
@@ -209,6 +213,11 @@ SequenceOutcome reconstruct_sequence(const fs::path& rig_path, const fs::path& f
   if (options.refine_rig && is_output_rig(rig_path, out)) {
     throw InputError("--rig", "", rig_path.string(),
                      "must not be the rig.json in --out, where the refined rig is written");
+  }
+  if (options.points.solution.method == Method::kSingleProjector && !shows_grid(rig)) {
+    throw InputError(rig_path.string(), "projectors", "",
+                     "must hold one with a vertical and a horizontal pattern, which the method "
+                     "single-projector needs");
   }
   check_images(rig, frames, progress);
   const ordered_json inputs = describe_inputs(rig_path, frames, options.description);

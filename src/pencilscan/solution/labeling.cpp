@@ -8,6 +8,7 @@
 #include "pencilscan/solution/linear.h"
 #include "pencilscan/solution/multiview.h"
 #include "pencilscan/solution/pencil_parameter.h"
+#include "pencilscan/solution/single_projector.h"
 
 namespace pencilscan {
 namespace {
@@ -90,6 +91,36 @@ ComponentResult solve_one(const Rig& rig, const GridGraph& graph, int component,
   return result;
 }
 
+/// The one-projector method: one grid of one camera after the other.
+Labeling solve_projector_grids(const Rig& rig, std::span<const GridGraph> graphs,
+                               const SolutionOptions& options) {
+  Labeling labeling;
+  labeling.runs.resize(rig.cameras.size());
+  std::vector<std::vector<GridSolution>> solutions(graphs.size());
+  parallel_for(graphs.size(),
+               [&](std::size_t g) { solutions[g] = solve_grids(rig, graphs[g], options); });
+  for (std::size_t g = 0; g < graphs.size(); ++g) {
+    auto& runs = labeling.runs[static_cast<std::size_t>(graphs[g].camera)];
+    for (GridSolution& solution : solutions[g]) {
+      constexpr double kScale = 0.25;  // half a line, squared
+      const auto confidence =
+          static_cast<float>(1 - 0.5 * std::exp(-solution.report.margin / kScale));
+      for (std::size_t k = 0; k < solution.lines.size(); ++k) {
+        if (solution.lines[k] < 0) continue;
+        const auto curve = static_cast<std::size_t>(solution.curves[k]);
+        runs.push_back({solution.curves[k], 0,
+                        static_cast<int>(graphs[g].curves[curve].points.size()),
+                        CurveLabel{*graphs[g].identities[curve].pattern, solution.lines[k],
+                                   static_cast<double>(solution.lines[k]), confidence}});
+      }
+      labeling.components.push_back(std::move(solution.report));
+    }
+    std::sort(runs.begin(), runs.end(),
+              [](const LabeledRun& a, const LabeledRun& b) { return a.curve < b.curve; });
+  }
+  return labeling;
+}
+
 /// Methods A and B: one component of one camera after the other.
 Labeling solve_components(const Rig& rig, std::span<const GridGraph> graphs,
                           const SolutionOptions& options) {
@@ -153,6 +184,7 @@ std::optional<Method> method_from_name(std::string_view name) {
   if (name == "linear") return Method::kLinear;
   if (name == "multiview") return Method::kMultiview;
   if (name == "joint") return Method::kJoint;
+  if (name == "single-projector") return Method::kSingleProjector;
   return std::nullopt;
 }
 
@@ -170,8 +202,16 @@ int nearest_line(double coordinate, int local_id, int period, int line_count) {
 
 Labeling solve(const Rig& rig, const std::vector<ColorFamily>& families,
                std::span<const GridGraph> graphs, const SolutionOptions& options) {
-  return options.method == Method::kJoint ? solve_joint(rig, families, graphs, options.joint)
-                                          : solve_components(rig, graphs, options);
+  switch (options.method) {
+    case Method::kJoint:
+      return solve_joint(rig, families, graphs, options.joint);
+    case Method::kSingleProjector:
+      return solve_projector_grids(rig, graphs, options);
+    case Method::kLinear:
+    case Method::kMultiview:
+      break;
+  }
+  return solve_components(rig, graphs, options);
 }
 
 }  // namespace pencilscan

@@ -30,7 +30,7 @@ struct ComponentReport {
   double sigma_min = 0;        ///< smallest singular value of the scaled M, px per line
   double sigma_second = 0;     ///< the next one
   double residual_rms_px = 0;  ///< of equations (6), as image distance
-  // Multi-view only:
+  // Where one degree of freedom is searched (multi-view, single projector):
   std::vector<double> sweep_s;  ///< lines of the most moving curve
   std::vector<double> sweep_cost;
   double best_s = 0;
@@ -65,7 +65,7 @@ struct Labeling {
   std::vector<std::vector<LabeledRun>> runs;  ///< per camera, ordered by (curve, begin), disjoint
   /// Per camera, the likeliest labels of undecided stretches; joint only.
   std::vector<std::vector<LabeledRun>> tentative;
-  std::vector<ComponentReport> components;           ///< linear and multi-view only
+  std::vector<ComponentReport> components;           ///< all but joint
   std::vector<std::vector<UndecidedRun>> undecided;  ///< per camera; joint only
 };
 
@@ -73,7 +73,7 @@ struct Labeling {
 [[nodiscard]] std::array<std::size_t, 4> undecided_points(std::span<const UndecidedRun> undecided,
                                                           std::span<const LabeledRun> labelled);
 
-enum class Method { kLinear, kMultiview, kJoint };
+enum class Method { kLinear, kMultiview, kJoint, kSingleProjector };
 [[nodiscard]] std::optional<Method> method_from_name(std::string_view name);
 
 enum class MultiviewCost {
