@@ -169,23 +169,25 @@ bool solve_equations(const CrossingEquations& system, GridSolution& solution) {
   return true;
 }
 
-/// Sweeps s and fills the report's minimum and the margin to the next one, a line or more away.
+/// Sweeps s and fills the report's minimum and the margin to the lowest one outside its valley.
 void sweep(const Search& search, double low, double high, double step, ComponentReport& report) {
+  std::vector<double>& cost = report.sweep_cost;
   report.sweep_s.clear();
-  report.sweep_cost.clear();
+  cost.clear();
   const int steps = static_cast<int>(std::ceil((high - low) / step));
   for (int i = 0; i <= steps; ++i) {
     report.sweep_s.push_back(low + i * step);
-    report.sweep_cost.push_back(search.cost(report.sweep_s.back()));
+    cost.push_back(search.cost(report.sweep_s.back()));
   }
-  const auto best = std::min_element(report.sweep_cost.begin(), report.sweep_cost.end());
-  report.best_s = report.sweep_s[static_cast<std::size_t>(best - report.sweep_cost.begin())];
-  double second = std::numeric_limits<double>::infinity();
-  for (std::size_t i = 0; i < report.sweep_s.size(); ++i) {
-    if (std::abs(report.sweep_s[i] - report.best_s) >= 1)
-      second = std::min(second, report.sweep_cost[i]);
-  }
-  report.margin = std::isfinite(second) ? second - *best : 0;
+  const auto best = std::min_element(cost.begin(), cost.end());
+  report.best_s = report.sweep_s[static_cast<std::size_t>(best - cost.begin())];
+  auto left = best;
+  while (left != cost.begin() && *(left - 1) >= *left) --left;
+  auto right = best;
+  while (right + 1 != cost.end() && *(right + 1) >= *right) ++right;
+  const double next =
+      std::min(*std::min_element(cost.begin(), left + 1), *std::min_element(right, cost.end()));
+  report.margin = next - *best;
 }
 
 GridSolution solve_grid(const Rig& rig, const GridGraph& graph, std::span<const int> crossings,

@@ -21,8 +21,9 @@ namespace pencilscan {
 /// its local de Bruijn ID. The cost of s is the mean over the curves of the squared distance to the
 /// nearest such line, in lines, at most half a period.
 ///
-/// No other camera is asked. What the search needs is many lines in one connected grid: a period of
-/// IDs fits s and s + a period alike until the curves do not shift by the same number of lines.
+/// No other camera is asked. Positions a period of IDs apart differ only in that not all curves
+/// shift by the same number of lines, so that the search needs curves whose IDs are right and which
+/// hang together in one grid: a finger between two lines has none.
 /// Deviations: distances count in lines, where the original takes angles of planes; crossings that
 /// contradict the IDs have been cut by the grid stage already.
 struct GridSolution {

@@ -70,16 +70,7 @@ TEST_F(OneGrid, SearchNamesEveryLineOfALargeGrid) {
   const std::vector<GridSolution> solutions = solve_grids(rig, g);
   ASSERT_EQ(solutions.size(), 1U);
   EXPECT_GE(right_share(solutions.front()), 0.99);
-  EXPECT_GT(solutions.front().report.margin, 0.1);  // squared lines
-}
-
-TEST_F(OneGrid, FewLinesLeaveTheSearchLessSure) {
-  const GridGraph large = graph(80, 0, 3);
-  const double margin = solve_grids(rig, large).front().report.margin;
-  const GridGraph small = graph(12, 0, 3);
-  ASSERT_GE(small.curves.size(), 4U);
-  // All curves of a small grid shift alike, so that a period of IDs further fits nearly as well.
-  EXPECT_LT(solve_grids(rig, small).front().report.margin, 0.2 * margin);
+  EXPECT_GT(solutions.front().report.margin, 0.5);  // squared lines
 }
 
 TEST_F(OneGrid, WithoutIdsNothingTellsThePositionsApart) {
