@@ -155,5 +155,5 @@ def plot(args, rows, shown):
 if __name__ == "__main__":
     arguments = common.arguments("fig7_hand", __doc__, draws=(3, 1))
     arguments.thicknesses = [16] if arguments.small else [3, 4, 6, 8, 12, 16, 20]
-    arguments.shown = 16
+    arguments.shown = 16 if arguments.small else 8
     report(arguments, run(arguments))
