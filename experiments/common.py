@@ -287,9 +287,13 @@ def plots():
     import matplotlib.pyplot as plt
     plt.rcParams.update({"figure.dpi": 110, "font.size": 8, "axes.grid": True, "grid.alpha": 0.3,
                          "axes.spines.top": False, "axes.spines.right": False,
-                         "svg.hashsalt": "pencilscan", "savefig.bbox": "tight"})
+                         "svg.hashsalt": "pencilscan", "svg.fonttype": "none", "savefig.bbox": "tight"})
     return plt
 
+
+# Options of `rig ring` for a setting that takes seconds.
+SMALL_RING = ["--cameras", 2, "--projectors", 2, "--arc-deg", 90, "--camera-width", 640,
+              "--camera-height", 480, "--camera-focal-px", 1150, "--pitch-px", 20]
 
 METHOD_COLORS = {"linear": "tab:red", "multiview": "tab:orange", "joint": "tab:blue",
                  "single-projector": "tab:green", "surface": "navy", "scan": "0.4"}

@@ -20,9 +20,8 @@ FIGURES = {"label_error": ("label error", 4), "line_recall": ("line recall", 3),
 
 def render(args, program):
     scene = args.out / "scene"
-    ring = ["--cameras", 3, "--projectors", 3, "--arc-deg", 150] if args.small else []
     rig = args.out / "rig.json"
-    program("rig", "ring", "--out", rig, *ring)
+    program("rig", "ring", "--out", rig, *(common.SMALL_RING if args.small else []))
     program("simulate", "--rig", rig, "--mesh", common.BUNNY, "--fit", "--up", "y", "--out", scene,
             "--overwrite", "--seed", 1, *(["--export-povray"] if args.povray else ["--noise", "medium"]),
             "--samples", 2 if args.small else 3)
@@ -57,13 +56,14 @@ def picture(args, scene):
     first = args.out / "joint/000000/pictures"
     top = [first / "cam0.jpg", first / "cam0_local_id.png", first / "scene.png"]
     plt = common.plots()
-    figure, axes = plt.subplots(2, 3, figsize=(11, 6))
+    figure, axes = plt.subplots(2, 3, figsize=(12, 7), dpi=130)
     titles = ["captured", "curves by local ID", "shape among the devices", *METHODS]
     files = top + [args.out / m / "000000/pictures/shape.png" for m in METHODS]
     for axis, title, file in zip(axes.flat, titles, files):
         axis.imshow(Image.open(file).convert("RGB"))
         axis.set_title(title)
         axis.set_axis_off()
+    figure.tight_layout(pad=0.2)
     figure.savefig(args.out / "fig5_bunny.jpg", pil_kwargs={"quality": 85})
 
 

@@ -106,7 +106,7 @@ def run(args):
                          mean=float(np.mean(list(shares.values()))), points=len(points),
                          label_error=figures["label_error"])
                 if shown:
-                    keep = args.out / "shown" / series.replace(", ", "_").replace(" ", "_")
+                    keep = shown_folder(args, series)
                     shutil.rmtree(keep, ignore_errors=True)
                     shutil.copytree(out / "000000", keep)
         common.progress(f"fig7_hand: fingers of {thickness} mm")
@@ -130,6 +130,34 @@ def report(args, rows):
     common.print_table(args.out / "sweep.md", "Mean share of the fingers by their thickness",
                        ["", *[f"{t} mm" for t in args.thicknesses]], table)
     plot(args, rows, shown)
+    if not args.small:
+        picture(args)
+
+
+def shown_folder(args, series):
+    return args.out / "shown" / series.replace(", ", "_").replace(" ", "_")
+
+
+def picture(args):
+    """The paper's Fig. 7: captured, grid graph by local ID, points (colour: height over the palm)."""
+    from PIL import Image
+    plt = common.plots()
+    series = [s for s in list(SERIES) if s.startswith("one") or "joint, 8 px" in s]
+    figure, axes = plt.subplots(3, len(series), figsize=(2.6 * len(series), 8))
+    for column, name in enumerate(series):
+        folder = shown_folder(args, name)
+        for axis, file in zip(axes[:2, column], ["cam0.jpg", "cam0_local_id.png"]):
+            axis.imshow(Image.open(folder / "pictures" / file).convert("RGB").crop((470, 180, 930, 790)))
+            axis.set_axis_off()
+        axes[0, column].set_title(name.replace(", ", "\n", 1))
+        points, _ = common.read_ply(folder / "points.ply")
+        points = points[points["camera"] == 0]
+        axes[2, column].scatter(points["y"], points["z"], s=0.2, c=points["x"], vmin=-20, vmax=30,
+                                cmap="viridis")
+        axes[2, column].set(aspect="equal", xlim=(-75, 100), ylim=(-115, 115))
+        axes[2, column].set_axis_off()
+    figure.tight_layout()
+    figure.savefig(args.out / "fig7_hand.jpg", pil_kwargs={"quality": 85})
 
 
 def plot(args, rows, shown):

@@ -57,9 +57,12 @@ def measure(args, program, rows, name, value):
     change, options = SWEEPS[name][2](value)
     base = {**BASE, **change}
     rig_path, scene, out = args.out / "work/rig.json", args.out / "work/scene", args.out / "work/out"
-    program("rig", "ring", "--out", rig_path, "--cameras", base["cameras"], "--projectors",
-            base["projectors"], "--arc-deg", base["arc"], "--pitch-px", base["pitch"],
-            "--line-width-px", base["pitch"] / 3, "--offset-px", base["pitch"] / 2)
+    if args.small:
+        program("rig", "ring", "--out", rig_path, *common.SMALL_RING)
+    else:
+        program("rig", "ring", "--out", rig_path, "--cameras", base["cameras"], "--projectors",
+                base["projectors"], "--arc-deg", base["arc"], "--pitch-px", base["pitch"],
+                "--line-width-px", base["pitch"] / 3, "--offset-px", base["pitch"] / 2)
     mesh = args.out / "work/bunny.ply"
     common.write_ply(mesh, *bunny(base["radius"]))
     program("simulate", "--rig", rig_path, "--mesh", mesh, "--noise", "medium", "--out", scene,
@@ -116,7 +119,7 @@ if __name__ == "__main__":
     results = common.Rows(arguments.out / "results.csv", ["sweep", "value", "method"], FIGURES,
                           arguments.resume)
     for sweep in chosen:
-        for v in SWEEPS[sweep][1][-2:-1] if arguments.small else SWEEPS[sweep][1]:
+        for v in SWEEPS[sweep][1][-1:] if arguments.small else SWEEPS[sweep][1]:
             measure(arguments, common.Program(arguments), results, sweep, v)
         plot(arguments, results, [sweep])
     common.print_table(arguments.out / "table.md", "All sweeps", results.columns,

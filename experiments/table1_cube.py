@@ -2,8 +2,10 @@
 """Table I of the paper: two faces of a cube before two cameras and two projectors (its Fig. 6).
 
 Per draw the sensor noise, the calibration error's direction and the line noise are new; draws of one
-number share them over all methods. Faces are told apart by the true cube behind each pixel, 8 mm off
-its edges, and fitted by least squares without leaving anything out, as in the paper.
+number share them over all methods. With --share k what takes long (surface, refined rig, scan,
+calibrated rig, line noise) is done for the first of k draws only. Faces are told apart by the true cube
+behind each pixel, 8 mm off its edges, and fitted by least squares without leaving anything out, as in
+the paper.
 """
 
 import math
@@ -152,7 +154,7 @@ def calibrated_rig(args, program, true_rig):
     path = common.write_rig(args.out / "work" / "devices.json", devices)
     out = args.out / "work" / "calibrated" / "rig.json"
     done = program("calibrate", "--captures", args.out / "captures/captures", "--devices", path,
-                   "--out", out, may_fail=True)
+                   "--out", out, "--overwrite", may_fail=True)
     return common.json.loads(out.read_text()) if done else None
 
 
@@ -166,21 +168,21 @@ def run(args):
                        ["angle_deg", "rmse", "points"], args.resume)
     simulate = ["simulate", "--rig", rig_path, "--mesh", mesh, "--flat", "--noise", "medium",
                 "--overwrite"]
-    if not (args.out / "captures/captures").exists():
+    if not args.small and not (args.out / "captures/captures").exists():
         program(*simulate, "--gray-code", "--out", args.out / "captures", "--seed", 1)
     calibrated = None if args.small else calibrated_rig(args, program, true_rig)
-    few = max(1, args.draws // 4)  # surface, scan and refinement take long and vary little
+    few = max(1, args.draws // args.share)  # of what takes long
     for draw in range(1, args.draws + 1):
         scene = args.out / "work" / "scene"
         program(*simulate, "--out", scene, "--seed", draw)
         for px in args.errors:
-            methods = METHODS if draw <= few else METHODS[:3]
+            methods = METHODS if draw <= few and not args.small else METHODS[:3]
             rig = common.with_calibration_error(true_rig, px, seed=draw)
             measure(args, program, rows, true_rig, scene, f"calibration {px} px", draw, rig, methods)
-        if calibrated:
+        if calibrated and draw <= few:
             measure(args, program, rows, true_rig, scene, "calibrated", draw, calibrated,
                     METHODS[:4] if draw <= few else METHODS[:3])
-        for noise_px in args.line_noise:
+        for noise_px in args.line_noise if draw <= few else []:
             program(*simulate, "--out", scene, "--seed", draw)
             add_line_noise(scene / "frames/000000", noise_px, seed=draw)
             for px in args.noise_errors:
@@ -246,7 +248,7 @@ def plot(args, rows):
 
 
 if __name__ == "__main__":
-    arguments = common.arguments("table1_cube", __doc__, draws=(20, 1))
+    arguments = common.arguments("table1_cube", __doc__, draws=(20, 1), share=(1, 1))
     arguments.errors = [0, 2] if arguments.small else [0, 1, 2, 3]
     arguments.line_noise = [] if arguments.small else [0.4, 0.8]
     arguments.noise_errors = [0, 2]
