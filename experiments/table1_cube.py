@@ -221,6 +221,7 @@ def plot(args, rows):
     figure, axes = plt.subplots(1, 2, figsize=(9, 3.2))
     shown = [m for m in METHODS if rows.select(method=m)]
     colors = {**common.METHOD_COLORS, "refined joint": "tab:cyan", "refined surface": "tab:purple"}
+    handles = {}
     for at, method in enumerate(shown):
         for px in args.errors:
             key = {"setting": f"calibration {px} px", "method": method}
@@ -232,8 +233,8 @@ def plot(args, rows):
                     continue
                 axis.plot(np.full(len(values), x), values, ".", ms=3, alpha=0.4,
                           color=colors[method])
-                axis.plot(x, np.median(values), "_", ms=9, mew=2, color=colors[method],
-                          label=method if px == args.errors[-1] else None)
+                handles[method], = axis.plot(x, np.median(values), "_", ms=9, mew=2,
+                                             color=colors[method])
     axes[0].set_ylabel("|angle - 90|, degrees")
     axes[1].set_ylabel("RMSE / distance")
     for axis, paper in zip(axes, ((7.7, 0.1), (0.00094, 0.00181))):
@@ -243,7 +244,7 @@ def plot(args, rows):
             axis.axhline(value, color=colors["linear" if name == "A" else "multiview"], lw=0.8, ls=":")
             axis.annotate(f"paper, {name}", (axis.get_xlim()[1], value), fontsize=6, ha="right",
                           va="bottom")
-    axes[0].legend(fontsize=6, ncol=2)
+    figure.legend(handles.values(), handles.keys(), fontsize=7, ncol=7, loc="upper center")
     figure.savefig(args.out / "table1_cube.png")
 
 
