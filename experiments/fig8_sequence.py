@@ -111,13 +111,14 @@ def animate(args):
     cells = []
     for seen, shape in zip(frames, shapes_):
         shape = Image.open(shape).convert("RGB")
-        view = shape.crop((0, 0, shape.width // 3, shape.height // 2)).resize((240, 180))
-        cell = Image.new("RGB", (240, 360))
+        view = shape.crop((0, 0, shape.width // 3, shape.height // 2))
+        view.thumbnail((240, 240))
+        cell = Image.new("RGB", (240, 180 + view.height))
         cell.paste(Image.open(seen).convert("RGB").resize((240, 180)), (0, 0))
         cell.paste(view, (0, 180))
         cells.append(cell)
     shown = cells[:: max(1, len(cells) // 6)][:6]
-    sheet = Image.new("RGB", (240 * len(shown), 360))
+    sheet = Image.new("RGB", (240 * len(shown), cells[0].height))
     for i, cell in enumerate(shown):
         sheet.paste(cell, (240 * i, 0))
     sheet.save(args.out / "fig8_sheet.jpg", quality=85)
