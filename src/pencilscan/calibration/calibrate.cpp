@@ -6,6 +6,7 @@
 
 #include "pencilscan/calibration/priors.h"
 #include "pencilscan/calibration/structure.h"
+#include "pencilscan/core/median.h"
 #include "pencilscan/core/parallel.h"
 
 namespace pencilscan {
@@ -16,14 +17,6 @@ constexpr unsigned kFocal = bit(kFx) | bit(kFy);
 constexpr unsigned kCenter = bit(kCx) | bit(kCy);
 constexpr unsigned kAll = kFocal | kCenter | bit(kK1) | bit(kK2) | bit(kP1) | bit(kP2);
 constexpr double kLeastAngle = 0.02;  ///< rad between rays of a point
-
-double quantile(std::vector<double>& values, double share) {
-  if (values.empty()) return 0;
-  const auto at =
-      values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), at, values.end());
-  return *at;
-}
 
 /// Robust standard deviation of one coordinate's error. A track of n measured views has 2 n - 1
 /// degrees of freedom left, since they choose the depth on the hub's ray.
@@ -42,14 +35,14 @@ double error_scale(const BundleProblem& problem) {
         errors.push_back(std::abs((*error)[k]) * std::sqrt(2 * n / (2 * n - 1)));
     }
   }
-  return 1.4826 * quantile(errors, 0.5);
+  return 1.4826 * lower_quantile(errors, 0.5);
 }
 
 double median_sigma(const BundleProblem& problem) {
   std::vector<double> sigmas;
   for (const Track& track : problem.tracks)
     for (std::size_t i = 1; i < track.views.size(); ++i) sigmas.push_back(track.views[i].sigma_px);
-  return quantile(sigmas, 0.5);
+  return lower_quantile(sigmas, 0.5);
 }
 
 /// Drops views beyond `limit` pixels, and tracks that are left with one view.
@@ -302,8 +295,8 @@ class Calibration {
       double squares = 0;
       for (const double e : errors[d]) squares += e * e;
       r.rms_px = std::sqrt(squares / static_cast<double>(std::max<std::size_t>(r.views, 1)));
-      r.median_px = quantile(errors[d], 0.5);
-      r.p95_px = quantile(errors[d], 0.95);
+      r.median_px = lower_quantile(errors[d], 0.5);
+      r.p95_px = lower_quantile(errors[d], 0.95);
     }
     measure_held_out();
   }

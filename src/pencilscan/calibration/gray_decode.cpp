@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "pencilscan/core/check.h"
+#include "pencilscan/core/median.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/pattern/gray_code.h"
 
@@ -24,14 +25,6 @@ struct NoiseModel {
     return offset + slope * std::max(value, 0.0);
   }
 };
-
-double quantile(std::vector<float>& values, double share) {
-  if (values.empty()) return 0;
-  const auto at =
-      values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), at, values.end());
-  return *at;
-}
 
 struct LevelNoise {
   double value = 0;
@@ -57,7 +50,8 @@ LevelNoise level_noise(const cv::Mat& image, const cv::Mat_<std::uint8_t>& mask)
     }
   }
   constexpr double kLowerQuartileOfAbsoluteNormal = 0.3186;
-  return {quantile(values, 0.5), quantile(residuals, 0.25) / kLowerQuartileOfAbsoluteNormal};
+  return {lower_quantile(values, 0.5),
+          lower_quantile(residuals, 0.25) / kLowerQuartileOfAbsoluteNormal};
 }
 
 NoiseModel noise_model(const GrayStack& stack) {
@@ -66,7 +60,7 @@ NoiseModel noise_model(const GrayStack& stack) {
   std::vector<float> all;
   for (int v = 0; v < contrast.rows; v += 4)
     for (int u = 0; u < contrast.cols; u += 4) all.push_back(contrast.at<float>(v, u));
-  const double bright = quantile(all, 0.98);
+  const double bright = lower_quantile(all, 0.98);
   cv::Mat_<std::uint8_t> lit;
   cv::compare(contrast, 0.25 * bright, lit, cv::CMP_GT);
   const cv::Mat_<std::uint8_t> everywhere(contrast.size(), 255);

@@ -7,6 +7,8 @@
 #include <map>
 #include <vector>
 
+#include "pencilscan/core/median.h"
+
 namespace pencilscan {
 namespace {
 
@@ -53,12 +55,6 @@ struct AxisFit {
   double sigma = 0;
 };
 
-double median_of(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 /// Crossings of one edge of the pattern err alike (texture, place within the pixels): the variance
 /// of the centre with the residuals of an edge added up first (the "sandwich" of clustered data,
 /// Liang and Zeger 1986), for the six degrees of freedom that the fit took.
@@ -101,7 +97,7 @@ std::optional<AxisFit> fit_axis(const std::vector<Crossing>& crossings, double e
       residuals[i] = std::abs(crossings[i].value -
                               fit.coefficients.dot(basis(crossings[i].a, crossings[i].b)));
     const double gradient = std::hypot(fit.coefficients[1], fit.coefficients[2]);
-    scale = std::max(1.4826 * median_of(residuals), 0.5 * edge_sigma * std::max(gradient, 0.2));
+    scale = std::max(1.4826 * upper_median(residuals), 0.5 * edge_sigma * std::max(gradient, 0.2));
     weight_sum = 0;
     for (std::size_t i = 0; i < crossings.size(); ++i) {
       const double t = residuals[i] / (4.685 * scale);  // Tukey: 95 % efficient

@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "pencilscan/calibration/structure.h"
+#include "pencilscan/core/median.h"
 
 namespace pencilscan {
 namespace {
@@ -25,13 +26,8 @@ Vec3 middle_of_points(const BundleProblem& problem) {
       for (std::size_t k = 0; k < 3; ++k)
         coordinates[k].push_back(problem.points[t][static_cast<Eigen::Index>(k)]);
   Vec3 middle = Vec3::Zero();
-  for (std::size_t k = 0; k < 3; ++k) {
-    auto& values = coordinates[k];
-    if (values.empty()) continue;
-    const auto at = values.begin() + std::ptrdiff_t(values.size() / 2);
-    std::nth_element(values.begin(), at, values.end());
-    middle[static_cast<Eigen::Index>(k)] = *at;
-  }
+  for (std::size_t k = 0; k < 3; ++k)
+    middle[static_cast<Eigen::Index>(k)] = upper_median(std::move(coordinates[k]));
   return middle;
 }
 

@@ -11,6 +11,8 @@
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core/eigen.hpp>
 
+#include "pencilscan/core/median.h"
+
 namespace pencilscan {
 namespace {
 
@@ -77,9 +79,7 @@ Seed solve_seed(const BundleProblem& problem, std::size_t a, std::size_t b,
     const Vec3 ray_b(points_b[i].x, points_b[i].y, 1);
     angles.push_back(std::acos(std::clamp(ray_a.normalized().dot(ray_b.normalized()), -1.0, 1.0)));
   }
-  std::nth_element(angles.begin(), angles.begin() + std::ptrdiff_t(angles.size() / 2),
-                   angles.end());
-  seed.score = front * std::min(angles[angles.size() / 2], 0.5);
+  seed.score = front * std::min(upper_median(std::move(angles)), 0.5);
   return seed;
 }
 

@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "pencilscan/calibration/structure.h"
+#include "pencilscan/core/median.h"
 #include "pencilscan/core/random.h"
 
 namespace pencilscan {
@@ -20,14 +21,6 @@ Mat3 cross_matrix(const Vec3& v) {
   Mat3 m;
   m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
   return m;
-}
-
-double quantile(std::vector<double> values, double share) {
-  if (values.empty()) return 0;
-  const auto at =
-      values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), at, values.end());
-  return *at;
 }
 
 /// Normal equations of all devices, 15 numbers each: a small rotation in the device's frame
@@ -52,7 +45,7 @@ class NormalEquations {
   [[nodiscard]] const Eigen::MatrixXd& H() const { return H_; }
   [[nodiscard]] bool is_free(Eigen::Index i) const { return free_[static_cast<std::size_t>(i)]; }
   [[nodiscard]] double variance_factor() const {
-    const double scale = 1.4826 * quantile(residuals_, 0.5);
+    const double scale = 1.4826 * lower_quantile(residuals_, 0.5);
     return scale * scale;
   }
 
@@ -283,8 +276,8 @@ void measure_volume(const BundleProblem& problem, const Covariance& covariance, 
   std::vector<double> sigmas;
   for (std::size_t i = 0; i < count; ++i)
     if (draws[i] > 0) sigmas.push_back(std::sqrt(squares[i] / draws[i]));
-  result.volume_median = quantile(sigmas, 0.5);
-  result.volume_p95 = quantile(sigmas, 0.95);
+  result.volume_median = lower_quantile(sigmas, 0.5);
+  result.volume_p95 = lower_quantile(sigmas, 0.95);
 }
 
 }  // namespace
@@ -305,7 +298,7 @@ Uncertainty uncertainty(const BundleProblem& problem, unsigned free_inner, doubl
   std::vector<double> radii;
   for (std::size_t t = 0; t < problem.points.size(); ++t)
     if (problem.used[t] != 0) radii.push_back((problem.points[t] - middle).norm());
-  result.volume_radius = quantile(radii, 0.9);
+  result.volume_radius = lower_quantile(radii, 0.9);
   double distance = 0;
   for (const BundleDevice& device : problem.devices)
     if (device.present) distance = std::max(distance, (center_of(device) - middle).norm());

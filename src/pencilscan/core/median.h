@@ -15,4 +15,15 @@ template <typename Number>
   return *middle;
 }
 
+/// The value that a share of the others is not above: of n in order of size, element
+/// share (n - 1), rounded down. 0 for no values. share in [0, 1].
+template <typename Number>
+[[nodiscard]] Number lower_quantile(std::vector<Number> values, double share) {
+  if (values.empty()) return Number{0};
+  const auto at =
+      values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), at, values.end());
+  return *at;
+}
+
 }  // namespace pencilscan

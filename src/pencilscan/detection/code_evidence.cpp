@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "pencilscan/core/lanes.h"
+#include "pencilscan/core/median.h"
 #include "pencilscan/detection/refine.h"
 
 namespace pencilscan {
@@ -192,9 +193,7 @@ Eigen::Vector3f channel_gains(const std::vector<std::vector<ColorAmplitude>>& am
       }
     }
     if (ratios.size() < 100) continue;
-    const auto middle = ratios.begin() + static_cast<std::ptrdiff_t>(ratios.size() / 2);
-    std::nth_element(ratios.begin(), middle, ratios.end());
-    gains[c] = *middle;
+    gains[c] = upper_median(std::move(ratios));
   }
   return gains;
 }

@@ -5,6 +5,7 @@
 #include <limits>
 #include <unordered_map>
 
+#include "pencilscan/core/median.h"
 #include "pencilscan/core/parallel.h"
 
 namespace pencilscan {
@@ -83,9 +84,8 @@ void scale_to_one(AlbedoEstimate& estimate) {
     if (!std::isnan(a)) known.push_back(a);
   }
   if (known.empty()) return;
-  const auto at = known.begin() + static_cast<std::ptrdiff_t>(0.95 * double(known.size() - 1));
-  std::nth_element(known.begin(), at, known.end());
-  const float factor = *at > 0 ? 0.9F / *at : 1.0F;
+  const float high = lower_quantile(std::move(known), 0.95);
+  const float factor = high > 0 ? 0.9F / high : 1.0F;
   for (float& a : estimate.points) a *= factor;
 }
 

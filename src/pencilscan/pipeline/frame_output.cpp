@@ -4,6 +4,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "pencilscan/core/median.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/report/overlay.h"
 #include "pencilscan/report/pictures.h"
@@ -45,11 +46,7 @@ ordered_json camera_report(const Rig& rig, const Frame& frame, const PointResult
   report["crossings"] = graph.crossings.size();
   report["components"] = graph.component_count;
   report["connections_cut"] = graph.cut_connections;
-  if (!sigmas.empty()) {
-    const auto middle = sigmas.begin() + static_cast<std::ptrdiff_t>(sigmas.size() / 2);
-    std::nth_element(sigmas.begin(), middle, sigmas.end());
-    report["curve_sigma_median_px"] = number(*middle);
-  }
+  if (!sigmas.empty()) report["curve_sigma_median_px"] = number(upper_median(std::move(sigmas)));
   if (c < result.labeling.undecided.size()) {
     const auto points = undecided_points(result.labeling.undecided[c], result.labeling.runs[c]);
     report["undecided_points"] = {{"no_crossing", points[0]},

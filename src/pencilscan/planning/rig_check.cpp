@@ -6,6 +6,7 @@
 #include <numbers>
 #include <optional>
 
+#include "pencilscan/core/median.h"
 #include "pencilscan/core/parallel.h"
 
 namespace pencilscan {
@@ -160,13 +161,6 @@ SampleView view_sample(const Rig& rig, const std::vector<LineFamily>& families,
   return view;
 }
 
-double median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 double share(std::size_t part, std::size_t whole) {
   return whole == 0 ? 0 : static_cast<double>(part) / static_cast<double>(whole);
 }
@@ -191,9 +185,9 @@ PairCheck check_pair(const std::vector<SampleView>& views, std::size_t camera,
   pair.shared = sensitivity.size();
   pair.sensitive_share = share(sensitive, pair.shared);
   pair.usable_share = share(usable, pair.shared);
-  pair.sensitivity_median = median(std::move(sensitivity));
-  pair.px_per_mm_median = median(std::move(px_per_mm));
-  pair.spacing_median_px = median(std::move(spacing));
+  pair.sensitivity_median = upper_median(std::move(sensitivity));
+  pair.px_per_mm_median = upper_median(std::move(px_per_mm));
+  pair.spacing_median_px = upper_median(std::move(spacing));
   return pair;
 }
 

@@ -7,6 +7,7 @@
 #include <optional>
 #include <tuple>
 
+#include "pencilscan/core/median.h"
 #include "pencilscan/core/parallel.h"
 
 namespace pencilscan {
@@ -138,13 +139,6 @@ void join(const Rig& rig, std::span<const Sighting> sightings, const TrackOption
   }
 }
 
-double median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 }  // namespace
 
 std::vector<CrossingTrack> crossing_tracks(const Rig& rig, std::span<const GridGraph> graphs,
@@ -202,8 +196,8 @@ CrossingDisagreement crossing_disagreement(const Rig& rig, std::span<const Cross
     }
   }
   constexpr double kMedianOfAbsoluteNormal = 0.6745;
-  return {misses.size(), median(std::move(misses)),
-          kMedianOfAbsoluteNormal * median(std::move(noises))};
+  return {misses.size(), upper_median(std::move(misses)),
+          kMedianOfAbsoluteNormal * upper_median(std::move(noises))};
 }
 
 bool disagrees(const CrossingDisagreement& crossings) {

@@ -10,6 +10,7 @@
 #include <memory>
 #include <optional>
 
+#include "pencilscan/core/median.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/refinement/determinacy.h"
 #include "pencilscan/refinement/track_residual.h"
@@ -104,13 +105,6 @@ std::string short_number(double value) {
   return text.data();
 }
 
-double median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 std::vector<PoseCorrection> poses_of(const TrackResidual& residual, const Scales& scales,
                                      const std::vector<Parameters>& parameters) {
   std::vector<PoseCorrection> poses;
@@ -131,7 +125,7 @@ double residual_scale(const std::vector<TrackResidual>& residuals,
     ratios[t] =
         value ? std::sqrt(value->residual.squaredNorm() / (k * std::pow(1 - 2 / (9 * k), 3))) : 1e9;
   });
-  return median(std::move(ratios));
+  return upper_median(std::move(ratios));
 }
 
 /// One robust solution at a fixed scale of the residuals.

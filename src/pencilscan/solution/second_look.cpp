@@ -6,6 +6,7 @@
 #include <tuple>
 #include <utility>
 
+#include "pencilscan/core/median.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/detection/profile_fit.h"
 #include "pencilscan/detection/refine.h"
@@ -318,9 +319,7 @@ bool CameraLook::fits(const CurvePoint& point, const LineName& name, int family)
       around.push_back(k.amplitude);
   });
   if (static_cast<int>(around.size()) < options_.min_support) return false;
-  const auto middle = around.begin() + static_cast<std::ptrdiff_t>(around.size() / 2);
-  std::nth_element(around.begin(), middle, around.end());
-  return point.amplitude > options_.min_amplitude * *middle;
+  return point.amplitude > options_.min_amplitude * upper_median(std::move(around));
 }
 
 /// A curve where a line is predicted, as wide as it would be there.
