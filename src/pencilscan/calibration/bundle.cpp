@@ -222,6 +222,11 @@ BundleSummary adjust(BundleProblem& problem, const BundleOptions& options) {
   return builder.solve();
 }
 
+std::size_t present_devices(const BundleProblem& problem) {
+  return static_cast<std::size_t>(std::count_if(problem.devices.begin(), problem.devices.end(),
+                                                [](const BundleDevice& d) { return d.present; }));
+}
+
 std::optional<Vec2> view_error(const BundleDevice& device, const Vec3& point,
                                const TrackView& view) {
   Vec2 pixel;

@@ -77,6 +77,25 @@ BundleSummary adjust(BundleProblem& problem, const BundleOptions& options);
 [[nodiscard]] std::optional<Vec2> view_error(const BundleDevice& device, const Vec3& point,
                                              const TrackView& view);
 
+/// visit(track index, view, error) for what present devices saw of the points in use; hubs, which
+/// are exact, left out.
+template <class Visit>
+void for_each_residual(const BundleProblem& problem, Visit visit) {
+  for (std::size_t t = 0; t < problem.points.size(); ++t) {
+    if (problem.used[t] == 0) continue;
+    const auto& views = problem.tracks[t].views;
+    for (std::size_t i = 1; i < views.size(); ++i) {
+      const BundleDevice& device = problem.devices[views[i].device];
+      if (!device.present) continue;
+      if (const auto error = view_error(device, problem.points[t], views[i]))
+        visit(t, views[i], *error);
+    }
+  }
+}
+
+/// Number of devices that have a pose.
+[[nodiscard]] std::size_t present_devices(const BundleProblem& problem);
+
 /// Residual and its derivatives of one view, whitened: d / d pose (2 x 6), inner (2 x 9) and point
 /// (2 x 3), by automatic differentiation of the same code that adjust() uses.
 struct ViewLinearization {

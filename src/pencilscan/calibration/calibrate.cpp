@@ -22,19 +22,11 @@ constexpr double kLeastAngle = 0.02;  ///< rad between rays of a point
 /// degrees of freedom left, since they choose the depth on the hub's ray.
 double error_scale(const BundleProblem& problem) {
   std::vector<double> errors;
-  for (std::size_t t = 0; t < problem.tracks.size(); ++t) {
-    if (problem.used[t] == 0) continue;
-    const Track& track = problem.tracks[t];
-    const double n = static_cast<double>(track.views.size()) - 1;
-    for (std::size_t i = 1; i < track.views.size(); ++i) {
-      const BundleDevice& device = problem.devices[track.views[i].device];
-      if (!device.present) continue;
-      const auto error = view_error(device, problem.points[t], track.views[i]);
-      if (!error) continue;
-      for (Eigen::Index k = 0; k < 2; ++k)
-        errors.push_back(std::abs((*error)[k]) * std::sqrt(2 * n / (2 * n - 1)));
-    }
-  }
+  for_each_residual(problem, [&](std::size_t t, const TrackView&, const Vec2& error) {
+    const double n = static_cast<double>(problem.tracks[t].views.size()) - 1;
+    for (Eigen::Index k = 0; k < 2; ++k)
+      errors.push_back(std::abs(error[k]) * std::sqrt(2 * n / (2 * n - 1)));
+  });
   return 1.4826 * lower_quantile(errors, 0.5);
 }
 
@@ -159,9 +151,7 @@ class Calibration {
     std::size_t best = tried.size();
     std::size_t most = 1;
     for (std::size_t i = 0; i < tried.size(); ++i) {
-      const auto placed = static_cast<std::size_t>(
-          std::count_if(problems[i].devices.begin(), problems[i].devices.end(),
-                        [](const BundleDevice& d) { return d.present; }));
+      const std::size_t placed = present_devices(problems[i]);
       if (placed < most || !std::isfinite(costs[i])) continue;
       if (placed == most && best < tried.size() && costs[i] >= costs[best]) continue;
       best = i;
@@ -275,19 +265,11 @@ class Calibration {
     const BundleProblem& problem = result_.problem;
     std::vector<std::vector<double>> errors(problem.devices.size());
     double sum = 0;
-    for (std::size_t t = 0; t < problem.tracks.size(); ++t) {
-      if (problem.used[t] == 0) continue;
-      const auto& views = problem.tracks[t].views;
-      for (std::size_t i = 1; i < views.size(); ++i) {
-        if (!problem.devices[views[i].device].present) continue;
-        const auto error =
-            view_error(problem.devices[views[i].device], problem.points[t], views[i]);
-        if (!error) continue;
-        errors[views[i].device].push_back(error->norm());
-        sum += error->squaredNorm();
-        ++result_.views;
-      }
-    }
+    for_each_residual(problem, [&](std::size_t, const TrackView& view, const Vec2& error) {
+      errors[view.device].push_back(error.norm());
+      sum += error.squaredNorm();
+      ++result_.views;
+    });
     result_.rms_px = std::sqrt(sum / static_cast<double>(std::max<std::size_t>(result_.views, 1)));
     for (std::size_t d = 0; d < errors.size(); ++d) {
       DeviceResiduals& r = result_.residuals[d];

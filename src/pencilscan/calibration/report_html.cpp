@@ -90,18 +90,11 @@ std::string residual_plot(const CalibrationReport& report, std::size_t d,
   std::string svg = "<figure><svg width='240' height='" + at(height) +
                     "' role='img'><rect width='240' height='" + at(height) +
                     "' fill='#f3f6f8' stroke='#b8c4cc'/>";
-  const BundleProblem& problem = report.result.problem;
-  std::size_t seen = 0;
-  const std::size_t step = report.result.residuals[d].views / 500 + 1;
-  for (std::size_t t = 0; t < problem.points.size(); ++t) {
-    if (problem.used[t] == 0) continue;
-    for (std::size_t i = 1; i < problem.tracks[t].views.size(); ++i) {
-      const TrackView& view = problem.tracks[t].views[i];
-      if (view.device != d || seen++ % step != 0) continue;
-      svg += "<circle cx='" + at(view.pixel.x() * scale) + "' cy='" + at(view.pixel.y() * scale) +
-             "' r='1' fill='#9fb3c1'/>";
-    }
-  }
+  constexpr std::size_t kMostDots = 500;
+  for_some_residuals(report, d, kMostDots, [&](const TrackView& view, const Vec2&) {
+    svg += "<circle cx='" + at(view.pixel.x() * scale) + "' cy='" + at(view.pixel.y() * scale) +
+           "' r='1' fill='#9fb3c1'/>";
+  });
   for (std::size_t i = 0; i < cells.size(); ++i) {
     if (cells[i].views < 10) continue;
     const double x = (static_cast<double>(i % 4) + 0.5) * kWidth / 4;

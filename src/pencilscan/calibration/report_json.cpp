@@ -14,22 +14,12 @@ Json list(const Vec3& v) { return {v.x(), v.y(), v.z()}; }
 /// A few hundred [u, v, du, dv], px: where the device saw a point, and how far off it is predicted.
 Json residuals_json(const CalibrationReport& report, std::size_t d) {
   constexpr std::size_t kMost = 400;
-  const BundleProblem& problem = report.result.problem;
-  const std::size_t step = report.result.residuals[d].views / kMost + 1;
   const auto rounded = [](double px) { return std::round(1000 * px) / 1000; };
   Json residuals = Json::array();
-  std::size_t seen = 0;
-  for (std::size_t t = 0; t < problem.points.size(); ++t) {
-    if (problem.used[t] == 0) continue;
-    for (std::size_t i = 1; i < problem.tracks[t].views.size(); ++i) {
-      const TrackView& view = problem.tracks[t].views[i];
-      if (view.device != d || seen++ % step != 0) continue;
-      const auto error = view_error(problem.devices[d], problem.points[t], view);
-      if (!error) continue;
-      residuals.push_back({rounded(view.pixel.x()), rounded(view.pixel.y()), rounded(error->x()),
-                           rounded(error->y())});
-    }
-  }
+  for_some_residuals(report, d, kMost, [&](const TrackView& view, const Vec2& error) {
+    residuals.push_back(
+        {rounded(view.pixel.x()), rounded(view.pixel.y()), rounded(error.x()), rounded(error.y())});
+  });
   return residuals;
 }
 

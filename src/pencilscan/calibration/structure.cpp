@@ -192,9 +192,23 @@ void grow(BundleProblem& problem, const std::vector<std::size_t>& tracks,
   }
 }
 
-std::size_t present_devices(const BundleProblem& problem) {
-  return static_cast<std::size_t>(std::count_if(problem.devices.begin(), problem.devices.end(),
-                                                [](const BundleDevice& d) { return d.present; }));
+/// What an attempt changes in a problem: all but what was seen.
+struct Placement {
+  std::vector<BundleDevice> devices;
+  std::vector<Vec3> points;
+  std::vector<char> used;
+  std::vector<std::array<double, 6>> board_poses;
+};
+
+Placement placement_of(const BundleProblem& problem) {
+  return {problem.devices, problem.points, problem.used, problem.board_poses};
+}
+
+void place(const Placement& placement, BundleProblem& problem) {
+  problem.devices = placement.devices;
+  problem.points = placement.points;
+  problem.used = placement.used;
+  problem.board_poses = placement.board_poses;
 }
 
 /// Triangulates what the present devices see and joins the others, with all tracks where the chosen
@@ -288,18 +302,22 @@ double build_structure(BundleProblem& problem, unsigned free_inner,
     std::vector<Seed> seeds = seeds_of(problem, tracks);
     if (seeds.empty()) return std::numeric_limits<double>::infinity();
     seeds.resize(std::min(seeds.size(), kMostSeeds));
-    const BundleProblem nothing = problem;
-    BundleProblem best = problem;
+    const Placement nothing = placement_of(problem);
+    Placement best = nothing;
+    std::size_t most = 0;
     for (const Seed& seed : seeds) {
-      problem = nothing;
+      place(nothing, problem);
       set_pose(problem.devices[seed.a], Mat3::Identity(), Vec3::Zero());
       set_pose(problem.devices[seed.b], seed.rotation, seed.translation);
       problem.devices[seed.a].present = problem.devices[seed.b].present = true;
       grow_from_present(problem, tracks, bundle, options);
-      if (present_devices(problem) > present_devices(best)) best = problem;
-      if (present_devices(best) == problem.devices.size()) break;
+      if (present_devices(problem) > most) {
+        most = present_devices(problem);
+        best = placement_of(problem);
+      }
+      if (most == problem.devices.size()) break;
     }
-    problem = std::move(best);
+    place(best, problem);
   }
   bundle.max_iterations = 60;
   const BundleSummary summary = adjust(problem, bundle);

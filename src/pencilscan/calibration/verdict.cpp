@@ -242,26 +242,16 @@ std::string to_string(Grade grade) {
 std::vector<std::vector<TrendCell>> residual_trends(const CalibrationResult& result) {
   std::vector<std::vector<TrendCell>> trends(result.placed.size(),
                                              std::vector<TrendCell>(kCells * kCells));
-  const BundleProblem& problem = result.problem;
-  for (std::size_t t = 0; t < problem.points.size(); ++t) {
-    if (problem.used[t] == 0) continue;
-    const auto& views = problem.tracks[t].views;
-    for (std::size_t i = 1; i < views.size(); ++i) {
-      const std::size_t d = views[i].device;
-      if (!problem.devices[d].present) continue;
-      const auto error = view_error(problem.devices[d], problem.points[t], views[i]);
-      if (!error) continue;
-      const Device& device = calibrated_device(result.rig, d);
-      const auto cell = [](double x, int size) {
-        return std::clamp(static_cast<int>((x + 0.5) * kCells / size), 0, kCells - 1);
-      };
-      TrendCell& at =
-          trends[d][static_cast<std::size_t>(kCells * cell(views[i].pixel.y(), device.height) +
-                                             cell(views[i].pixel.x(), device.width))];
-      ++at.views;
-      at.mean += *error;
-    }
-  }
+  const auto cell = [](double x, int size) {
+    return std::clamp(static_cast<int>((x + 0.5) * kCells / size), 0, kCells - 1);
+  };
+  for_each_residual(result.problem, [&](std::size_t, const TrackView& view, const Vec2& error) {
+    const Device& device = calibrated_device(result.rig, view.device);
+    TrendCell& at = trends[view.device][static_cast<std::size_t>(
+        kCells * cell(view.pixel.y(), device.height) + cell(view.pixel.x(), device.width))];
+    ++at.views;
+    at.mean += error;
+  });
   for (auto& cells : trends)
     for (TrendCell& cell : cells)
       if (cell.views > 0) cell.mean /= cell.views;
