@@ -242,13 +242,13 @@ std::string to_string(Grade grade) {
 std::vector<std::vector<TrendCell>> residual_trends(const CalibrationResult& result) {
   std::vector<std::vector<TrendCell>> trends(result.placed.size(),
                                              std::vector<TrendCell>(kCells * kCells));
-  const auto cell = [](double x, int size) {
+  const auto cell_of = [](double x, int size) {
     return std::clamp(static_cast<int>((x + 0.5) * kCells / size), 0, kCells - 1);
   };
   for_each_residual(result.problem, [&](std::size_t, const TrackView& view, const Vec2& error) {
     const Device& device = calibrated_device(result.rig, view.device);
     TrendCell& at = trends[view.device][static_cast<std::size_t>(
-        kCells * cell(view.pixel.y(), device.height) + cell(view.pixel.x(), device.width))];
+        kCells * cell_of(view.pixel.y(), device.height) + cell_of(view.pixel.x(), device.width))];
     ++at.views;
     at.mean += error;
   });
