@@ -5,6 +5,8 @@ function(pencilscan_target_options target)
   target_compile_features(${target} PUBLIC cxx_std_20)
   set_target_properties(${target} PROPERTIES CXX_EXTENSIONS OFF)
   target_compile_options(${target} PRIVATE -Wall -Wextra -Wpedantic -Wshadow -Wconversion)
+  # Nobody reads errno or floating-point traps: square roots and comparisons may run in registers.
+  target_compile_options(${target} PRIVATE -fno-math-errno -fno-trapping-math)
   if(PENCILSCAN_WERROR)
     target_compile_options(${target} PRIVATE -Werror)
   endif()

@@ -6,6 +6,7 @@
 #include <limits>
 #include <utility>
 
+#include "pencilscan/core/lanes.h"
 #include "pencilscan/detection/cell_index.h"
 
 namespace pencilscan {
@@ -24,43 +25,96 @@ struct LinkRule {
   float min_cosine;
 };
 
+/// Ridgels in columns; after the last, more that never count.
+struct RidgelColumns {
+  std::vector<float> x, y, nx, ny;
+
+  void add(float px, float py, float normal_x, float normal_y) {
+    x.push_back(px);
+    y.push_back(py);
+    nx.push_back(normal_x);
+    ny.push_back(normal_y);
+  }
+};
+
+/// Those of eight ridgels that the rule links to one, and what a link would cost.
+struct EightLinks {
+  std::array<float, kLanes> cost;
+  std::array<float, kLanes> forward;  ///< way along the tangent (-ny, nx)
+  std::array<float, kLanes> turned;   ///< cosine between the normals; < 0: runs the other way
+  std::array<int, kLanes> is_linked;
+};
+
+PENCILSCAN_INLINE void absolute(const Lanes& x, Lanes& result) { result = x < 0 ? -x : x; }
+
+/// False if there are none.
+PENCILSCAN_CLONES
+bool look_at_eight(const float* x, const float* y, const float* nx, const float* ny,
+                   const Ridgel& own, const LinkRule& rule, EightLinks& links) {
+  Lanes dx;
+  Lanes dy;
+  Lanes other_nx;
+  Lanes other_ny;
+  load(x, dx);
+  load(y, dy);
+  load(nx, other_nx);
+  load(ny, other_ny);
+  dx -= own.x;
+  dy -= own.y;
+  const Lanes forward = dy * own.nx - dx * own.ny;
+  Lanes along;
+  absolute(forward, along);
+  Lanes lateral;
+  absolute(dx * own.nx + dy * own.ny, lateral);
+  const Lanes turned = own.nx * other_nx + own.ny * other_ny;
+  Lanes cosine;
+  absolute(turned, cosine);
+  const IntLanes is_linked = (along >= rule.min_along) & (along <= rule.max_along) &
+                             (lateral <= rule.lateral_base + rule.lateral_slope * along) &
+                             (cosine >= rule.min_cosine);
+  if (!any(is_linked)) return false;
+  store(along + 2 * lateral + 4 * (1 - cosine), links.cost.data());
+  store(forward, links.forward.data());
+  store(turned, links.turned.data());
+  for (int k = 0; k < kLanes; ++k) links.is_linked[static_cast<std::size_t>(k)] = is_linked[k];
+  return true;
+}
+
 /// For every end of the ridgels (2 i against the tangent of ridgel i, 2 i + 1 along it) the best
 /// facing end, or -1.
 std::vector<int> best_facing_ends(std::span<const Ridgel> ridgels, cv::Size size,
                                   const LinkRule& rule) {
   const CellIndex index(size, kCellPx, ridgels.size(),
                         [&](std::size_t i) { return std::pair(ridgels[i].x, ridgels[i].y); });
-  std::vector<Ridgel> ordered;
-  ordered.reserve(ridgels.size());
-  for (const int i : index.items()) ordered.push_back(ridgels[static_cast<std::size_t>(i)]);
+  RidgelColumns ordered;
+  for (const int i : index.items()) {
+    const Ridgel& r = ridgels[static_cast<std::size_t>(i)];
+    ordered.add(r.x, r.y, r.nx, r.ny);
+  }
+  for (int k = 0; k < kLanes; ++k) ordered.add(0, 0, 0, 0);
   const float radius =
       std::hypot(rule.max_along, rule.lateral_base + rule.lateral_slope * rule.max_along);
   std::vector<int> best(2 * ridgels.size(), -1);
+  EightLinks links;
   for (std::size_t e = 0; e < ridgels.size(); ++e) {
-    const Ridgel& own = ridgels[e];
     std::array<float, 2> best_cost{};
     best_cost.fill(std::numeric_limits<float>::max());
-    index.ranges(own.x, own.y, radius, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t k = begin; k < end; ++k) {
-        const Ridgel& other = ordered[k];
-        const float x = other.x - own.x;
-        const float y = other.y - own.y;
-        const float forward = y * own.nx - x * own.ny;  // along the tangent (-ny, nx)
-        const float along = std::abs(forward);
-        if (along < rule.min_along || along > rule.max_along) continue;
-        const float lateral = std::abs(x * own.nx + y * own.ny);
-        if (lateral > rule.lateral_base + rule.lateral_slope * along) continue;
-        const float turned = own.nx * other.nx + own.ny * other.ny;  // < 0: runs the other way
-        const float cosine = std::abs(turned);
-        if (cosine < rule.min_cosine) continue;
-        // The end that looks back at us.
-        const std::size_t side = forward > 0 ? 1 : 0;
-        const int f = 2 * index.items()[k] + ((turned > 0) == (side == 1) ? 0 : 1);
-        const float cost = along + 2 * lateral + 4 * (1 - cosine);
-        int& known = best[2 * e + side];
-        if (cost < best_cost[side] || (cost == best_cost[side] && f < known)) {
-          best_cost[side] = cost;
-          known = f;
+    index.ranges(ridgels[e].x, ridgels[e].y, radius, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t first = begin; first < end; first += kLanes) {
+        if (!look_at_eight(&ordered.x[first], &ordered.y[first], &ordered.nx[first],
+                           &ordered.ny[first], ridgels[e], rule, links))
+          continue;
+        for (std::size_t k = 0; k < std::min<std::size_t>(kLanes, end - first); ++k) {
+          if (links.is_linked[k] == 0) continue;
+          // The end that looks back at us.
+          const std::size_t side = links.forward[k] > 0 ? 1 : 0;
+          const int f =
+              2 * index.items()[first + k] + ((links.turned[k] > 0) == (side == 1) ? 0 : 1);
+          int& known = best[2 * e + side];
+          if (links.cost[k] < best_cost[side] || (links.cost[k] == best_cost[side] && f < known)) {
+            best_cost[side] = links.cost[k];
+            known = f;
+          }
         }
       }
       return true;

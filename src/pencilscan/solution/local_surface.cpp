@@ -130,6 +130,17 @@ PENCILSCAN_CLONES std::size_t count_within(const float* deviation, std::size_t s
   return count;
 }
 
+PENCILSCAN_CLONES void weigh_by_distance(const float* x, const float* y, std::size_t size,
+                                         float* near) {
+  for (std::size_t i = 0; i < size; i += kLanes) {
+    Lanes lx, ly, weight;
+    load(x + i, lx);
+    load(y + i, ly);
+    exponential(-0.5F * (lx * lx + ly * ly), weight);
+    store(weight, near + i);
+  }
+}
+
 Matrix6f normal_matrix(const std::array<float, 15>& s) {
   Matrix6f N;
   N << s[0], s[1], s[2], s[3], s[4], s[5],    //
@@ -158,28 +169,32 @@ Vector2f SurfacePatch::gradient(const Vector2f& at) const {
 struct LocalSurface::Neighborhood {
   std::vector<float> x, y, z, inverse_sigma, near, deviation;
   std::size_t count = 0;
+  std::size_t padded = 0;  ///< count, to whole registers
 
-  void clear() {
-    for (auto* v : {&x, &y, &z, &inverse_sigma}) v->clear();
+  /// Room for `most` samples; none yet.
+  void start(std::size_t most) {
+    for (auto* v : {&x, &y, &z, &inverse_sigma, &near, &deviation})
+      v->resize(std::max(v->size(), most + kLanes));
     count = 0;
   }
-  void add(const Vector2f& d, const Sample& sample) {
-    x.push_back(d.x());
-    y.push_back(d.y());
-    z.push_back(sample.w);
-    inverse_sigma.push_back(1 / sample.sigma);
-    ++count;
+  /// Adds a sample at d if that is wanted.
+  void add(const Vector2f& d, const Sample& sample, bool is_wanted) {
+    x[count] = d.x();
+    y[count] = d.y();
+    z[count] = sample.w;
+    inverse_sigma[count] = sample.inverse_sigma;
+    count += is_wanted ? 1 : 0;
   }
-  void pad() {
-    while (x.size() % kLanes != 0) {
-      for (auto* v : {&x, &y, &z, &inverse_sigma}) v->push_back(0);
-    }
-    near.resize(x.size());
-    deviation.assign(x.size(), 0.F);
+  void finish() {
+    padded = (count + kLanes - 1) / kLanes * kLanes;
+    for (auto* v : {&x, &y, &z, &inverse_sigma})
+      std::fill(v->data() + count, v->data() + padded, 0.F);
+    std::fill(deviation.data(), deviation.data() + padded, 0.F);
+    weigh_by_distance(x.data(), y.data(), padded, near.data());
   }
   Columns columns() {
     return {x.data(),    y.data(),         z.data(), inverse_sigma.data(),
-            near.data(), deviation.data(), x.size()};
+            near.data(), deviation.data(), padded};
   }
   /// 1.5 times the median of the absolute deviations, at least 1, on a scale of steps of a quarter.
   [[nodiscard]] float scale_of_deviations() const {
@@ -187,9 +202,9 @@ struct LocalSurface::Neighborhood {
     constexpr float kStep = 1.25F;
     constexpr float kMost = 1e6F;
     float scale = 1;
-    const std::size_t padding = deviation.size() - count;
+    const std::size_t padding = padded - count;
     const auto agreeing = [&] {
-      return count_within(deviation.data(), deviation.size(), scale / kPerMedian) - padding;
+      return count_within(deviation.data(), padded, scale / kPerMedian) - padding;
     };
     while (2 * agreeing() <= count && scale < kMost) scale *= kStep;
     return scale;
@@ -197,17 +212,6 @@ struct LocalSurface::Neighborhood {
 };
 
 namespace {
-
-PENCILSCAN_CLONES void weigh_by_distance(const float* x, const float* y, std::size_t size,
-                                         float* near) {
-  for (std::size_t i = 0; i < size; i += kLanes) {
-    Lanes lx, ly, weight;
-    load(x + i, lx);
-    load(y + i, ly);
-    exponential(-0.5F * (lx * lx + ly * ly), weight);
-    store(weight, near + i);
-  }
-}
 
 /// Pixels of a lattice that every line of pixels, upright, flat or diagonal, meets as often.
 bool is_used(float u, float v, int used_of_seven) {
@@ -249,7 +253,7 @@ void LocalSurface::add(std::span<const MeasuredPoint> points) {
     const float relative = p.sigma / static_cast<float>(way.norm());
     Cell& cell = cells_[static_cast<std::size_t>(cell_row(p.v) * cell_columns_ + cell_column(p.u))];
     cell.samples.push_back({Vector2f(p.u, p.v), static_cast<float>(1 / way.dot(forward_)),
-                            std::sqrt(relative * relative + floor_ * floor_)});
+                            1 / std::sqrt(relative * relative + floor_ * floor_)});
     cell.has_news = true;
   }
   Neighborhood around;
@@ -285,28 +289,33 @@ const SurfacePatch* LocalSurface::nearest(const Vector2f& pixel) const {
 }
 
 bool LocalSurface::gather(const Vector2f& pixel, float scale, Neighborhood& around) const {
-  around.clear();
   const float reach = 2 * scale;
   const int left = cell_column(pixel.x() - reach);
   const int right = cell_column(pixel.x() + reach);
   const int top = cell_row(pixel.y() - reach);
   const int bottom = cell_row(pixel.y() + reach);
-  bool has_news = false;
-  for (int y = top; y <= bottom; ++y) {
-    for (int x = left; x <= right; ++x)
-      has_news = has_news || cells_[static_cast<std::size_t>(y * cell_columns_ + x)].has_news;
-  }
-  if (!has_news) return false;
-  for (int y = top; y <= bottom; ++y) {
-    for (int x = left; x <= right; ++x) {
-      for (const Sample& s : cells_[static_cast<std::size_t>(y * cell_columns_ + x)].samples) {
-        const Vector2f d = (s.pixel - pixel) / scale;
-        if (d.squaredNorm() < 4) around.add(d, s);
-      }
+  const auto for_each_cell = [&](auto visit) {
+    for (int y = top; y <= bottom; ++y) {
+      for (int x = left; x <= right; ++x)
+        visit(cells_[static_cast<std::size_t>(y * cell_columns_ + x)]);
     }
-  }
-  around.pad();
-  weigh_by_distance(around.x.data(), around.y.data(), around.x.size(), around.near.data());
+  };
+  bool has_news = false;
+  std::size_t most = 0;
+  for_each_cell([&](const Cell& cell) {
+    has_news = has_news || cell.has_news;
+    most += cell.samples.size();
+  });
+  if (!has_news) return false;
+  around.start(most);
+  const float per_scale = 1 / scale;
+  for_each_cell([&](const Cell& cell) {
+    for (const Sample& s : cell.samples) {
+      const Vector2f d = (s.pixel - pixel) * per_scale;
+      around.add(d, s, d.squaredNorm() < 4);
+    }
+  });
+  around.finish();
   return true;
 }
 

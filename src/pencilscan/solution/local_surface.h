@@ -60,8 +60,8 @@ class LocalSurface {
  private:
   struct Sample {
     Eigen::Vector2f pixel;
-    float w;      ///< inverse depth
-    float sigma;  ///< relative
+    float w;              ///< inverse depth
+    float inverse_sigma;  ///< 1 / relative standard deviation
   };
   struct Cell {
     std::vector<Sample> samples;

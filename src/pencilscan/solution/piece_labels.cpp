@@ -143,10 +143,12 @@ void keep_supported(LabelledPieces& pieces, const JointOptions& options) {
     std::vector<std::size_t> order(labels.size());
     for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
     const std::size_t count = std::min(labels.size(), max_labels);
-    std::partial_sort(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(count),
-                      order.end(), [&](std::size_t i, std::size_t j) {
-                        return scores[p][i] != scores[p][j] ? scores[p][i] < scores[p][j] : i < j;
-                      });
+    if (count < order.size()) {
+      std::nth_element(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(count),
+                       order.end(), [&](std::size_t i, std::size_t j) {
+                         return scores[p][i] != scores[p][j] ? scores[p][i] < scores[p][j] : i < j;
+                       });
+    }
     order.resize(count);
     std::sort(order.begin(), order.end());
     std::vector<PieceLabel> kept;

@@ -149,21 +149,35 @@ PENCILSCAN_CLONES void coordinates_of_row(const LocalCoordinate& local, float dx
   store(on ? line : line - line + std::numeric_limits<float>::quiet_NaN(), result);
 }
 
+/// w = c0 + c1 x + c2 y + c3 x^2 + c4 x y + c5 y^2 on `rows` rows of pixels, x and y from `first`
+/// on.
+PENCILSCAN_CLONES void inverse_depths(const std::array<float, 6>& c, float first, int rows,
+                                      int stride, float* w) {
+  const Lanes lane = {0, 1, 2, 3, 4, 5, 6, 7};
+  for (int row = 0; row < rows; ++row) {
+    const float y = first + static_cast<float>(row);
+    const float constant = c[0] + y * (c[2] + c[5] * y);
+    const float slope = c[1] + c[4] * y;
+    for (int column = 0; column < stride; column += kLanes) {
+      const Lanes x = lane + (first + static_cast<float>(column));
+      store(constant + x * (slope + c[3] * x), w + row * stride + column);
+    }
+  }
+}
+
 /// Inverse depth of a patch at pixels around its middle.
 struct PatchGrid {
   static constexpr int kMostRows = 17;
-  float x0 = 0;  ///< of the first pixel, off the patch's pixel
-  float y0 = 0;
+  float first = 0;  ///< x and y of the first pixel, off the patch's pixel
   std::array<float, static_cast<std::size_t>(kMostRows) * 2 * kLanes> w;
 
-  PatchGrid(const SurfacePatch& patch, int side) {
-    x0 = y0 = -0.5F * static_cast<float>(side - 2);
-    for (int y = 0; y < side; ++y) {
-      for (int x = 0; x < stride(side); ++x) {
-        const Vector2f d(x0 + static_cast<float>(x), y0 + static_cast<float>(y));
-        w[static_cast<std::size_t>(y * stride(side) + x)] = patch.inverse_depth(patch.pixel + d);
-      }
-    }
+  PatchGrid(const SurfacePatch& patch, int side) : first(-0.5F * static_cast<float>(side - 2)) {
+    const auto& c = patch.coefficients;
+    const float linear = patch.reference / patch.scale_px;
+    const float square = linear / patch.scale_px;
+    inverse_depths({patch.reference * (1 + c[0]), linear * c[1], linear * c[2], square * c[3],
+                    square * c[4], square * c[5]},
+                   first, side, stride(side), w.data());
   }
   static int stride(int side) { return (side + kLanes - 1) / kLanes * kLanes; }
 };
@@ -233,15 +247,15 @@ std::vector<PredictedPoint> predict_lines(const Rig& rig, const Camera& camera,
       for (int y = 0; y < side; ++y) {
         for (int x = 0; x < stride; x += kLanes) {
           const auto i = static_cast<std::size_t>(y * stride + x);
-          coordinates_of_row(*local, grid.x0 + static_cast<float>(x),
-                             grid.y0 + static_cast<float>(y), &grid.w[i], pattern.extent_along(),
+          coordinates_of_row(*local, grid.first + static_cast<float>(x),
+                             grid.first + static_cast<float>(y), &grid.w[i], pattern.extent_along(),
                              &coordinates[i]);
         }
       }
       PredictedPoint like;
       like.pattern = pattern.ref();
       like.patch = p;
-      add_crossings(coordinates, step, patch.pixel + Vector2f(grid.x0, grid.y0),
+      add_crossings(coordinates, step, patch.pixel + Vector2f::Constant(grid.first),
                     pattern.line_count(), options.min_spacing_px, like, sigma_lines, result);
     }
   }
