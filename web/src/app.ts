@@ -10,6 +10,21 @@ export interface Selection {
   sample: number; // index in curves; -1: not known
 }
 
+/** Of the places [begin, end) that count, the one nearest to (u, v); -1: none within `reach`. */
+function nearest(places: {u: ArrayLike<number>; v: ArrayLike<number>}, begin: number, end: number,
+    u: number, v: number, reach: number, counts: (i: number) => boolean = () => true): number {
+  let best = -1;
+  let least = reach * reach;
+  for (let i = begin; i < end; ++i) {
+    const d = (places.u[i] - u) ** 2 + (places.v[i] - v) ** 2;
+    if (d < least && counts(i)) {
+      least = d;
+      best = i;
+    }
+  }
+  return best;
+}
+
 export class App {
   result = 0;
   rig: RigJson | null = null;
@@ -102,33 +117,15 @@ export class App {
   nearestSample(camera: number, u: number, v: number, reach: number): number {
     const {curves} = this;
     if (!curves) return -1;
-    let best = -1;
-    let least = reach * reach;
     const end = curves.beginOfCamera[camera + 1] ?? curves.count;
-    for (let i = curves.beginOfCamera[camera] ?? 0; i < end; ++i) {
-      const d = (curves.u[i] - u) ** 2 + (curves.v[i] - v) ** 2;
-      if (d < least) {
-        least = d;
-        best = i;
-      }
-    }
-    return best;
+    return nearest(curves, curves.beginOfCamera[camera] ?? 0, end, u, v, reach);
   }
 
+  /** The same among the measured points. */
   nearestPoint(camera: number, u: number, v: number, reach: number): number {
     const {points} = this;
     if (!points) return -1;
-    let best = -1;
-    let least = reach * reach;
-    for (let i = 0; i < points.count; ++i) {
-      if (points.camera[i] !== camera) continue;
-      const d = (points.u[i] - u) ** 2 + (points.v[i] - v) ** 2;
-      if (d < least) {
-        least = d;
-        best = i;
-      }
-    }
-    return best;
+    return nearest(points, 0, points.count, u, v, reach, (i) => points.camera[i] === camera);
   }
 
   /** Selects what a click at a pixel of a camera means: a measured point, or an undecided curve. */

@@ -1,8 +1,20 @@
 #include "pencilscan/depth/pattern_view.h"
 
+#include <Eigen/LU>
 #include <cmath>
 
 namespace pencilscan {
+
+TangentView::TangentView(const Camera& camera, const Vec3& point, const Vec3& normal) {
+  const Vec3 local = camera.device_from_world * point;
+  w = 1 / local.z();
+  normalized = local.head<2>() * w;
+  jacobian = camera.K.topLeftCorner<2, 2>().inverse();
+  // w = omega . (x, y, 1) on the plane, omega = n / (n . X).
+  const Vec3 n = camera.device_from_world.rotation * normal;
+  const Vec3 omega = n / n.dot(local);
+  slope = (jacobian.transpose() * omega.head<2>()).cast<float>();
+}
 
 PatternView::PatternView(const Rig& rig, const Camera& camera, int projector, int pattern)
     : projector_(&rig.projectors[static_cast<std::size_t>(projector)]),

@@ -36,6 +36,18 @@ struct WindowLines {
   }
 };
 
+/// A place of a surface as a camera without lens distortion sees it: what PatternView::lines() asks
+/// for, with the inverse depth of its tangent plane.
+struct TangentView {
+  Vec2 normalized;           ///< camera coordinates
+  Eigen::Matrix2d jacobian;  ///< d normalized / d pixel
+  double w = 0;              ///< inverse depth, 1/mm
+  Eigen::Vector2f slope;     ///< d w / d pixel
+
+  /// At a point (world, mm) with a unit normal.
+  TangentView(const Camera& camera, const Vec3& point, const Vec3& normal);
+};
+
 /// One pattern as one camera sees it.
 class PatternView {
  public:

@@ -1,6 +1,5 @@
 #include "pencilscan/surface/holes.h"
 
-#include <Eigen/LU>
 #include <algorithm>
 
 #include "pencilscan/core/chunks.h"
@@ -56,22 +55,14 @@ class Visibility {
     const Camera& camera = rig_.cameras[c];
     if ((camera.center() - x).normalized().dot(normal) < options_.least_cosine)
       return HoleReason::kTooCompressed;
-    const Vec3 local = camera.device_from_world * x;
-    const double w = 1 / local.z();
-    const Vec2 m = local.head<2>() * w;
-    const Eigen::Matrix2d jacobian = camera.K.topLeftCorner<2, 2>().inverse();
-    // Inverse depth of the tangent plane: w = omega . (x, y, 1), omega = n / (n . X).
-    const Vec3 n = camera.device_from_world.rotation * normal;
-    const Vec3 omega = n / n.dot(local);
-    const Vec2 slope = jacobian.transpose() * omega.head<2>();
+    const TangentView at(camera, x, normal);
     std::uint64_t resolved = 0;
     for (const PatternView& view : views_[c]) {
       if (view.projector() >= 64 || ((lit >> view.projector()) & 1U) == 0) continue;
       bool ok = false;
-      const WindowLines lines = view.lines(m, jacobian, w, ok);
+      const WindowLines lines = view.lines(at.normalized, at.jacobian, at.w, ok);
       if (!ok) continue;
-      const auto gradient = lines.gradient(static_cast<float>(w), static_cast<float>(slope[0]),
-                                           static_cast<float>(slope[1]));
+      const auto gradient = lines.gradient(static_cast<float>(at.w), at.slope[0], at.slope[1]);
       if (static_cast<double>(gradient.norm()) * options_.least_spacing_px < 1)
         resolved |= std::uint64_t{1} << view.projector();
     }

@@ -1,6 +1,5 @@
 #include "pencilscan/surface/vertex_color.h"
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -96,24 +95,17 @@ class Light {
                                        const Vec3& x, const Vec3& normal,
                                        std::span<const double> irradiance) const {
     Channels light = Channels::Zero();
-    const Vec3 local = camera.device_from_world * x;
-    const double w = 1 / local.z();
-    const Vec2 m = local.head<2>() * w;
-    const Eigen::Matrix2d jacobian = camera.K.topLeftCorner<2, 2>().inverse();
-    // Inverse depth of the tangent plane: w = omega . (x, y, 1), omega = n / (n . X).
-    const Vec3 n = camera.device_from_world.rotation * normal;
-    const Vec3 omega = n / n.dot(local);
-    const Eigen::Vector2f slope = (jacobian.transpose() * omega.head<2>()).cast<float>();
+    const TangentView at(camera, x, normal);
+    const auto w = static_cast<float>(at.w);
     for (const PatternView& pattern : patterns_[view]) {
       const double power = irradiance[static_cast<std::size_t>(pattern.projector())];
       if (!(power > 0)) continue;
       bool ok = false;
-      const WindowLines lines = pattern.lines(m, jacobian, w, ok);
+      const WindowLines lines = pattern.lines(at.normalized, at.jacobian, at.w, ok);
       if (!ok) continue;
-      const auto wf = static_cast<float>(w);
-      const double l = static_cast<double>(lines.line(0, 0, wf));
+      const double l = static_cast<double>(lines.line(0, 0, w));
       const double blur =
-          blur_px * static_cast<double>(lines.gradient(wf, slope[0], slope[1]).norm());
+          blur_px * static_cast<double>(lines.gradient(w, at.slope[0], at.slope[1]).norm());
       const Rgb color = pattern.pattern().color(static_cast<int>(std::lround(std::max(l, 0.0))));
       const double value =
           power * line_profile(l, static_cast<double>(pattern.half_width()), std::min(blur, 0.5));
