@@ -10,6 +10,7 @@
 #include "pencilscan/core/random.h"
 #include "pencilscan/depth/depth_image.h"
 #include "pencilscan/depth/seeds.h"
+#include "pencilscan/rig/sample_devices.h"
 #include "pencilscan/simulation/panel_light.h"
 #include "pencilscan/simulation/render.h"
 #include "pencilscan/simulation/sensor.h"
@@ -19,35 +20,8 @@
 namespace pencilscan {
 namespace {
 
-/// Two cameras and two projectors before a ball, small images.
-Rig small_rig() {
-  Rig rig;
-  for (int c = 0; c < 2; ++c) {
-    Camera camera;
-    camera.name = "cam" + std::to_string(c);
-    camera.width = 240;
-    camera.height = 200;
-    camera.K << 900, 0, 120, 0, 900, 100, 0, 0, 1;
-    camera.device_from_world = look_at({560, c == 0 ? -110.0 : 110.0, 80}, {0, 0, 0});
-    rig.cameras.push_back(camera);
-  }
-  for (int p = 0; p < 2; ++p) {
-    Projector projector;
-    projector.name = "proj" + std::to_string(p);
-    projector.width = 640;
-    projector.height = 512;
-    projector.K << 1000, 0, 320, 0, 1000, 256, 0, 0, 1;
-    projector.device_from_world =
-        p == 0 ? look_at({450, 225, 45}, {0, 0, 0}) : look_at({386, -140, 277}, {0, 0, 0});
-    LinePattern pattern;
-    pattern.axis = p == 0 ? Axis::kColumn : Axis::kRow;
-    if (p == 1) pattern.colors = {"red", "yellow"};
-    projector.patterns = {pattern};
-    rig.projectors.push_back(projector);
-  }
-  rig.volume = Sphere{{0, 0, 0}, 70};
-  return rig;
-}
+/// Before a ball, small images.
+Rig small_rig() { return sample::small_rig(240, 200, 70); }
 
 /// Images of a ball with noise, true depth, and points on it as labelled curves would give them.
 struct BallScene {

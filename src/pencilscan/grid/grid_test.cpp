@@ -4,6 +4,7 @@
 
 #include "pencilscan/grid/grid_graph.h"
 #include "pencilscan/grid/local_ids.h"
+#include "pencilscan/rig/sample_devices.h"
 
 namespace pencilscan {
 namespace {
@@ -12,28 +13,11 @@ namespace {
 class PlaneGrid : public testing::Test {
  protected:
   PlaneGrid() {
-    Camera camera;
-    camera.name = "cam";
-    camera.width = 640;
-    camera.height = 480;
-    camera.K << 1100, 0, 320, 0, 1100, 240, 0, 0, 1;
-    camera.device_from_world = look_at({1000, -200, 100}, Vec3::Zero());
-    rig_.cameras = {camera};
-    for (int p = 0; p < 2; ++p) {
-      Projector projector;
-      projector.name = "proj" + std::to_string(p);
-      projector.width = 640;
-      projector.height = 512;
-      projector.K << 1200, 0, 320, 0, 1200, 256, 0, 0, 1;
-      projector.device_from_world =
-          p == 0 ? look_at({900, 450, 90}, Vec3::Zero()) : look_at({780, -280, 560}, Vec3::Zero());
-      LinePattern pattern;
-      pattern.axis = p == 0 ? Axis::kColumn : Axis::kRow;
-      if (p == 1) pattern.colors = {"red", "yellow"};
-      projector.patterns = {pattern};
-      rig_.projectors.push_back(projector);
-    }
-    rig_.volume = Sphere{Vec3::Zero(), 110};
+    rig_ = sample::two_by_two(
+        sample::device_at<Camera>({1000, -200, 100}, "cam", 640, 480, 1100),
+        sample::device_at<Projector>({900, 450, 90}, "proj0", 640, 512, 1200),
+        sample::device_at<Projector>({780, -280, 560}, "proj1", 640, 512, 1200), 110);
+    rig_.cameras.resize(1);
     families_ = color_families(rig_);
   }
 

@@ -13,26 +13,18 @@
 #include "pencilscan/io/image.h"
 #include "pencilscan/io/mesh_file.h"
 #include "pencilscan/io/point_file.h"
-#include "pencilscan/rig/rig.h"
+#include "pencilscan/rig/sample_devices.h"
 
 namespace pencilscan::sample {
 
 inline Rig rig() {
   Rig rig;
-  for (int i = 0; i < 2; ++i) {
-    Camera camera;
-    camera.name = "cam" + std::to_string(i);
-    camera.width = 160;
-    camera.height = 120;
-    camera.K << 300, 0, 80, 0, 300, 60, 0, 0, 1;
-    camera.device_from_world = look_at({600, i == 0 ? -120.0 : 120.0, 60}, {0, 0, 0});
-    rig.cameras.push_back(camera);
-    Projector projector;
-    static_cast<Device&>(projector) = camera;
-    projector.name = "proj" + std::to_string(i);
-    projector.device_from_world = look_at({500, i == 0 ? 200.0 : -200.0, 0}, {0, 0, 0});
-    projector.patterns = {LinePattern{}};
-    rig.projectors.push_back(projector);
+  for (const double side : {-1.0, 1.0}) {
+    const std::string number = std::to_string(rig.cameras.size());
+    rig.cameras.push_back(device_at<Camera>({600, 120 * side, 60}, "cam" + number, 160, 120, 300));
+    rig.projectors.push_back(
+        device_at<Projector>({500, -200 * side, 0}, "proj" + number, 160, 120, 300));
+    rig.projectors.back().patterns = {LinePattern{}};
   }
   rig.volume = Sphere{{0, 0, 0}, 120};
   return rig;

@@ -4,6 +4,7 @@
 
 #include "pencilscan/core/random.h"
 #include "pencilscan/grid/grid_graph.h"
+#include "pencilscan/rig/sample_devices.h"
 
 namespace pencilscan {
 
@@ -12,30 +13,10 @@ namespace pencilscan {
 /// images.
 struct TwoProjectorScene {
   TwoProjectorScene() {
-    for (int c = 0; c < 2; ++c) {
-      Camera camera;
-      camera.name = "cam" + std::to_string(c);
-      camera.width = 1280;
-      camera.height = 960;
-      camera.K << 2300, 0, 640, 0, 2300, 480, 0, 0, 1;
-      camera.device_from_world = look_at({1100, c == 0 ? -250.0 : 250.0, 150}, Vec3::Zero());
-      rig.cameras.push_back(camera);
-    }
-    for (int p = 0; p < 2; ++p) {
-      Projector projector;
-      projector.name = "proj" + std::to_string(p);
-      projector.width = 1280;
-      projector.height = 1024;
-      projector.K << 2400, 0, 640, 0, 2400, 512, 0, 0, 1;
-      projector.device_from_world = p == 0 ? look_at({1000, 500, 100}, Vec3::Zero())
-                                           : look_at({857, -312, 615}, Vec3::Zero());
-      LinePattern pattern;
-      pattern.axis = p == 0 ? Axis::kColumn : Axis::kRow;
-      if (p == 1) pattern.colors = {"red", "yellow"};
-      projector.patterns = {pattern};
-      rig.projectors.push_back(projector);
-    }
-    rig.volume = Sphere{Vec3::Zero(), 150};
+    rig = sample::two_by_two(
+        sample::device_at<Camera>({1100, -250, 150}, "cam0", 1280, 960, 2300),
+        sample::device_at<Projector>({1000, 500, 100}, "proj0", 1280, 1024, 2400),
+        sample::device_at<Projector>({857, -312, 615}, "proj1", 1280, 1024, 2400), 150);
     families = color_families(rig);
   }
 
