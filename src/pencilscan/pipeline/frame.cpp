@@ -4,11 +4,13 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <optional>
 #include <utility>
 
 #include "pencilscan/core/check.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/core/stopwatch.h"
+#include "pencilscan/pipeline/rig_refinement.h"
 #include "pencilscan/surface/vertex_color.h"
 
 namespace pencilscan {
@@ -46,14 +48,39 @@ std::vector<std::string> detection_warnings(const Rig& rig, const Frame& frame,
   return warnings;
 }
 
-std::string disagreement_warning(const CrossingDisagreement& crossings) {
-  std::array<char, 200> text{};
+std::string disagreement_warning(const CrossingDisagreement& crossings, bool labels_are_corrected) {
+  std::array<char, 400> text{};
   std::snprintf(
       text.data(), text.size(),
       "crossing lines miss each other by %.2f projector pixels (median) where image noise "
-      "explains %.2f: the rig's calibration is off; --refine-rig can correct it",
-      crossings.median_px, crossings.expected_px);
+      "explains %.2f: the rig's calibration is off. %s; --refine-rig can correct %s",
+      crossings.median_px, crossings.expected_px,
+      labels_are_corrected ? "Lines were named with the devices as this frame corrects them, "
+                             "points lie where the rig as given puts them"
+                           : "This frame does not say how, many lines may be named wrong",
+      labels_are_corrected ? "the points too" : "it from several frames");
   return text.data();
+}
+
+/// Where the rig is off, labels decided with a corrected one: the same crossings that miss each
+/// other tell how the devices stand (refine_rig_on_frames). Nothing where they do not.
+std::optional<Rig> correct_labels(const Rig& rig, const PointOptions& options,
+                                  PointResult& result) {
+  const FrameCurves curves{result.families, result.graphs};
+  RigRefinementOptions refinement;
+  refinement.points = options;
+  RigRefinement found = refine_rig_on_frames(rig, {&curves, 1}, refinement);
+  if (!found.report.refined) return std::nullopt;
+  result.labeling = solve(found.rig, result.families, result.graphs, options.solution);
+  return std::move(found.rig);
+}
+
+/// Error of each plane, projector px, that makes crossings miss each other as they do.
+double plane_error_px(const CrossingDisagreement& crossings) {
+  constexpr double kDeviationPerMedian = 1.4826;  // of a Gaussian's absolute value
+  const double noise2 = crossings.expected_px * crossings.expected_px;
+  const double devices2 = crossings.median_px * crossings.median_px - noise2;
+  return kDeviationPerMedian * std::sqrt(std::max(0.0, devices2) / 2);
 }
 
 /// Images as vertex_colors() wants them; overexposed pixels are NaN.
@@ -129,27 +156,49 @@ PointResult measure_points(const Rig& rig, const Frame& frame, const PointOption
   PointResult result = detect_frame(rig, frame, options);
   Stopwatch solution_watch;
   result.labeling = solve(rig, result.families, result.graphs, options.solution);
-  result.times.push_back({"solution", solution_watch.seconds()});
-  const bool is_joint = options.solution.method == Method::kJoint;
-  std::vector<LocalSurface> surfaces;
-  if (is_joint) {
-    const auto tracks = crossing_tracks(rig, result.graphs, result.labeling);
-    result.crossings = crossing_disagreement(rig, tracks);
-    if (disagrees(result.crossings))
-      result.warnings.push_back(disagreement_warning(result.crossings));
-
-    Stopwatch second_look_watch;
-    std::vector<std::vector<cv::Mat>> presence;
-    for (CameraDetection& detection : result.detections)
-      presence.push_back(std::move(detection.presence));
-    surfaces = second_look(rig, result.families, presence, result.graphs, result.labeling,
-                           options.second_look);
-    result.times.push_back({"second look", second_look_watch.seconds()});
+  const auto triangulate_with = [&](const TriangulationOptions& triangulation) {
+    return triangulate(rig, result.graphs, result.labeling, triangulation);
+  };
+  if (options.solution.method != Method::kJoint) {
+    result.times.push_back({"solution", solution_watch.seconds()});
+    const Stopwatch triangulation_watch;
+    result.points = triangulate_with(options.triangulation);
+    result.times.push_back({"triangulation", triangulation_watch.seconds()});
+    return result;
   }
 
-  Stopwatch triangulation_watch;
-  result.points = triangulate(rig, result.graphs, result.labeling, options.triangulation);
-  if (is_joint) result.points = settle_points(rig, result.points, surfaces, options.settle);
+  const auto crossings = [&] {
+    return crossing_disagreement(rig, crossing_tracks(rig, result.graphs, result.labeling));
+  };
+  result.crossings = crossings();
+  std::optional<Rig> corrected;
+  if (disagrees(result.crossings)) {
+    corrected = correct_labels(rig, options, result);
+    if (corrected) result.crossings = crossings();
+    result.warnings.push_back(disagreement_warning(result.crossings, corrected.has_value()));
+  }
+  result.times.push_back({"solution", solution_watch.seconds()});
+
+  const Stopwatch second_look_watch;
+  std::vector<std::vector<cv::Mat>> presence;
+  for (CameraDetection& detection : result.detections)
+    presence.push_back(std::move(detection.presence));
+  std::vector<LocalSurface> surfaces =
+      second_look(corrected ? *corrected : rig, result.families, presence, result.graphs,
+                  result.labeling, options.second_look);
+  result.times.push_back({"second look", second_look_watch.seconds()});
+
+  const Stopwatch triangulation_watch;
+  TriangulationOptions triangulation = options.triangulation;
+  SettleOptions settle = options.settle;
+  if (corrected) {
+    triangulation.projection_sigma_px =
+        std::max(triangulation.projection_sigma_px, plane_error_px(result.crossings));
+    settle.errors_are_shared = true;
+  }
+  result.points = triangulate_with(triangulation);
+  if (corrected) surfaces = local_surfaces(rig, result.points, options.second_look.surface);
+  result.points = settle_points(rig, result.points, surfaces, settle);
   result.times.push_back({"triangulation", triangulation_watch.seconds()});
   return result;
 }

@@ -64,7 +64,9 @@ struct PointResult {
                                        const PointOptions& options = {});
 
 /// The paper's Fig. 3 for one frame: detection and grid per camera, one solution over all cameras,
-/// triangulation.
+/// triangulation. Joint: where crossing lines say that the rig is off, lines are named with the
+/// devices as the frame corrects them; points are triangulated with the rig as given, their sigma
+/// grows by its error, and a warning says so.
 [[nodiscard]] PointResult measure_points(const Rig& rig, const Frame& frame,
                                          const PointOptions& options = {});
 

@@ -4,7 +4,10 @@
 
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <opencv2/core.hpp>
+#include <tuple>
+#include <utility>
 
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/parallel.h"
@@ -251,6 +254,25 @@ TEST_F(PipelineTest, WrongRigIsToldFromATrueOne) {
   EXPECT_THAT(measure_points(*rig_, *frame_).warnings, testing::Not(hint));
   const Rig wrong = corrected_rig(*rig_, {{{0, 0.7, 0}, {}}, {}, {{0, 0.5, 0}, {}}, {}});
   EXPECT_THAT(measure_points(wrong, *frame_).warnings, hint);
+}
+
+TEST_F(PipelineTest, LinesAreNamedRightWithARigThatIsOff) {
+  const PoseCorrection one{{1.0, 1.4, -0.6}, {0.2, 0.2, 0.4}};
+  const PoseCorrection other{{-1.2, 1.0, 0.8}, {-0.2, 0.4, -0.2}};
+  const Rig wrong = corrected_rig(*rig_, {one, other, other, one});
+  using Place = std::tuple<int, float, float>;
+  std::map<Place, std::pair<int, int>> names;
+  const auto truth = measure_points(*rig_, *frame_).points;
+  for (const MeasuredPoint& p : truth) names[{p.camera, p.u, p.v}] = {p.projector, p.line};
+  std::size_t same = 0;
+  std::size_t other_name = 0;
+  for (const MeasuredPoint& p : measure_points(wrong, *frame_).points) {
+    const auto found = names.find({p.camera, p.u, p.v});
+    if (found == names.end()) continue;
+    ++(found->second == std::pair<int, int>(p.projector, p.line) ? same : other_name);
+  }
+  EXPECT_GT(same, 9 * truth.size() / 10);
+  EXPECT_LT(other_name, truth.size() / 200);
 }
 
 TEST_F(PipelineTest, MissingCameraIsAWarningAndNotAFailure) {

@@ -67,16 +67,32 @@ std::optional<MeasuredPoint> settled(const MeasuredPoint& point, const LocalSurf
   result.z = static_cast<float>(x.z());
   result.sigma = static_cast<float>(
       settled_sigma(std::sqrt(own_share * own2), others.depth / camera.K(0, 0), *patch));
+  if (options.errors_are_shared) result.sigma = std::max(result.sigma, point.sigma);
   return result;
+}
+
+std::vector<std::vector<MeasuredPoint>> points_by_camera(const Rig& rig,
+                                                         std::span<const MeasuredPoint> points) {
+  std::vector<std::vector<MeasuredPoint>> by_camera(rig.cameras.size());
+  for (const MeasuredPoint& p : points) by_camera[p.camera].push_back(p);
+  return by_camera;
 }
 
 }  // namespace
 
+std::vector<LocalSurface> local_surfaces(const Rig& rig, std::span<const MeasuredPoint> points,
+                                         const LocalSurfaceOptions& options) {
+  std::vector<LocalSurface> surfaces;
+  for (const Camera& camera : rig.cameras) surfaces.emplace_back(camera, options);
+  const auto by_camera = points_by_camera(rig, points);
+  parallel_for(surfaces.size(), [&](std::size_t c) { surfaces[c].add(by_camera[c]); });
+  return surfaces;
+}
+
 std::vector<MeasuredPoint> settle_points(const Rig& rig, std::span<const MeasuredPoint> points,
                                          std::span<const LocalSurface> surfaces,
                                          const SettleOptions& options) {
-  std::vector<std::vector<MeasuredPoint>> by_camera(rig.cameras.size());
-  for (const MeasuredPoint& p : points) by_camera[p.camera].push_back(p);
+  auto by_camera = points_by_camera(rig, points);
   parallel_for(by_camera.size(), [&](std::size_t c) {
     const Camera& camera = rig.cameras[c];
     const Vec3 center = camera.center();
