@@ -254,6 +254,23 @@ TEST_F(Io, MeshRoundTripKeepsVerticesAndSigma) {
   EXPECT_DOUBLE_EQ(signed_volume(back), 6000);
 }
 
+TEST_F(Io, MeshRoundTripKeepsReasonsOfHolesAndColors) {
+  TriangleMesh box = make_box({10, 20, 30});
+  for (std::size_t i = 0; i < box.vertices.size(); ++i) {
+    box.hole.push_back(static_cast<std::uint8_t>(i));
+    box.color.push_back({0.02F * static_cast<float>(i), 0.5F, 1.0F});
+  }
+  write_mesh(folder_ / "m.ply", box);
+  const TriangleMesh back = read_mesh(folder_ / "m.ply");
+  EXPECT_EQ(back.hole, box.hole);
+  ASSERT_EQ(back.color.size(), box.color.size());
+  constexpr float kHalfAStep = 0.0045F;  // of 8 bits, where sRGB is steepest in linear light
+  for (std::size_t i = 0; i < box.color.size(); ++i) {
+    for (std::size_t k = 0; k < 3; ++k)
+      EXPECT_NEAR(back.color[i][k], box.color[i][k], kHalfAStep);
+  }
+}
+
 TEST_F(Io, ObjStlAndOffGiveOneClosedTetrahedron) {
   const auto obj = put("t.obj",
                        "v 0 0 0\nv 6 0 0\nv 0 6 0\nv 0 0 6\nvn 0 0 1\nf 1//1 3//1 2//1\n"

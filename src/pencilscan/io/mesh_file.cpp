@@ -30,6 +30,31 @@ std::vector<float> optional_column(const PlyElement& vertices, const char* name)
   return values;
 }
 
+/// Of a property of type uchar; empty when there is none.
+std::vector<std::uint8_t> optional_bytes(const PlyElement& vertices, const char* name) {
+  const PlyColumn* column = vertices.find(name);
+  if (column == nullptr || column->is_list || !column->is_byte) return {};
+  std::vector<std::uint8_t> values(column->values.size());
+  std::transform(column->values.begin(), column->values.end(), values.begin(),
+                 [](double value) { return static_cast<std::uint8_t>(value); });
+  return values;
+}
+
+/// Linear light from red, green and blue as bytes.
+std::vector<std::array<float, 3>> optional_colors(const PlyElement& vertices) {
+  const std::array<std::vector<std::uint8_t>, 3> shown = {optional_bytes(vertices, "red"),
+                                                          optional_bytes(vertices, "green"),
+                                                          optional_bytes(vertices, "blue")};
+  if (shown[0].empty() || shown[1].empty() || shown[2].empty()) return {};
+  std::array<float, 256> linear{};
+  for (std::size_t i = 0; i < linear.size(); ++i)
+    linear[i] = static_cast<float>(from_srgb(static_cast<double>(i) / 255));
+  std::vector<std::array<float, 3>> colors(vertices.count);
+  for (std::size_t i = 0; i < colors.size(); ++i)
+    colors[i] = {linear[shown[0][i]], linear[shown[1][i]], linear[shown[2][i]]};
+  return colors;
+}
+
 /// Appends a polygon as a fan of triangles.
 void append_polygon(const std::string& path, std::span<const double> corners, std::size_t face,
                     TriangleMesh& mesh) {
@@ -63,12 +88,15 @@ TriangleMesh read_ply_mesh(const std::filesystem::path& path) {
   }
   mesh.sigma = optional_column(*vertices, "sigma");
   mesh.confidence = optional_column(*vertices, "confidence");
+  mesh.hole = optional_bytes(*vertices, "hole");
+  mesh.color = optional_colors(*vertices);
   const PlyElement* faces = file.find("face");
   if (faces == nullptr) return mesh;
   const PlyColumn* corners = faces->find("vertex_indices");
   if (corners == nullptr) corners = faces->find("vertex_index");
   if (corners == nullptr || !corners->is_list) return mesh;
   const std::span<const double> all(corners->values);
+  mesh.faces.reserve(faces->count);
   for (std::size_t f = 0; f < faces->count; ++f) {
     const std::size_t begin = corners->begin[f];
     append_polygon(path.string(), all.subspan(begin, corners->begin[f + 1] - begin), f, mesh);

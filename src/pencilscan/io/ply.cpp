@@ -1,6 +1,7 @@
 #include "pencilscan/io/ply.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <charconv>
 #include <cmath>
@@ -34,13 +35,6 @@ std::optional<NumberType> type_from_name(std::string_view name) {
   return std::nullopt;
 }
 
-template <class T>
-double as_double(const unsigned char* bytes) {
-  T value;
-  std::memcpy(&value, bytes, sizeof(T));
-  return static_cast<double>(value);
-}
-
 struct ColumnTypes {
   NumberType count;  ///< of a list's length
   NumberType value;
@@ -70,23 +64,28 @@ class Body {
   }
 
  private:
-  double next_binary(NumberType type) {
-    if (remaining() < type.size) truncated();
-    unsigned char b[8] = {};
-    std::memcpy(b, bytes_.data() + at_, type.size);
-    at_ += type.size;
+  template <class T>
+  double take() {
+    if (remaining() < sizeof(T)) truncated();
+    std::array<unsigned char, sizeof(T)> bytes;
+    std::memcpy(bytes.data(), bytes_.data() + at_, sizeof(T));
+    at_ += sizeof(T);
     const bool big = encoding_ == Encoding::kBigEndian;
-    if (big != (std::endian::native == std::endian::big)) std::reverse(b, b + type.size);
+    if (big != (std::endian::native == std::endian::big)) std::reverse(bytes.begin(), bytes.end());
+    return static_cast<double>(std::bit_cast<T>(bytes));
+  }
+
+  double next_binary(NumberType type) {
     switch (type.size) {
       case 1:
-        return type.kind == 'i' ? as_double<std::int8_t>(b) : as_double<std::uint8_t>(b);
+        return type.kind == 'i' ? take<std::int8_t>() : take<std::uint8_t>();
       case 2:
-        return type.kind == 'i' ? as_double<std::int16_t>(b) : as_double<std::uint16_t>(b);
+        return type.kind == 'i' ? take<std::int16_t>() : take<std::uint16_t>();
       case 4:
-        if (type.kind == 'f') return as_double<float>(b);
-        return type.kind == 'i' ? as_double<std::int32_t>(b) : as_double<std::uint32_t>(b);
+        if (type.kind == 'f') return take<float>();
+        return type.kind == 'i' ? take<std::int32_t>() : take<std::uint32_t>();
       default:
-        return as_double<double>(b);
+        return take<double>();
     }
   }
 
@@ -190,6 +189,7 @@ class HeaderParser {
     const auto value = type_from_name(type);
     const auto count = type_from_name(count_type);
     if (!words || !value || !count) fail(line, "must be `property <type> <name>`");
+    column.is_byte = value->kind == 'u' && value->size == 1;
     header_.file.elements.back().columns.push_back(std::move(column));
     header_.types.back().push_back({*count, *value});
   }
@@ -217,7 +217,9 @@ void read_element(Body& body, const std::vector<ColumnTypes>& types, PlyElement&
   }
   for (PlyColumn& column : element.columns) {
     if (column.is_list) {
+      column.begin.reserve(element.count + 1);
       column.begin.assign(1, 0);
+      column.values.reserve(std::min(3 * element.count, body.remaining()));  // mostly triangles
     } else {
       column.values.reserve(element.count);
     }

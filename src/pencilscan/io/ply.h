@@ -14,6 +14,7 @@ namespace pencilscan {
 struct PlyColumn {
   std::string name;
   bool is_list = false;
+  bool is_byte = false;  ///< type uchar
   std::vector<double> values;
   std::vector<std::size_t> begin;  ///< empty for a scalar property
 };

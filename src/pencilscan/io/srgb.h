@@ -11,4 +11,10 @@ namespace pencilscan {
   return x <= 0.0031308 ? 12.92 * x : 1.055 * std::pow(x, 1 / 2.4) - 0.055;
 }
 
+/// The way back.
+[[nodiscard]] inline double from_srgb(double shown) {
+  const double x = std::clamp(shown, 0.0, 1.0);
+  return x <= 0.04045 ? x / 12.92 : std::pow((x + 0.055) / 1.055, 2.4);
+}
+
 }  // namespace pencilscan
