@@ -1,5 +1,6 @@
 // Colours of points and vertices by what is known of them, and the legend that explains them.
 import type {Mesh, Points, RigJson} from './data';
+import {nearestVertices} from './nearest';
 import {category, kHoles, lightColor, sequential, type Named, type Rgb} from './palette';
 
 export type ColorMode =
@@ -61,7 +62,8 @@ function niceHigh(value: number): number {
   return 10 * unit;
 }
 
-const gray = (value: number, none: Rgb): Rgb => (value === 0 ? none : [value, value, value]);
+const colorAt = (color: Uint8Array, i: number): Rgb =>
+  [color[3 * i], color[3 * i + 1], color[3 * i + 2]];
 
 /** The high end of a scale that both points and mesh share. */
 export function scaleOf(...lists: (Float32Array | undefined)[]): number {
@@ -73,8 +75,9 @@ export interface Ramps {
   distance: number;
 }
 
+/** mesh: of which the points take their albedo. */
 export function colorPoints(
-  points: Points, mode: ColorMode, rig: RigJson | null, ramps: Ramps, plain: Rgb,
+  points: Points, mesh: Mesh | null, mode: ColorMode, rig: RigJson | null, ramps: Ramps, plain: Rgb,
 ): Float32Array {
   const {count} = points;
   const byConfidence = (i: number) => sequential(points.confidence[i] / 255);
@@ -92,10 +95,12 @@ export function colorPoints(
       return points.distance
         ? paint(count, (i) => sequential(points.distance![i] / ramps.distance))
         : paint(count, () => plain);
-    case 'albedo':
-      return points.albedo
-        ? paint(count, (i) => gray(points.albedo![i], plain))
-        : paint(count, () => plain);
+    case 'albedo': {
+      const color = mesh?.color;
+      if (!color) return paint(count, () => plain);
+      const vertex = nearestVertices(mesh.position, points.position);
+      return paint(count, (i) => vertex[i] < 0 ? plain : colorAt(color, vertex[i]));
+    }
     default: return paint(count, () => plain);
   }
 }
@@ -119,9 +124,7 @@ export function colorMesh(
   if (mode === 'distance' && mesh.distance) {
     return paint(count, (i) => sequential(mesh.distance![i] / ramps.distance));
   }
-  if (mode === 'albedo' && mesh.albedo) {
-    return paint(count, (i) => gray(mesh.albedo![i], invented));
-  }
+  if (mode === 'albedo' && mesh.color) return paint(count, (i) => colorAt(mesh.color!, i));
   return paint(count, (i) => closing(i) ? invented : clay);
 }
 
@@ -142,9 +145,7 @@ export function legendOf(
     case 'sigma': return {title: 'Sigma', range: {low: 0, high: ramps.sigma, unit}};
     case 'confidence': return {title: 'Confidence', range: {low: 0, high: 1, unit: ''}};
     case 'distance': return {title: 'Distance to truth', range: {low: 0, high: ramps.distance, unit}};
-    case 'albedo': return {title: 'Albedo, from the brightness of the lines', named: [
-      {name: 'dark', color: [60, 60, 60]}, {name: 'bright', color: [245, 245, 245]},
-      {name: 'not known', color: invented}]};
+    case 'albedo': return {title: 'Albedo, up to one common factor', named: []};
     case 'hole': {
       const present = new Set(mesh?.hole ?? []);
       return {title: 'Why not measured', named: kHoles.filter((_, i) => present.has(i))};

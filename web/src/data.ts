@@ -83,7 +83,6 @@ export interface Points {
   sigma: Float32Array;
   confidence: Uint8Array;
   distance?: Float32Array;
-  albedo?: Uint8Array;
 }
 
 export interface Mesh {
@@ -93,7 +92,7 @@ export interface Mesh {
   confidence?: Uint8Array;
   hole?: Uint8Array;
   distance?: Float32Array;
-  albedo?: Uint8Array; // 0: not known
+  color?: Uint8Array; // albedo as sRGB: red green blue of each vertex
 }
 
 export interface Curves {
@@ -133,8 +132,8 @@ function fromBase64(text: string): Uint8Array<ArrayBuffer> {
   return bytes;
 }
 
-function interleave(x: Float32Array, y: Float32Array, z: Float32Array): Float32Array {
-  const all = new Float32Array(3 * x.length);
+function interleave<T extends Float32Array | Uint8Array>(x: T, y: T, z: T): T {
+  const all = new (x.constructor as new (length: number) => T)(3 * x.length);
   for (let i = 0; i < x.length; ++i) {
     all[3 * i] = x[i];
     all[3 * i + 1] = y[i];
@@ -205,7 +204,8 @@ export class Source {
       confidence: block.has('confidence') ? block.bytes('confidence') : undefined,
       hole: block.has('hole') ? block.bytes('hole') : undefined,
       distance: optional('distance'),
-      albedo: block.has('albedo') ? block.bytes('albedo') : undefined,
+      color: block.has('red')
+        ? interleave(block.bytes('red'), block.bytes('green'), block.bytes('blue')) : undefined,
     };
   }
 
@@ -227,7 +227,6 @@ export class Source {
         sigma: block.floats('sigma'),
         confidence: block.bytes('confidence'),
         distance: block.has('distance') ? block.floats('distance') : undefined,
-        albedo: block.has('albedo') ? block.bytes('albedo') : undefined,
       };
     });
   }

@@ -9,19 +9,29 @@ import type {Device} from './device';
 
 const kFov = 35; // degrees, of the free view
 
-function rendersInSoftware(): boolean {
-  const context = document.createElement('canvas').getContext('webgl2');
-  if (!context) return false;
+/** A renderer; without a graphics card, smooth edges and fine pixels would cost many times the time. */
+function makeRenderer(): WebGLRenderer {
+  const canvas = document.createElement('canvas');
+  const context = canvas.getContext('webgl2', {
+    alpha: true, antialias: false, powerPreference: 'low-power'});
+  if (!context) throw new Error('no WebGL 2');
   const info = context.getExtension('WEBGL_debug_renderer_info');
   const name = String(context.getParameter(info ? info.UNMASKED_RENDERER_WEBGL : context.RENDERER));
+  if (/swiftshader|llvmpipe|software|basic render/i.test(name)) {
+    const renderer = new WebGLRenderer({canvas, context});
+    renderer.setPixelRatio(1);
+    return renderer;
+  }
   context.getExtension('WEBGL_lose_context')?.loseContext();
-  return /swiftshader|llvmpipe|software|basic render/i.test(name);
+  const renderer = new WebGLRenderer({antialias: true, powerPreference: 'low-power'});
+  renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+  return renderer;
 }
 
 export class Picture3d {
   readonly camera = new PerspectiveCamera(kFov, 1, 1, 10000);
   readonly helpers = new Group(); // devices, planes, markers: not picked, not fitted
-  private readonly renderer: WebGLRenderer;
+  private readonly renderer = makeRenderer();
   private readonly scene = new Scene();
   private readonly headlight = new DirectionalLight(0xffffff, 1.9);
   private controls: OrbitControls;
@@ -32,13 +42,10 @@ export class Picture3d {
   private ball = new Sphere(new Vector3(), 100);
   private deviceView: Device | null = null;
   private pending = false;
+  private drawn = false; // once at least
   beforeRender: (() => void) | null = null;
 
   constructor(private readonly container: HTMLElement) {
-    // Without a graphics card, smooth edges would cost four times the time.
-    const software = rendersInSoftware();
-    this.renderer = new WebGLRenderer({antialias: !software, powerPreference: 'low-power'});
-    this.renderer.setPixelRatio(software ? 1 : Math.min(devicePixelRatio, 2));
     const canvas = this.renderer.domElement;
     canvas.tabIndex = 0;
     container.append(canvas);
@@ -179,8 +186,9 @@ export class Picture3d {
 
   private resize(): void {
     const {width, height} = this.size();
-    const drawn = this.renderer.getSize(new Vector2());
-    if (drawn.x !== width || drawn.y !== height) this.renderer.setSize(width, height);
+    const now = this.renderer.getSize(new Vector2());
+    const resized = now.x !== width || now.y !== height;
+    if (resized) this.renderer.setSize(width, height);
     this.camera.aspect = width / height;
     if (this.deviceView) {
       const {K, width: w, height: h} = this.deviceView.json;
@@ -194,7 +202,8 @@ export class Picture3d {
       this.camera.clearViewOffset();
     }
     this.camera.updateProjectionMatrix();
-    this.draw(); // at once: the canvas is empty now
+    if (resized && this.drawn) this.draw(); // at once: the canvas is empty now
+    else this.render();
   }
 
   render(): void {
@@ -205,6 +214,7 @@ export class Picture3d {
 
   private draw(): void {
     this.pending = false;
+    this.drawn = true;
     this.beforeRender?.();
     this.renderer.render(this.scene, this.camera);
   }

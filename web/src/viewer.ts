@@ -162,7 +162,7 @@ export class Viewer {
     const mesh = this.currentMesh() ?? this.meshes.mesh;
     const {points} = this.app;
     const available: Record<ColorMode, boolean> = {
-      shading: true, albedo: points?.albedo !== undefined || mesh?.albedo !== undefined, camera: points !== null,
+      shading: true, albedo: mesh?.color !== undefined, camera: points !== null,
       projector: points !== null, line: points !== null,
       sigma: points !== null || mesh?.sigma !== undefined,
       confidence: points !== null || mesh?.confidence !== undefined,
@@ -285,7 +285,7 @@ export class Viewer {
     if (mesh) picture.setColors('mesh', colorMesh(mesh, this.mode, this.ramps, clay, invented));
     if (points && this.showPoints.checked) {
       picture.setColors('points',
-        colorPoints(points, this.mode, app.rig, this.ramps, rgbOf('--point')));
+        colorPoints(points, mesh ?? this.meshes.mesh, this.mode, app.rig, this.ramps, rgbOf('--point')));
     }
     this.drawLegend(legendOf(this.mode, app.rig, mesh, this.ramps, clay, invented));
   }

@@ -59,7 +59,9 @@ void Block::add_integers(const std::string& name, std::span<const std::uint32_t>
   data_ += difference_planes(values);
 }
 
-void Block::add_floats(const std::string& name, std::span<const float> values, Steps steps) {
+void Block::add_floats(const std::string& name, std::span<const float> values, Steps steps,
+                       int bits) {
+  PENCILSCAN_CHECK(bits >= 2 && bits <= 16);
   const bool logarithmic = steps == Steps::kLogarithmic;
   const auto value_of = [&](float value) {
     if (!logarithmic) return static_cast<double>(value);
@@ -75,8 +77,8 @@ void Block::add_floats(const std::string& name, std::span<const float> values, S
     high = std::max(high, x);
   }
   if (!(low <= high)) low = high = 0;
-  constexpr double kLast = 65534;
-  const double step = high > low ? (high - low) / kLast : 1.0;
+  const double last = (1 << bits) - 2;
+  const double step = high > low ? (high - low) / last : 1.0;
   std::vector<std::uint16_t> codes;
   codes.reserve(values.size());
   for (const float value : values) {

@@ -23,10 +23,11 @@ class Block {
   void add_bytes(const std::string& name, std::span<const std::uint8_t> values);
   void add_integers(const std::string& name, std::span<const std::uint16_t> values);
   void add_integers(const std::string& name, std::span<const std::uint32_t> values);
-  /// Floats over their own range in 65535 steps, which makes an error of up to half a step; the
-  /// last step stands for "no value" (not finite, or not positive where logarithmic).
+  /// Floats over their own range in 2^bits - 2 steps, which makes an error of up to half a step;
+  /// 65535 stands for "no value" (not finite, or not positive where logarithmic). 2 <= bits <= 16:
+  /// fewer take less room.
   void add_floats(const std::string& name, std::span<const float> values,
-                  Steps steps = Steps::kLinear);
+                  Steps steps = Steps::kLinear, int bits = 16);
 
   /// The whole, compressed (zlib, RFC 1950).
   [[nodiscard]] std::string bytes() const;

@@ -7,7 +7,7 @@
 #include <limits>
 
 #include "pencilscan/core/parallel.h"
-#include "pencilscan/page/albedo.h"
+#include "pencilscan/io/srgb.h"
 
 namespace pencilscan {
 namespace {
@@ -59,14 +59,12 @@ PointErrors point_errors(const Rig& rig, std::span<const MeasuredPoint> points,
 }
 
 Block points_block(std::span<const MeasuredPoint> all, std::span<const float> distance_mm,
-                   std::span<const float> albedo, std::size_t stride) {
+                   std::size_t stride) {
   std::vector<MeasuredPoint> points;
   std::vector<float> distances;
-  std::vector<float> albedos;
   for (std::size_t i = 0; i < all.size(); i += stride) {
     points.push_back(all[i]);
     if (!distance_mm.empty()) distances.push_back(distance_mm[i]);
-    if (!albedo.empty()) albedos.push_back(albedo[i]);
   }
   using P = MeasuredPoint;
   Block block;
@@ -87,7 +85,6 @@ Block points_block(std::span<const MeasuredPoint> all, std::span<const float> di
   block.add_bytes("confidence", integers<std::uint8_t>(
                                     points, [](const P& p) { return share_byte(p.confidence); }));
   if (!distances.empty()) block.add_floats("distance", distances, Steps::kLogarithmic);
-  if (!albedos.empty()) block.add_bytes("albedo", albedo_bytes(albedos));
   return block;
 }
 
@@ -103,7 +100,15 @@ TriangleMesh decimated(const TriangleMesh& mesh, std::size_t max_faces) {
   for (const auto& face : mesh.faces) {
     for (const int vertex : face) indices.push_back(static_cast<unsigned int>(vertex));
   }
-  constexpr float kAnyError = 1;  // the number of faces decides
+  constexpr float kAnyError = 1;         // the number of faces decides
+  constexpr std::size_t kManyTimes = 8;  // so many faces per face wanted show no cluster any more
+  if (mesh.faces.size() > 2 * kManyTimes * max_faces) {
+    std::vector<unsigned int> clustered(indices.size());
+    clustered.resize(meshopt_simplifySloppy(
+        clustered.data(), indices.data(), indices.size(), positions.data(), mesh.vertices.size(),
+        3 * sizeof(float), 3 * kManyTimes * max_faces, kAnyError));
+    indices = std::move(clustered);
+  }
   const std::size_t left =
       meshopt_simplify(indices.data(), indices.data(), indices.size(), positions.data(),
                        mesh.vertices.size(), 3 * sizeof(float), 3 * max_faces, kAnyError);
@@ -116,6 +121,7 @@ TriangleMesh decimated(const TriangleMesh& mesh, std::size_t max_faces) {
   result.vertices.resize(vertices);
   if (!mesh.sigma.empty()) result.sigma.resize(vertices);
   if (!mesh.confidence.empty()) result.confidence.resize(vertices);
+  if (!mesh.color.empty()) result.color.resize(vertices);
   if (!mesh.hole.empty()) result.hole.resize(vertices);
   for (std::size_t i = 0; i < remap.size(); ++i) {
     const std::size_t to = remap[i];
@@ -123,6 +129,7 @@ TriangleMesh decimated(const TriangleMesh& mesh, std::size_t max_faces) {
     result.vertices[to] = mesh.vertices[i];
     if (!mesh.sigma.empty()) result.sigma[to] = mesh.sigma[i];
     if (!mesh.confidence.empty()) result.confidence[to] = mesh.confidence[i];
+    if (!mesh.color.empty()) result.color[to] = mesh.color[i];
     if (!mesh.hole.empty()) result.hole[to] = mesh.hole[i];
   }
   for (std::size_t i = 0; i + 2 < left; i += 3) {
@@ -143,26 +150,39 @@ std::vector<float> vertex_distances(const TriangleMesh& mesh, const RayScene& tr
 }
 
 Block mesh_block(const TriangleMesh& mesh, std::span<const float> distance_mm,
-                 std::span<const float> albedo) {
+                 MeshPrecision precision) {
+  const bool fine = precision == MeshPrecision::kFine;
+  const int place_bits = fine ? 16 : 12;  // of 300 mm: 0.005 mm or 0.07 mm
+  const int value_bits = fine ? 16 : 8;
   Block block;
   const auto coordinate = [&](Eigen::Index k) {
     return column(mesh.vertices, [k](const Vec3& v) { return static_cast<float>(v[k]); });
   };
-  block.add_floats("x", coordinate(0));
-  block.add_floats("y", coordinate(1));
-  block.add_floats("z", coordinate(2));
+  block.add_floats("x", coordinate(0), Steps::kLinear, place_bits);
+  block.add_floats("y", coordinate(1), Steps::kLinear, place_bits);
+  block.add_floats("z", coordinate(2), Steps::kLinear, place_bits);
   std::vector<std::uint32_t> indices;
   indices.reserve(3 * mesh.faces.size());
   for (const auto& face : mesh.faces) {
     for (const int vertex : face) indices.push_back(static_cast<std::uint32_t>(vertex));
   }
   block.add_integers("index", indices);
-  if (!mesh.sigma.empty()) block.add_floats("sigma", mesh.sigma, Steps::kLogarithmic);
+  if (!mesh.sigma.empty()) block.add_floats("sigma", mesh.sigma, Steps::kLogarithmic, value_bits);
   if (!mesh.confidence.empty())
     block.add_bytes("confidence", integers<std::uint8_t>(mesh.confidence, share_byte));
   if (!mesh.hole.empty()) block.add_bytes("hole", mesh.hole);
-  if (!distance_mm.empty()) block.add_floats("distance", distance_mm, Steps::kLogarithmic);
-  if (!albedo.empty()) block.add_bytes("albedo", albedo_bytes(albedo));
+  if (!distance_mm.empty())
+    block.add_floats("distance", distance_mm, Steps::kLogarithmic, value_bits);
+  if (!mesh.color.empty() && fine) {
+    const auto channel = [&](std::size_t k) {
+      return integers<std::uint8_t>(mesh.color, [k](const std::array<float, 3>& linear) {
+        return std::lround(255 * to_srgb(static_cast<double>(linear[k])));
+      });
+    };
+    block.add_bytes("red", channel(0));
+    block.add_bytes("green", channel(1));
+    block.add_bytes("blue", channel(2));
+  }
   return block;
 }
 

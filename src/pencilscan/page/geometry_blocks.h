@@ -20,19 +20,22 @@ struct PointErrors {
 [[nodiscard]] PointErrors point_errors(const Rig& rig, std::span<const MeasuredPoint> points,
                                        const RayScene& truth);
 
-/// Every `stride`-th point. distance_mm, albedo: per point, or empty.
+/// Every `stride`-th point. distance_mm: per point, or empty.
 [[nodiscard]] Block points_block(std::span<const MeasuredPoint> points,
-                                 std::span<const float> distance_mm, std::span<const float> albedo,
-                                 std::size_t stride = 1);
+                                 std::span<const float> distance_mm, std::size_t stride = 1);
 
 /// The mesh with at most about `max_faces` faces: edges collapse where that changes the shape least
 /// (quadrics of Garland and Heckbert, 1997, by meshoptimizer); vertices that remain keep their
-/// place and properties.
+/// place and properties. Where far fewer faces are wanted than there are, vertices are first
+/// clustered on a grid, which is fast and may leave edges of more than two faces.
 [[nodiscard]] TriangleMesh decimated(const TriangleMesh& mesh, std::size_t max_faces);
 
-/// distance_mm, albedo: per vertex, or empty.
+/// How exactly a mesh is stored: for measuring on it, or for playing.
+enum class MeshPrecision { kFine, kCoarse };
+
+/// distance_mm: per vertex, or empty. A coarse one has no colours.
 [[nodiscard]] Block mesh_block(const TriangleMesh& mesh, std::span<const float> distance_mm,
-                               std::span<const float> albedo);
+                               MeshPrecision precision = MeshPrecision::kFine);
 [[nodiscard]] std::vector<float> vertex_distances(const TriangleMesh& mesh, const RayScene& truth);
 
 /// Points of curves in order, camera by camera, with their local IDs, and the crossings.

@@ -101,52 +101,78 @@ constexpr std::array<Detail, 4> kFullDetails = {{
     {.max_faces = 30'000, .point_stride = 4, .image_width = 960, .image_quality = 50},
     {.max_faces = 20'000, .point_stride = 8, .image_width = 640, .image_quality = 40},
 }};
-constexpr double kBytesPerFace = 6;  // embedded, measured on scanned shapes
 
-Detail shape_detail(std::size_t results, std::size_t max_bytes) {
+/// The result with the largest mesh: it says how much results take.
+std::size_t largest(const ResultFolder& folder) {
+  std::size_t best = 0;
+  std::uintmax_t most = 0;
+  for (std::size_t i = 0; i < folder.results.size(); ++i) {
+    std::error_code error;
+    const std::uintmax_t size = fs::file_size(folder.results[i].folder / "mesh.ply", error);
+    if (error || size <= most) continue;
+    most = size;
+    best = i;
+  }
+  return best;
+}
+
+/// Shapes that together take about `bytes`, judged by that of one result.
+Detail shape_detail(const PageData& data, std::size_t sample, double bytes) {
   Detail detail;
   detail.shape_only = true;
-  const double share = 0.6 * static_cast<double>(max_bytes) / static_cast<double>(results);
-  detail.max_faces = static_cast<std::size_t>(std::clamp(share / kBytesPerFace, 2000.0, 20'000.0));
+  detail.max_faces = 4000;
+  const Collected tried = collect(data, sample, detail);
+  double mesh = 0;
+  for (const CollectedPart& part : tried.parts) {
+    if (part.name == "mesh") mesh += static_cast<double>(part.bytes.size()) * 4 / 3;
+  }
+  const double rest = static_cast<double>(tried.embedded_bytes()) - mesh;
+  const double room = bytes / static_cast<double>(data.size()) - rest;
+  const double faces = room / std::max(1.0, mesh) * static_cast<double>(detail.max_faces);
+  detail.max_faces = static_cast<std::size_t>(std::clamp(faces, 500.0, 20'000.0));
   return detail;
 }
 
-/// All results, each in the detail that there is room for; first of all the first one, which says
-/// how much a whole one takes.
+/// All results, each in the detail that there is room for.
 std::vector<Collected> collect_all(const PageData& data, const PageOptions& options,
                                    const Progress& progress) {
   const std::size_t count = data.size();
   std::vector<Collected> collected(count);
   if (count == 0) return collected;
-  const Detail shape = shape_detail(count, options.max_bytes);
+  if (progress) progress("reading results", 0);
   const auto number = static_cast<double>(count);
-  const double shape_bytes = static_cast<double>(shape.max_faces) * kBytesPerFace;
   const double room = static_cast<double>(options.max_bytes) - 1e6;  // 1 MB: the page itself
+  constexpr double kShareOfShapes = 0.6;
+  constexpr std::size_t kFew = 6;
+  const std::size_t sample = largest(data.folder());
+  // Few results are all whole, if need be with less detail; of many, at least one.
+  const bool few = count <= kFew;
+  const Detail shape = count == 1 ? Detail{} : shape_detail(data, sample, kShareOfShapes * room);
+  const double left = few ? room / number : (1 - kShareOfShapes) * room;
   Detail full;
   double each = 0;
   for (const Detail& detail : kFullDetails) {
-    if (progress) progress("reading results", 0);
     full = detail;
     full.evaluate = count <= 8;
-    collected[0] = collect(data, 0, full);
-    each = static_cast<double>(collected[0].embedded_bytes());
-    // Few results are all whole, if need be with less detail; of many, at least one.
-    constexpr std::size_t kFew = 6;
-    const double others = std::min((number - 1) * shape_bytes, 0.6 * room);
-    if ((count <= kFew ? number * each : each + others) <= room) break;
+    collected[sample] = collect(data, sample, full);
+    each = static_cast<double>(collected[sample].embedded_bytes());
+    if (each <= left) break;
   }
   std::size_t whole = count;
   if (number * each > room) {
-    const double fit = (room - number * shape_bytes) / std::max(1.0, each - shape_bytes);
+    const double shapes = kShareOfShapes * room;
+    const double fit = (room - shapes) / std::max(1.0, each - shapes / number);
     whole = static_cast<std::size_t>(std::clamp(fit, 1.0, number));
   }
+  // Evenly picked, the one that is there already among them.
   std::vector<char> is_whole(count, 0);
-  for (std::size_t i = 0; i < whole; ++i) is_whole[i * count / whole] = 1;
-  const auto chunk = static_cast<std::size_t>(thread_count());
-  for (std::size_t first = 1; first < count; first += chunk) {
+  for (std::size_t i = 0; i < whole; ++i) is_whole[(sample + i * count / whole) % count] = 1;
+  const auto chunk = 4 * static_cast<std::size_t>(thread_count());
+  for (std::size_t first = 0; first < count; first += chunk) {
     const std::size_t last = std::min(first + chunk, count);
     parallel_for(last - first, [&](std::size_t i) {
       const std::size_t result = first + i;
+      if (result == sample) return;
       collected[result] = collect(data, result, is_whole[result] != 0 ? full : shape);
     });
     if (progress) progress("reading results", static_cast<double>(last) / number);

@@ -164,6 +164,41 @@ TEST(Decimated, KeepsTheBallClosedAndItsSize) {
     EXPECT_EQ(small.hole[i], small.vertices[i].x() > 0 ? 1 : 8);
 }
 
+TEST(Decimated, KeepsTheShapeWithFarFewerFaces) {
+  const TriangleMesh mesh = make_sphere(sample::kBallRadius, 120);
+  constexpr std::size_t kFaces = 500;
+  ASSERT_GT(mesh.faces.size(), 32 * kFaces);  // clustered first
+  const TriangleMesh small = decimated(mesh, kFaces);
+  EXPECT_LE(small.faces.size(), kFaces);
+  EXPECT_GT(small.faces.size(), kFaces / 2);
+  constexpr double kInscribed = 0.08;  // as above, with fewer faces and uneven ones
+  EXPECT_NEAR(signed_volume(small) / signed_volume(mesh), 1, kInscribed);
+}
+
+TEST(MeshBlock, HasColorsWhereTheMeshHasThem) {
+  TriangleMesh mesh = sample::ball();
+  EXPECT_FALSE(ReadBlock(mesh_block(mesh, {}).bytes()).header["arrays"].contains("red"));
+  mesh.color.assign(mesh.vertices.size(), {1, 0.2140F, 0});
+  const ReadBlock read(mesh_block(mesh, {}).bytes());
+  const auto byte = [&](const char* name) {
+    return static_cast<unsigned char>(read.data[read.header["arrays"][name]["at"]]);
+  };
+  EXPECT_EQ(byte("red"), 255);
+  EXPECT_EQ(byte("green"), 127);  // half on a screen is 0.214 of the light (IEC 61966-2-1)
+  EXPECT_EQ(byte("blue"), 0);
+}
+
+TEST(MeshBlock, OfLowerPrecisionHasLargerStepsAndTakesLessRoom) {
+  const TriangleMesh mesh = sample::ball();
+  const ReadBlock fine(mesh_block(mesh, {}).bytes());
+  const ReadBlock coarse(mesh_block(mesh, {}, MeshPrecision::kCoarse).bytes());
+  const double ratio = coarse.header["arrays"]["x"]["step"].get<double>() /
+                       fine.header["arrays"]["x"]["step"].get<double>();
+  EXPECT_NEAR(ratio, 65534.0 / 4094, 1e-6);
+  EXPECT_LT(mesh_block(mesh, {}, MeshPrecision::kCoarse).bytes().size(),
+            mesh_block(mesh, {}).bytes().size());
+}
+
 TEST(PointErrors, AreHowFarThePointsLieBeforeTheTruth) {
   const Rig rig = sample::rig();
   constexpr double kOff = 2;
@@ -277,6 +312,7 @@ TEST_F(Folder, OfManyFramesSomeAreWholeAndTheOthersHaveTheirShape) {
   const auto index = index_of(report(options));
   EXPECT_LT(last_.full_results, last_.results);
   EXPECT_GE(last_.full_results, 1U);
+  EXPECT_LE(last_.bytes, options.max_bytes);
   EXPECT_EQ(index["results"][0]["detail"], "full");
   for (const auto& result : index["results"]) EXPECT_THAT(result["parts"], Contains("mesh"));
 }

@@ -55,12 +55,6 @@ const TriangleMesh* ResultFiles::measured() {
   return measured_.get([&] { return attempt(entry_.folder / "mesh_measured.ply", read); });
 }
 
-const RayScene* ResultFiles::mesh_scene() {
-  const TriangleMesh* closed = mesh();
-  if (closed == nullptr) return nullptr;
-  return mesh_scene_.get([&] { return std::optional<RayScene>(RayScene(*closed)); });
-}
-
 const RayScene* ResultFiles::measured_scene() {
   const TriangleMesh* mesh = measured();
   if (mesh == nullptr) return nullptr;
@@ -77,13 +71,6 @@ const PointErrors* ResultFiles::errors() {
   const RayScene* scene = truth();
   if (measured_points == nullptr || scene == nullptr || rig_ == nullptr) return nullptr;
   return errors_.get([&] { return std::optional(point_errors(*rig_, *measured_points, *scene)); });
-}
-
-const AlbedoEstimate* ResultFiles::albedo() {
-  if (rig_ == nullptr || points() == nullptr || curves() == nullptr || mesh_scene() == nullptr)
-    return nullptr;
-  return albedo_.get(
-      [&] { return std::optional(estimate_albedo(*rig_, *points(), *curves(), *mesh_scene())); });
 }
 
 }  // namespace pencilscan

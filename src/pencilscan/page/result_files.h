@@ -9,7 +9,6 @@
 
 #include "pencilscan/geometry/ray_scene.h"
 #include "pencilscan/io/curve_file.h"
-#include "pencilscan/page/albedo.h"
 #include "pencilscan/page/geometry_blocks.h"
 #include "pencilscan/page/result_folder.h"
 
@@ -50,11 +49,8 @@ class ResultFiles {
   [[nodiscard]] const TriangleMesh* mesh();
   [[nodiscard]] const TriangleMesh* measured();
   [[nodiscard]] const RayScene* measured_scene();
-  [[nodiscard]] const RayScene* mesh_scene();
   [[nodiscard]] const RayScene* truth();
   [[nodiscard]] const PointErrors* errors();  ///< needs points, truth and rig
-
-  [[nodiscard]] const AlbedoEstimate* albedo();  ///< on mesh(); needs points, curves and rig
 
   [[nodiscard]] const ResultEntry& entry() const { return entry_; }
 
@@ -71,9 +67,8 @@ class ResultFiles {
   Lazy<std::vector<MeasuredPoint>> points_;
   Lazy<CurveFile> curves_;
   Lazy<TriangleMesh> mesh_, measured_;
-  Lazy<RayScene> mesh_scene_, measured_scene_, truth_;
+  Lazy<RayScene> measured_scene_, truth_;
   Lazy<PointErrors> errors_;
-  Lazy<AlbedoEstimate> albedo_;
 };
 
 /// True for a file that is there.

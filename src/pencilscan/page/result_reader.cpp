@@ -141,9 +141,8 @@ std::optional<std::string> ResultReader::make_part(const std::string& name) {
     const RayScene* truth = files_.truth();
     const auto distances =
         truth == nullptr ? std::vector<float>() : vertex_distances(*mesh, *truth);
-    const AlbedoEstimate* albedo =
-        name == "mesh" && !detail_.shape_only ? files_.albedo() : nullptr;
-    return mesh_block(*mesh, distances, albedo == nullptr ? std::vector<float>() : albedo->vertices)
+    return mesh_block(*mesh, distances,
+                      detail_.shape_only ? MeshPrecision::kCoarse : MeshPrecision::kFine)
         .bytes();
   }
   if (detail_.shape_only) return std::nullopt;
@@ -151,9 +150,7 @@ std::optional<std::string> ResultReader::make_part(const std::string& name) {
     const auto* points = files_.points();
     if (points == nullptr) return std::nullopt;
     const PointErrors* errors = files_.errors();
-    const AlbedoEstimate* albedo = files_.albedo();
     return points_block(*points, errors == nullptr ? std::vector<float>() : errors->distance_mm,
-                        albedo == nullptr ? std::vector<float>() : albedo->points,
                         detail_.point_stride)
         .bytes();
   }
