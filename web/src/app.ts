@@ -1,5 +1,5 @@
 // What is shown now, and what is selected in it. Panels listen and never talk to each other.
-import type {Curves, DepthMap, Points, RigJson, Source} from './data';
+import type {Curves, DepthMap, PatternJson, Points, RigJson, Source} from './data';
 import {Device} from './device';
 
 export interface Selection {
@@ -85,6 +85,13 @@ export class App {
       this.depth[c] = map;
     }
     this.tell('selection');
+  }
+
+  /** The pattern that a point's line belongs to; none where lines are not those of the rig. */
+  patternOf(point: number): PatternJson | undefined {
+    const {points, rig, source} = this;
+    if (!points || source.index.results[this.result]?.scan) return undefined;
+    return rig?.patterns[points.projector[point]]?.[points.pattern[point]];
   }
 
   position(point: number): [number, number, number] {

@@ -47,6 +47,18 @@ export function bars(title: string, rows: [string, number, string][], highest?: 
         h('span', {class: 'bar-value'}, text)))));
 }
 
+export interface Tile {
+  name: string;
+  value: string;
+  hint?: string;
+}
+
+/** Key figures. */
+export function tiles(list: Tile[]): HTMLElement {
+  return h('dl', {class: 'tiles'}, ...list.map(({name, value, hint}) =>
+    h('div', {class: 'tile'}, h('dt', {}, name), h('dd', {}, value), hint ? h('dd', {class: 'hint'}, hint) : null)));
+}
+
 export function table(head: string[], rows: (string | number)[][], caption: string): HTMLElement {
   return h('div', {class: 'table-holder', tabindex: 0, role: 'region', 'aria-label': caption},
     h('table', {}, h('caption', {}, caption),

@@ -26,6 +26,7 @@ export interface ResultJson {
   run: string;
   rig: number;
   truth: boolean;
+  scan?: boolean; // from Gray codes: `line` counts columns or rows of the panel
   detail: 'full' | 'shape';
   summary: Record<string, number>;
   parts: string[];

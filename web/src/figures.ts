@@ -1,17 +1,20 @@
 // Warnings, key figures, histograms and tables of the shown result.
 import type {App} from './app';
-import {bars, histogramChart, table} from './charts';
+import {bars, histogramChart, table, tiles, type Tile} from './charts';
 import {dig, digList, digNumber, type Details, type Json} from './data';
 import {byId, format, h, percent} from './dom';
 
 const kReasons = ['no_crossing', 'ambiguous', 'contradicted', 'outside_volume'];
 const words = (key: string) => key.replace(/_/g, ' ');
+const kStages = ['reading', 'detection', 'grid', 'solution', 'refinement', 'second look', 'triangulation',
+  'depth', 'surface', 'holes', 'color', 'pictures'];
+const kBands = ['below_3px', '3_5px', '5_8px', '8_12px', 'from_12px'];
 
-interface Tile {
-  name: string;
-  value: string;
-  hint?: string;
-}
+/** In the order of `known`; what is not in it comes last. */
+const inOrder = <T>(entries: [string, T][], known: string[]): [string, T][] => {
+  const place = (key: string) => (known.includes(key) ? known.indexOf(key) : known.length);
+  return entries.sort(([a], [b]) => place(a) - place(b));
+};
 
 export class Figures {
   constructor(private readonly app: App) {
@@ -57,26 +60,27 @@ export class Figures {
   private tiles(details: Details): HTMLElement {
     const {report, figures, timing, histograms} = details;
     const {summary} = this.app.source.index.results[this.app.result];
-    const tiles: Tile[] = [];
+    const list: Tile[] = [];
+    const unit = this.app.rig?.unit ?? 'mm';
     const add = (name: string, value: number | undefined, text: (x: number) => string, hint?: string) => {
-      if (value !== undefined) tiles.push({name, value: text(value), hint});
+      if (value !== undefined) list.push({name, value: text(value), hint});
     };
-    add('Measured points', digNumber(report, 'points') ?? summary.points, (x) => format(x));
+    add('Measured points', digNumber(report, 'points') ?? summary.points ?? histograms?.confidence?.count,
+      (x) => format(x));
     add('Surface measured', digNumber(report, 'surface', 'measured_share'), percent,
       'share of the closed surface that was measured');
     const sigma = histograms?.sigma_mm;
-    if (sigma) add('Sigma, median', sigma.median, (x) => `${format(x)} mm`, 'one standard deviation along the ray');
+    if (sigma) add('Sigma, median', sigma.median, (x) => `${format(x)} ${unit}`, 'one standard deviation along the ray');
     add('Lines disagree by', digNumber(report, 'crossing_disagreement', 'median_px'),
       (x) => `${format(x)} px`, `median at crossings; noise explains ${
         format(digNumber(report, 'crossing_disagreement', 'expected_px'))} px`);
     add('Label error', digNumber(figures, 'label_error'), (x) => percent(x, 2), 'points with a wrong line');
     add('Line recall', digNumber(figures, 'line_recall'), percent, 'true lines that were measured, spacing from 5 px');
-    add('Distance, median', digNumber(figures, 'distance_median_mm'), (x) => `${format(x)} mm`, 'points to the truth');
+    add('Distance, median', digNumber(figures, 'distance_median_mm'), (x) => `${format(x)} ${unit}`, 'points to the truth');
     add('Complete at 1 mm', digNumber(figures, 'completeness_1mm'), percent, 'of the measurable surface');
     add('Time', digNumber(timing, 'seconds', 'total') ?? summary.seconds, (x) => `${format(x)} s`,
       `${format(digNumber(timing, 'threads'))} threads`);
-    return h('dl', {class: 'tiles'}, ...tiles.map(({name, value, hint}) =>
-      h('div', {class: 'tile'}, h('dt', {}, name), h('dd', {}, value), hint ? h('p', {}, hint) : null)));
+    return tiles(list);
   }
 
   private charts(details: Details): HTMLElement {
@@ -94,7 +98,7 @@ export class Figures {
     chart('confidence', 'Confidence of the points', '');
     const seconds = dig(timing, 'seconds');
     if (seconds && typeof seconds === 'object' && !Array.isArray(seconds)) {
-      const rows = Object.entries(seconds)
+      const rows = inOrder(Object.entries(seconds), kStages)
         .filter(([key, value]) => key !== 'total' && typeof value === 'number')
         .map(([key, value]) => [words(key), value as number, `${format(value as number, 2)} s`] as [string, number, string]);
       if (rows.length) grid.append(bars('Time per stage', rows));
@@ -102,7 +106,7 @@ export class Figures {
     const recall = (key: string, title: string) => {
       const group = dig(figures, key);
       if (!group || typeof group !== 'object' || Array.isArray(group)) return;
-      const rows = Object.entries(group).flatMap(([name, entry]) => {
+      const rows = inOrder(Object.entries(group), kBands).flatMap(([name, entry]) => {
         const value = digNumber(entry, 'line_recall');
         return value === undefined ? [] : [[spacing(name), value, percent(value)] as [string, number, string]];
       });
@@ -116,7 +120,7 @@ export class Figures {
       const total = entries.reduce((sum, [, v]) => sum + v, 0);
       if (total > 0) {
         grid.append(bars('Surface by what is known of it',
-          entries.filter(([, v]) => v > 0).map(([key, v]) => [words(key), v / total, percent(v / total)]), 1));
+          entries.filter(([, v]) => v > 0).sort(([, a], [, b]) => b - a).map(([key, v]) => [words(key), v / total, percent(v / total)]), 1));
       }
     }
     return grid;

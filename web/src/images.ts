@@ -1,37 +1,27 @@
 // The image panel: one camera's picture with layers, zoom, and a click that selects.
 import type {App} from './app';
-import type {Curves} from './data';
 import {byId, choice, h} from './dom';
-import {category, css, kHoles, kStates, kUndecided, lightColor, sequential, type Named, type Rgb} from './palette';
+import {crossingsPath, depthPicture, kLayers, layerLegend, layerPaths, type ColoredPath, type Layer} from './image_layers';
+import {ImageView} from './image_view';
+import {css, kHoles, sequential, type Named} from './palette';
 
 type Base = 'picture' | 'holes' | 'depth';
-type Layer = 'local' | 'projector' | 'color' | 'confidence' | 'undecided' | 'none';
 
-const kLayers: {value: Layer; text: string}[] = [
-  {value: 'local', text: 'Local ID'},
-  {value: 'projector', text: 'Projector'},
-  {value: 'color', text: 'Code colour'},
-  {value: 'confidence', text: 'Confidence'},
-  {value: 'undecided', text: 'Undecided: why'},
-  {value: 'none', text: 'No curves'},
-];
-
-const kConfidenceSteps = 8;
+const kBaseWords: Record<Base, string> = {picture: 'picture', holes: 'hole map', depth: 'depth'};
+const partOf = (base: Base, camera: number): string =>
+  `${base === 'picture' ? 'image' : base}/${camera}`;
 
 export class Images {
   private camera = 0;
   private base: Base = 'picture';
   private layer: Layer = 'projector';
-  private scale = 1; // CSS pixels per image pixel
-  private left = 0; // of the image's corner, CSS pixels
-  private top = 0;
-  private fitted = true;
   private bitmap: CanvasImageSource | null = null;
-  private paths: {color: Rgb; path: Path2D}[] = [];
+  private paths: ColoredPath[] = [];
   private crossings: Path2D | null = null;
   private pending = false;
   private strip: HTMLButtonElement[] = [];
   private readonly canvas = h('canvas', {tabindex: 0, role: 'application'});
+  private readonly view: ImageView;
   private readonly legend = h('div', {class: 'legend', hidden: true});
   private readonly message = h('p', {class: 'overlay-message', hidden: true});
   private readonly cameraStrip = h('div', {class: 'camera-strip', role: 'group', 'aria-label': 'Cameras'});
@@ -52,6 +42,21 @@ export class Images {
 
   constructor(private readonly app: App) {
     this.layerSelect.value = this.layer;
+    this.build();
+    this.view = new ImageView(this.canvas, () => app.cameras[this.camera] ?? null,
+      () => this.draw(), (x, y) => this.select(x, y));
+    this.canvas.addEventListener('keydown', (event) => this.key(event));
+    new ResizeObserver(() => this.resize()).observe(byId('canvas-image'));
+    app.on('result', () => this.load());
+    app.on('points', () => this.prepare());
+    app.on('curves', () => this.prepare());
+    app.on('selection', () => this.selectionChanged());
+    app.on('theme', () => this.draw());
+    // For tests and scripts: where a pixel is on the canvas.
+    Object.assign(this.canvas, {pencilscanToCanvas: (u: number, v: number) => this.view.toCanvas(u, v)});
+  }
+
+  private build(): void {
     const button = (text: string, title: string, act: () => void) =>
       h('button', {type: 'button', title, 'aria-label': title, onclick: act}, text);
     byId('images').append(
@@ -62,21 +67,12 @@ export class Images {
         h('label', {class: 'check'}, this.showCrossings, 'Crossings'),
         h('span', {class: 'spacer'}),
         h('span', {class: 'tool-group'},
-          button('−', 'Zoom out', () => this.zoomMiddle(1 / 1.5)),
-          button('+', 'Zoom in', () => this.zoomMiddle(1.5)),
-          button('Fit', 'Whole image', () => this.fit()))),
+          button('−', 'Zoom out', () => this.view.zoomMiddle(1 / 1.5)),
+          button('+', 'Zoom in', () => this.view.zoomMiddle(1.5)),
+          button('Fit', 'Fit the whole image', () => this.view.fit()))),
       h('div', {class: 'canvas-holder', id: 'canvas-image'}, this.canvas, this.message, this.legend));
     this.canvas.setAttribute('aria-label', 'Camera image. Arrow keys move, plus and minus zoom, ' +
       '0 fits, Enter selects what is in the middle, brackets step along the selected line.');
-    new ResizeObserver(() => this.resize()).observe(byId('canvas-image'));
-    this.listen();
-    app.on('result', () => this.load());
-    app.on('points', () => this.prepare());
-    app.on('curves', () => this.prepare());
-    app.on('selection', () => this.selectionChanged());
-    app.on('theme', () => this.draw());
-    Object.assign(this.canvas, {pencilscanToCanvas: (u: number, v: number) =>
-      ({x: this.left + (u + 0.5) * this.scale, y: this.top + (v + 0.5) * this.scale})});
   }
 
   private load(): void {
@@ -86,14 +82,18 @@ export class Images {
       const other = app.cameras.findIndex((_, c) => this.hasAnything(c));
       if (other >= 0) this.camera = other;
     }
+    // Without devices nothing can be drawn here: the 3-D picture gets the room.
+    byId('stage').classList.toggle('one-panel', app.rig === null);
+    byId('panel-tabs').classList.toggle('one-panel', app.rig === null);
     this.strip = app.cameras.map((camera, c) => {
-      const thumb = h('canvas', {width: 96, height: 72, 'aria-hidden': 'true'});
+      const thumb = app.source.has(app.result, `image/${c}`)
+        ? h('canvas', {width: 96, height: 72, 'aria-hidden': 'true'}) : null;
       return h('button', {type: 'button', title: camera.name, onclick: () => this.showCamera(c)},
         thumb, h('span', {}, camera.name), h('i', {class: 'seen', 'aria-hidden': 'true'}));
     });
     this.cameraStrip.replaceChildren(...this.strip);
     this.markStrip();
-    this.fit();
+    this.view.fit();
     this.prepare();
     void this.loadBase();
     void this.fillThumbs();
@@ -120,11 +120,11 @@ export class Images {
     }
   }
 
-  showCamera(camera: number): void {
+  private showCamera(camera: number): void {
     if (camera === this.camera) return;
     this.camera = camera;
     this.markStrip();
-    if (this.fitted) this.fit();
+    if (this.view.fitted) this.view.fit();
     this.prepare();
     void this.loadBase();
   }
@@ -146,20 +146,14 @@ export class Images {
 
   private async loadBase(): Promise<void> {
     const {app, camera, base} = this;
-    const {result, source} = app;
+    const {result} = app;
     this.bitmap = null;
-    const part = base === 'picture' ? `image/${camera}` : `${base}/${camera}`;
     let bitmap: CanvasImageSource | null = null;
-    let reason = '';
-    if (!app.rig) reason = 'The devices are not known: no camera images can be shown.';
-    else if (!source.has(result, part)) {
-      reason = source.index.results[result]?.detail === 'shape'
-        ? 'This frame has its shape only; pencilscan view shows the images of all frames.'
-        : `This result holds no ${base === 'picture' ? 'picture' : base === 'holes' ? 'hole map' : 'depth'} of ${
-          app.cameras[camera]?.name ?? 'this camera'}.`;
-    } else {
+    let reason = this.whyNoBase();
+    if (!reason) {
       try {
-        bitmap = base === 'depth' ? await this.depthImage(camera) : await source.image(result, part);
+        bitmap = base === 'depth' ? depthPicture(await app.source.depth(result, camera))
+          : await app.source.image(result, partOf(base, camera));
       } catch (error) {
         reason = `It cannot be shown: ${String(error)}`;
       }
@@ -172,128 +166,22 @@ export class Images {
     this.draw();
   }
 
-  private async depthImage(camera: number): Promise<HTMLCanvasElement> {
-    const map = await this.app.source.depth(this.app.result, camera);
-    let [low, high] = [Infinity, -Infinity];
-    for (const z of map.depth) {
-      if (z < low) low = z;
-      if (z > high) high = z;
+  /** Empty when the picture is there. */
+  private whyNoBase(): string {
+    const {app, camera, base} = this;
+    if (!app.rig) return 'The devices are not known: no camera images can be shown.';
+    if (app.source.has(app.result, partOf(base, camera))) return '';
+    if (app.source.index.results[app.result]?.detail === 'shape') {
+      return 'This frame has its shape only; pencilscan view shows the images of all frames.';
     }
-    const canvas = h('canvas', {width: map.columns, height: map.rows});
-    const context = canvas.getContext('2d')!;
-    const pixels = context.createImageData(map.columns, map.rows);
-    map.depth.forEach((z, i) => {
-      const [r, g, b] = Number.isFinite(z) ? sequential((high - z) / (high - low)) : [24, 24, 28];
-      pixels.data.set([r, g, b, 255], 4 * i);
-    });
-    context.putImageData(pixels, 0, 0);
-    canvas.dataset.low = String(low);
-    canvas.dataset.high = String(high);
-    canvas.dataset.source = map.source;
-    return canvas;
+    return `This result holds no ${kBaseWords[base]} of ${app.cameras[camera]?.name ?? 'this camera'}.`;
   }
 
-  /** Curves of this camera as one path per colour. */
   private prepare(): void {
-    const {curves} = this.app;
-    this.paths = [];
-    this.crossings = null;
-    if (curves) {
-      this.makePaths(curves);
-      this.crossings = new Path2D();
-      for (let i = 0; i < curves.crossingU.length; ++i) {
-        if (curves.crossingCamera[i] !== this.camera) continue;
-        const [u, v] = [curves.crossingU[i], curves.crossingV[i]];
-        this.crossings.moveTo(u + 1.6, v);
-        this.crossings.arc(u, v, 1.6, 0, 7);
-      }
-    } else if (this.app.points) {
-      this.pathsOfPoints();
-    }
+    this.paths = layerPaths(this.app, this.camera, this.layer);
+    this.crossings = crossingsPath(this.app.curves, this.camera);
     this.drawLegend();
     this.draw();
-  }
-
-  private colorKey(curves: Curves, i: number): number {
-    const labelled = curves.state[i] === 0;
-    switch (this.layer) {
-      case 'local': return curves.localId[i] === 255 ? -1 : curves.localId[i] % 8;
-      case 'projector': return labelled ? curves.projector[i] % 8 : -1;
-      case 'color': return curves.family[i] * 16 + curves.color[i];
-      case 'confidence': return labelled
-        ? Math.round((curves.confidence[i] / 255) * (kConfidenceSteps - 1)) : -1;
-      default: return curves.state[i];
-    }
-  }
-
-  private colorOfKey(key: number): Rgb {
-    if (key < 0) return kUndecided;
-    switch (this.layer) {
-      case 'color': return lightColor(this.app.rig?.families[key >> 4]?.[key & 15]);
-      case 'confidence': return sequential(key / (kConfidenceSteps - 1));
-      case 'undecided': return (kStates[key] ?? kStates[0]).color;
-      default: return category(key);
-    }
-  }
-
-  private makePaths(curves: Curves): void {
-    if (this.layer === 'none') return;
-    const byKey = new Map<number, Path2D>();
-    const end = curves.beginOfCamera[this.camera + 1] ?? curves.count;
-    let last = -1; // key of the point before, on the same curve
-    for (let i = curves.beginOfCamera[this.camera] ?? 0; i < end; ++i) {
-      const key = this.colorKey(curves, i);
-      let path = byKey.get(key);
-      if (!path) byKey.set(key, (path = new Path2D()));
-      const joined = i > 0 && curves.curve[i - 1] === curves.curve[i] &&
-        Math.abs(curves.u[i] - curves.u[i - 1]) + Math.abs(curves.v[i] - curves.v[i - 1]) < 6;
-      if (!joined) path.moveTo(curves.u[i], curves.v[i]);
-      else if (last !== key) path.moveTo(curves.u[i - 1], curves.v[i - 1]);
-      path.lineTo(curves.u[i], curves.v[i]);
-      last = key;
-    }
-    // What is decided on top of what is not; reasons on top of what is labelled.
-    const order = [...byKey.keys()].sort((a, b) => a - b);
-    this.paths = order.map((key) => ({color: this.colorOfKey(key), path: byKey.get(key)!}));
-  }
-
-  /** Without curves.ply, the measured points alone. */
-  private pathsOfPoints(): void {
-    const points = this.app.points!;
-    if (this.layer === 'none') return;
-    const byKey = new Map<number, Path2D>();
-    for (let i = 0; i < points.count; ++i) {
-      if (points.camera[i] !== this.camera) continue;
-      const key = this.layer === 'confidence'
-        ? Math.round((points.confidence[i] / 255) * (kConfidenceSteps - 1)) : points.projector[i] % 8;
-      let path = byKey.get(key);
-      if (!path) byKey.set(key, (path = new Path2D()));
-      path.rect(points.u[i] - 0.5, points.v[i] - 0.5, 1, 1);
-    }
-    for (const [key, path] of byKey) {
-      this.paths.push({path, color: this.layer === 'confidence'
-        ? sequential(key / (kConfidenceSteps - 1)) : category(key)});
-    }
-  }
-
-  private legendEntries(): {title: string; named: Named[]} | null {
-    const {rig, curves} = this.app;
-    const undecided = {name: 'undecided', color: kUndecided};
-    switch (this.layer) {
-      case 'projector': return {title: 'Projector', named: [...(rig?.projectors ?? [])
-        .map(({name}, i) => ({name, color: category(i)})), undecided]};
-      case 'local': return {title: 'Local ID', named: [...Array.from({length: 8}, (_, i) =>
-        ({name: String(i), color: category(i)})), undecided]};
-      case 'color': return {title: 'Likeliest code colour', named: (rig?.families ?? []).flat()
-        .map((name) => ({name, color: lightColor(name)}))};
-      case 'undecided': {
-        const present = new Set(curves?.state ?? []);
-        return {title: 'Curves', named: kStates.filter((_, i) => present.has(i))};
-      }
-      case 'confidence': return {title: 'Confidence', named: [
-        ...[0, 0.5, 0.9, 1].map((x) => ({name: String(x), color: sequential(x)})), undecided]};
-      default: return null;
-    }
   }
 
   private drawLegend(): void {
@@ -302,7 +190,7 @@ export class Images {
       children.push(h('strong', {}, title), ...named.map(({name, color}) =>
         h('span', {class: 'key'}, h('i', {style: `background:${css(color)}`}), name)));
     };
-    const curves = this.paths.length ? this.legendEntries() : null;
+    const curves = this.paths.length ? layerLegend(this.app, this.layer) : null;
     if (curves) keys(curves.title, curves.named);
     if (this.base === 'holes' && this.bitmap) keys('Ground', kHoles.slice(0, 8));
     if (this.base === 'depth' && this.bitmap instanceof HTMLCanvasElement) {
@@ -317,59 +205,13 @@ export class Images {
     this.legend.hidden = children.length === 0;
   }
 
-  // --- what is seen of the image ---
-
-  private size(): {width: number; height: number} {
-    const holder = byId('canvas-image');
-    return {width: Math.max(1, holder.clientWidth), height: Math.max(1, holder.clientHeight)};
-  }
-
   private resize(): void {
-    const {width, height} = this.size();
+    const {width, height} = this.view.size();
     const ratio = Math.min(devicePixelRatio, 2);
     this.canvas.width = Math.round(width * ratio);
     this.canvas.height = Math.round(height * ratio);
-    if (this.fitted) this.fit();
-    this.paint();  // at once: the canvas is empty now
-  }
-
-  private fit(): void {
-    const device = this.app.cameras[this.camera];
-    if (!device) return;
-    const {width, height} = this.size();
-    this.scale = Math.min(width / device.width, height / device.height);
-    this.left = (width - device.width * this.scale) / 2;
-    this.top = (height - device.height * this.scale) / 2;
-    this.fitted = true;
-    this.draw();
-  }
-
-  private zoom(factor: number, x: number, y: number): void {
-    const device = this.app.cameras[this.camera];
-    if (!device) return;
-    const {width} = this.size();
-    const scale = Math.min(Math.max(this.scale * factor, (0.5 * width) / device.width / 2), 60);
-    this.left = x - ((x - this.left) * scale) / this.scale;
-    this.top = y - ((y - this.top) * scale) / this.scale;
-    this.scale = scale;
-    this.fitted = false;
-    this.draw();
-  }
-
-  private zoomMiddle(factor: number): void {
-    const {width, height} = this.size();
-    this.zoom(factor, width / 2, height / 2);
-  }
-
-  private pan(dx: number, dy: number): void {
-    this.left += dx;
-    this.top += dy;
-    this.fitted = false;
-    this.draw();
-  }
-
-  private toImage(x: number, y: number): {u: number; v: number} {
-    return {u: (x - this.left) / this.scale - 0.5, v: (y - this.top) / this.scale - 0.5};
+    if (this.view.fitted) this.view.fit();
+    this.paint(); // at once: the canvas is empty now
   }
 
   private draw(): void {
@@ -384,14 +226,15 @@ export class Images {
   private paint(): void {
     const context = this.canvas.getContext('2d')!;
     const device = this.app.cameras[this.camera];
-    const ratio = this.canvas.width / this.size().width;
+    const {scale, left, top} = this.view;
+    const ratio = this.canvas.width / this.view.size().width;
     context.setTransform(1, 0, 0, 1, 0, 0);
     context.clearRect(0, 0, this.canvas.width, this.canvas.height);
     if (!device) return;
-    const s = this.scale * ratio;
+    const s = scale * ratio;
     // Pixel centres sit at integer coordinates.
-    context.setTransform(s, 0, 0, s, this.left * ratio + 0.5 * s, this.top * ratio + 0.5 * s);
-    context.imageSmoothingEnabled = this.scale < 3 && this.base === 'picture';
+    context.setTransform(s, 0, 0, s, left * ratio + 0.5 * s, top * ratio + 0.5 * s);
+    context.imageSmoothingEnabled = scale < 3 && this.base === 'picture';
     context.fillStyle = '#0b0d10';
     context.fillRect(-0.5, -0.5, device.width, device.height);
     if (this.bitmap) {
@@ -399,11 +242,11 @@ export class Images {
       context.drawImage(this.bitmap, -0.5, -0.5, device.width, device.height);
       context.globalAlpha = 1;
     }
-    context.lineWidth = Math.max(0.8, Math.min(2.5, this.scale)) / this.scale;
+    context.lineWidth = Math.max(0.8, Math.min(2.5, scale)) / scale;
     context.lineCap = 'round';
     const dots = !this.app.curves;
     for (const {color, path} of this.paths) {
-      context.strokeStyle = context.fillStyle = css(color, this.scale > 8 ? 0.75 : 1);
+      context.strokeStyle = context.fillStyle = css(color, scale > 8 ? 0.75 : 1);
       if (dots) context.fill(path);
       else context.stroke(path);
     }
@@ -417,6 +260,7 @@ export class Images {
   private paintSelection(context: CanvasRenderingContext2D): void {
     const {app} = this;
     const {selection} = app;
+    const {scale} = this.view;
     if (!selection) return;
     let at: {u: number; v: number} | null = null;
     let hidden = false;
@@ -427,10 +271,10 @@ export class Images {
       hidden = seen?.visible === false;
     }
     if (!at) return;
-    const r = 9 / this.scale;
-    context.setLineDash(hidden ? [3 / this.scale, 3 / this.scale] : []);
+    const r = 9 / scale;
+    context.setLineDash(hidden ? [3 / scale, 3 / scale] : []);
     for (const [width, color] of [[5, '#000a'], [2.5, '#ff3d6e']] as const) {
-      context.lineWidth = width / this.scale;
+      context.lineWidth = width / scale;
       context.strokeStyle = color;
       context.beginPath();
       context.arc(at.u, at.v, r, 0, 7);
@@ -445,77 +289,29 @@ export class Images {
 
   private selectionChanged(): void {
     const {selection} = this.app;
-    if (selection && selection.camera !== this.camera && !this.keepCamera) {
+    if (selection) {
       this.showCamera(selection.camera);
+      if (!this.view.fitted) this.view.reveal(selection.u, selection.v);
     }
-    if (selection && selection.camera === this.camera && !this.fitted) this.reveal(selection.u, selection.v);
     this.markStrip();
     this.draw();
   }
-  private keepCamera = false;
-
-  private reveal(u: number, v: number): void {
-    const {width, height} = this.size();
-    const x = this.left + (u + 0.5) * this.scale;
-    const y = this.top + (v + 0.5) * this.scale;
-    const margin = 30;
-    if (x > margin && x < width - margin && y > margin && y < height - margin) return;
-    this.left += width / 2 - x;
-    this.top += height / 2 - y;
-  }
-
-  private listen(): void {
-    const {canvas} = this;
-    const pointers = new Map<number, {x: number; y: number}>();
-    let moved = 0;
-    canvas.addEventListener('wheel', (event) => {
-      event.preventDefault();
-      this.zoom(Math.exp(-event.deltaY * 0.0015), event.offsetX, event.offsetY);
-    }, {passive: false});
-    canvas.addEventListener('pointerdown', (event) => {
-      canvas.setPointerCapture(event.pointerId);
-      pointers.set(event.pointerId, {x: event.offsetX, y: event.offsetY});
-      if (pointers.size === 1) moved = 0;
-    });
-    canvas.addEventListener('pointermove', (event) => {
-      const before = pointers.get(event.pointerId);
-      if (!before) return;
-      const now = {x: event.offsetX, y: event.offsetY};
-      moved += Math.hypot(now.x - before.x, now.y - before.y);
-      if (pointers.size === 2) {
-        const other = [...pointers].find(([id]) => id !== event.pointerId)![1];
-        const was = Math.hypot(before.x - other.x, before.y - other.y);
-        const is = Math.hypot(now.x - other.x, now.y - other.y);
-        if (was > 0) this.zoom(is / was, (now.x + other.x) / 2, (now.y + other.y) / 2);
-      } else if (moved > 4) {
-        this.pan(now.x - before.x, now.y - before.y);
-      }
-      pointers.set(event.pointerId, now);
-    });
-    const up = (event: PointerEvent, click: boolean) => {
-      const alone = pointers.size === 1;
-      if (!pointers.delete(event.pointerId) || !click || !alone || moved > 4) return;
-      this.select(event.offsetX, event.offsetY);
-    };
-    canvas.addEventListener('pointerup', (event) => up(event, true));
-    canvas.addEventListener('pointercancel', (event) => up(event, false));
-    canvas.addEventListener('keydown', (event) => this.key(event));
-  }
 
   private select(x: number, y: number): void {
-    const {u, v} = this.toImage(x, y);
-    const reach = Math.max(1.5, 9 / this.scale);
+    const {u, v} = this.view.toImage(x, y);
+    const reach = Math.max(1.5, 9 / this.view.scale);
     if (!this.app.pick(this.camera, u, v, reach)) this.app.clearSelection();
   }
 
   private key(event: KeyboardEvent): void {
-    const {width, height} = this.size();
+    const {view} = this;
+    const {width, height} = view.size();
     const step = 40;
     const acts: Record<string, () => void> = {
-      ArrowLeft: () => this.pan(step, 0), ArrowRight: () => this.pan(-step, 0),
-      ArrowUp: () => this.pan(0, step), ArrowDown: () => this.pan(0, -step),
-      '+': () => this.zoomMiddle(1.3), '=': () => this.zoomMiddle(1.3),
-      '-': () => this.zoomMiddle(1 / 1.3), '0': () => this.fit(),
+      ArrowLeft: () => view.pan(step, 0), ArrowRight: () => view.pan(-step, 0),
+      ArrowUp: () => view.pan(0, step), ArrowDown: () => view.pan(0, -step),
+      '+': () => view.zoomMiddle(1.3), '=': () => view.zoomMiddle(1.3),
+      '-': () => view.zoomMiddle(1 / 1.3), '0': () => view.fit(),
       Enter: () => this.select(width / 2, height / 2),
       '[': () => this.app.step(-1), ']': () => this.app.step(1),
       Escape: () => this.app.clearSelection(),

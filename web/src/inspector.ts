@@ -50,7 +50,7 @@ export class Inspector {
     const points = app.points!;
     const i = app.selection!.point;
     const projector = points.projector[i];
-    const pattern = app.rig?.patterns[projector]?.[points.pattern[i]];
+    const pattern = app.patternOf(i);
     const unit = app.rig?.unit ?? 'mm';
     fact('Projector', app.rig?.projectors[projector]?.name ?? `#${projector}`,
       app.rig && app.rig.patterns[projector]?.length > 1 ? `, pattern ${points.pattern[i]}` : '');
@@ -59,7 +59,7 @@ export class Inspector {
       const color = pattern.colors[pattern.sequence[line % pattern.sequence.length]];
       fact('Line', `${line} of ${pattern.lines} `,
         h('i', {class: 'swatch', style: `background:${css(lightColor(color))}`}), ` ${color}, local ID ${line % pattern.sequence.length}`);
-    } else fact('Line', String(line));
+    } else fact(app.source.index.results[app.result]?.scan ? 'Panel column or row' : 'Line', String(line));
     const [x, y, z] = app.position(i);
     fact('3-D point', `${x.toFixed(2)}, ${y.toFixed(2)}, ${z.toFixed(2)} ${unit}`);
     fact('Sigma', `${format(points.sigma[i])} ${unit}`);

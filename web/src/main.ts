@@ -68,6 +68,7 @@ function start(): void {
   showCalibrations(app);
   const nothing = index.results.length === 0;
   document.body.classList.toggle('without-results', nothing);
+  if (nothing) document.querySelector('.skip')!.setAttribute('href', '#calibration-section');
   if (nothing) {
     const text = index.calibrations.length ? '' :
       'This folder holds no result: no points.ply, mesh.ply or report.json of a frame was found in it or in its folders.';
@@ -77,10 +78,12 @@ function start(): void {
       byId('nothing').textContent += ` Frames without a result: ${index.failed.join(', ')}.`;
     }
   } else {
-    app.show(0);
+    // The first one that has everything: of long sequences, some have their shape only.
+    app.show(Math.max(0, index.results.findIndex((result) => result.detail !== 'shape')));
     app.on('result', () => void later(app));
     void later(app);
   }
+  if (nothing) document.documentElement.dataset.loaded = 'nothing';
   document.documentElement.dataset.ready = 'true';
 }
 

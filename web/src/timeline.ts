@@ -23,9 +23,11 @@ export class Timeline {
     const {results, failed} = app.source.index;
     this.root.hidden = results.length < 2;
     if (results.length < 2) return;
+    document.body.classList.add('with-timeline'); // which is in sight beside the pictures
     const sequence = new Set(results.map((r) => r.name)).size > 1;
     const strip = h('div', {class: 'frames', role: 'group', 'aria-label': sequence ? 'Frames' : 'Runs'});
     const quality = (i: number): number | undefined => results[i].summary.measured_share;
+    const partial = results.some((r) => r.detail === 'shape');
     const best = Math.max(...results.map((r) => r.summary.points ?? 0), 1);
     this.items = results.map((r, i) => {
       const share = quality(i);
@@ -33,6 +35,7 @@ export class Timeline {
       const about = [share === undefined ? '' : `${percent(share, 0)} measured`,
         points === undefined ? '' : `${format(points)} points`,
         r.summary.warnings ? `${r.summary.warnings} warnings` : '',
+        partial ? (r.detail === 'full' ? 'with images and points' : 'shape only') : '',
         r.missing.length ? 'parts are missing' : ''].filter(Boolean).join(', ');
       const title = [r.run, r.name].filter(Boolean).join(' / ');
       return h('button', {type: 'button', class: 'frame', title: `${title}: ${about}`,
@@ -40,7 +43,7 @@ export class Timeline {
       h('span', {class: 'thumb'}),
       h('span', {class: 'quality', 'aria-hidden': 'true'},
         h('i', {style: `width:${100 * (share ?? (points ?? 0) / best)}%`})),
-      h('span', {class: 'name'}, sequence ? (r.run ? `${r.run} ${r.name}` : r.name) : r.run || r.name,
+      h('span', {class: 'name'}, partial && r.detail === 'full' ? h('i', {class: 'whole'}) : null, sequence ? (r.run ? `${r.run} ${r.name}` : r.name) : r.run || r.name,
         r.summary.warnings || r.missing.length ? h('b', {class: 'alert', 'aria-hidden': 'true'}, '!') : null));
     });
     strip.append(...this.items);
@@ -48,6 +51,7 @@ export class Timeline {
     this.root.append(
       h('div', {class: 'timeline-tools'}, sequence ? this.play : null, sequence ? this.speed : null,
         sequence ? this.slider : null, this.name,
+        partial ? h('span', {class: 'tool-label'}, h('i', {class: 'whole'}), 'with images and points') : null,
         failed.length ? h('span', {class: 'failed'}, `${failed.length} failed: ${failed.slice(0, 8).join(', ')}${
           failed.length > 8 ? ', …' : ''}`) : null),
       strip);

@@ -8,12 +8,12 @@ import type {Mesh} from './data';
 import {clear, drawDevices, drawMarker, drawSegments, drawSheet} from './devices3d';
 import {Device, type Vec3} from './device';
 import {byId, choice, format, h} from './dom';
+import {Measuring, type Measure} from './measuring';
 import {css, sequential, type Rgb} from './palette';
-import {angleBetween, fitPlane, type Plane} from './plane_fit';
 import {Picture3d} from './scene';
 
 type Surface = 'mesh' | 'measured' | 'none';
-type Tool = 'select' | 'distance' | 'angle';
+type Tool = 'select' | Measure;
 
 const cssColor = (name: string): string =>
   getComputedStyle(document.documentElement).getPropertyValue(name).trim();
@@ -31,8 +31,6 @@ export class Viewer {
   private meshes: Record<'mesh' | 'measured', Mesh | null> = {mesh: null, measured: null};
   private readonly devices = new Group();
   private readonly picked = new Group();
-  private readonly measured = new Group();
-  private marks: {at: Vec3; plane: Plane | null}[] = [];
   private ramps: Ramps = {sigma: 1, distance: 1};
   private shown = -1; // result in the picture
   private readonly colorSelect = h('select', {id: 'color-mode', onchange: () => {
@@ -46,11 +44,16 @@ export class Viewer {
     onchange: () => this.drawDevices()});
   private readonly showSheet = h('input', {type: 'checkbox', id: 'show-sheet', checked: true,
     onchange: () => this.drawSelection()});
-  private readonly patch = h('input', {type: 'range', id: 'patch', min: 1, max: 30, value: 8,
-    'aria-label': 'Radius of the fitted patches', oninput: () => this.refit()});
+  private readonly sheetLabel = h('label', {class: 'check', hidden: true, title:
+    'The light of the selected line, as a plane from its projector'}, this.showSheet, 'Light plane');
   private readonly legend = h('div', {class: 'legend', hidden: true});
   private readonly message = h('p', {class: 'overlay-message', hidden: true});
-  private readonly readout = h('output', {class: 'readout', hidden: true, 'aria-live': 'polite'});
+  private readonly measuring = new Measuring(() => ({
+    position: this.app.points?.position ?? this.currentMesh()?.position ?? null,
+    radius: this.picture?.bounds.radius ?? 100,
+    eye: (this.picture?.camera.position.toArray() ?? [0, 0, 0]) as Vec3,
+    unit: this.app.rig?.unit ?? 'mm',
+  }), () => this.picture?.render());
   private readonly surfaceChoice = choice<Surface>('Surface', [
     {value: 'mesh', text: 'Closed', title: 'mesh.ply: the closed surface'},
     {value: 'measured', text: 'Measured', title: 'mesh_measured.ply: only what was measured'},
@@ -65,8 +68,7 @@ export class Viewer {
     {value: 'angle', text: 'Angle', title: 'Click two flat places: planes are fitted to the points'},
   ], 'select', (value) => {
     this.tool = value;
-    this.marks = [];
-    this.drawMeasuring();
+    this.measuring.start(value === 'select' ? null : value);
   });
 
   constructor(private readonly app: App) {
@@ -94,9 +96,9 @@ export class Viewer {
         h('label', {class: 'tool-group'}, h('span', {class: 'tool-label'}, 'View'), this.viewSelect),
         h('button', {type: 'button', title: 'Save a screenshot of the 3-D picture', 'aria-label': 'Save a screenshot', onclick: () => void this.save()},
           'PNG')),
-      h('div', {class: 'canvas-holder', id: 'canvas-3d'}, this.message, this.legend, this.readout,
-        h('div', {class: 'canvas-tools'}, this.toolChoice.element,
-          h('label', {class: 'check', id: 'patch-label', hidden: true}, 'Patch', this.patch))));
+      h('div', {class: 'canvas-holder', id: 'canvas-3d'}, this.message, this.legend,
+        this.measuring.readout,
+        h('div', {class: 'canvas-tools'}, this.toolChoice.element, this.measuring.patchLabel, this.sheetLabel)));
     try {
       this.picture = new Picture3d(byId('canvas-3d'));
     } catch (error) {
@@ -107,7 +109,7 @@ export class Viewer {
     canvas.setAttribute('role', 'application');
     canvas.setAttribute('aria-label',
       '3-D view. Arrow keys turn it, plus and minus zoom, 0 shows everything.');
-    helpers.add(this.devices, this.picked, this.measured);
+    helpers.add(this.devices, this.picked, this.measuring.group);
     let down: {x: number; y: number} | null = null;
     canvas.addEventListener('pointerdown', (e) => (down = {x: e.offsetX, y: e.offsetY}));
     canvas.addEventListener('pointerup', (e) => {
@@ -129,11 +131,10 @@ export class Viewer {
   private async load(): Promise<void> {
     const {app} = this;
     this.meshes = {mesh: null, measured: null};
-    this.marks = [];
     this.fillSelects();
     this.drawPoints();
     this.drawDevices();
-    this.drawMeasuring();
+    this.measuring.reset();
     const has = (part: string) => app.source.has(app.result, part);
     if (!has('mesh') && has('measured')) this.surface = 'measured';
     if (!has('mesh') && !has('measured')) this.surface = 'none';
@@ -163,7 +164,7 @@ export class Viewer {
     const {points} = this.app;
     const available: Record<ColorMode, boolean> = {
       shading: true, albedo: mesh?.color !== undefined, camera: points !== null,
-      projector: points !== null, line: points !== null,
+      projector: points !== null, line: points !== null && points.count > 0 && this.app.patternOf(0) !== undefined,
       sigma: points !== null || mesh?.sigma !== undefined,
       confidence: points !== null || mesh?.confidence !== undefined,
       hole: mesh?.hole !== undefined,
@@ -316,7 +317,7 @@ export class Viewer {
     if (this.tool !== 'select') {
       const i = !hit && points ? picture.pointHit(points.position, x, y, 12) : -1;
       const at = hit ? (hit.toArray() as Vec3) : i >= 0 ? app.position(i) : null;
-      if (at) this.addMark(at);
+      if (at) this.measuring.add(at);
       return;
     }
     if (!points) return;
@@ -340,82 +341,12 @@ export class Viewer {
     return best;
   }
 
-  private addMark(at: Vec3): void {
-    if (this.marks.length === 2) this.marks = [];
-    this.marks.push({at, plane: this.tool === 'angle' ? this.planeAt(at) : null});
-    this.drawMeasuring();
-  }
-
-  private get patchRadius(): number {
-    return (Number(this.patch.value) / 100) * (this.picture?.bounds.radius ?? 100);
-  }
-
-  private planeAt(at: Vec3): Plane | null {
-    const position = this.app.points?.position ?? this.currentMesh()?.position;
-    return position ? fitPlane(position, at, this.patchRadius) : null;
-  }
-
-  private refit(): void {
-    for (const mark of this.marks) mark.plane = this.planeAt(mark.at);
-    this.drawMeasuring();
-  }
-
-  private drawMeasuring(): void {
-    const {picture, marks} = this;
-    byId('patch-label').hidden = this.tool !== 'angle';
-    clear(this.measured);
-    this.readout.hidden = this.tool === 'select';
-    for (const {at} of marks) {
-      const marker = drawMarker('#ffd23f');
-      marker.position.set(...at);
-      this.measured.add(marker);
-    }
-    const unit = this.app.rig?.unit ?? 'mm';
-    if (this.tool === 'distance') {
-      if (marks.length === 2) {
-        this.measured.add(drawSegments([...marks[0].at, ...marks[1].at], 0xffd23f));
-        const length = Math.hypot(...marks[0].at.map((x, k) => x - marks[1].at[k]));
-        this.readout.textContent = `Distance ${length.toFixed(2)} ${unit}`;
-      } else {
-        this.readout.textContent = marks.length ? 'Click the second place.' : 'Click two places on the shape.';
-      }
-    } else if (this.tool === 'angle') {
-      for (const {plane} of marks) if (plane) this.measured.add(this.disc(plane));
-      this.readout.textContent = this.angleText(unit);
-    }
-    picture?.render();
-  }
-
-  private angleText(unit: string): string {
-    const {marks, picture} = this;
-    if (marks.some((m) => !m.plane)) return 'Too few points there: take a larger patch.';
-    const fits = marks.map((m) => `${m.plane!.count} points, rms ${format(m.plane!.rms)} ${unit}`);
-    if (marks.length < 2) return marks.length ? `First plane: ${fits[0]}. Click the second one.` :
-      'Click two flat places; planes are fitted to the points around them.';
-    const eye = picture!.camera.position.toArray() as Vec3;
-    const angle = angleBetween(marks[0].plane!, marks[1].plane!, eye);
-    return `Angle between the normals ${angle.toFixed(2)}° (${fits.join('; ')})`;
-  }
-
-  private disc(plane: Plane) {
-    const n = new Vector3(...plane.normal);
-    const a = new Vector3(Math.abs(n.x) < 0.9 ? 1 : 0, Math.abs(n.x) < 0.9 ? 0 : 1, 0).cross(n).normalize();
-    const b = n.clone().cross(a);
-    const center = new Vector3(...plane.center);
-    const r = this.patchRadius;
-    const rim = (i: number) => center.clone()
-      .addScaledVector(a, r * Math.cos(i * Math.PI / 24)).addScaledVector(b, r * Math.sin(i * Math.PI / 24));
-    const positions: number[] = [];
-    for (let i = 0; i < 48; ++i) positions.push(...rim(i).toArray(), ...rim(i + 1).toArray());
-    positions.push(...center.toArray(), ...center.clone().addScaledVector(n, 0.6 * r).toArray());
-    return drawSegments(positions, 0xffd23f);
-  }
-
   private drawSelection(): void {
     const {picture, app} = this;
     if (!picture) return;
     clear(this.picked);
     const {selection, points, rig} = app;
+    this.sheetLabel.hidden = !selection || selection.point < 0 || !app.patternOf(selection.point);
     if (selection && selection.point >= 0 && points) {
       const at = app.position(selection.point);
       const marker = drawMarker('#ff3d6e');
@@ -423,7 +354,7 @@ export class Viewer {
       this.picked.add(marker);
       const camera = app.cameras[selection.camera];
       if (camera) this.picked.add(drawSegments([...camera.center, ...at], 0xff3d6e));
-      if (rig && this.showSheet.checked) {
+      if (rig && this.showSheet.checked && app.patternOf(selection.point)) {
         this.picked.add(drawSheet(rig, points.projector[selection.point],
           points.pattern[selection.point], points.line[selection.point]));
       }

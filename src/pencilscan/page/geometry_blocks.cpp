@@ -101,7 +101,7 @@ TriangleMesh decimated(const TriangleMesh& mesh, std::size_t max_faces) {
     for (const int vertex : face) indices.push_back(static_cast<unsigned int>(vertex));
   }
   constexpr float kAnyError = 1;         // the number of faces decides
-  constexpr std::size_t kManyTimes = 8;  // so many faces per face wanted show no cluster any more
+  constexpr std::size_t kManyTimes = 5;  // so many faces per face wanted show no cluster any more
   if (mesh.faces.size() > 2 * kManyTimes * max_faces) {
     std::vector<unsigned int> clustered(indices.size());
     clustered.resize(meshopt_simplifySloppy(

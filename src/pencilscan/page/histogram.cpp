@@ -31,12 +31,12 @@ nlohmann::ordered_json histogram(std::span<const float> values, int bins) {
   std::vector<std::size_t> counts(static_cast<std::size_t>(bins), 0);
   std::size_t above = 0;
   for (const float value : sorted) {
-    const double bin = std::floor(std::max(0.0, static_cast<double>(value)) / high * bins);
-    if (bin >= bins) {
+    if (static_cast<double>(value) > high) {
       ++above;
-    } else {
-      ++counts[static_cast<std::size_t>(bin)];
+      continue;
     }
+    const double bin = std::floor(std::max(0.0, static_cast<double>(value)) / high * bins);
+    ++counts[static_cast<std::size_t>(std::min<double>(bin, bins - 1))];
   }
   return {{"high", high},           {"counts", counts},  {"above", above},
           {"count", sorted.size()}, {"median", at(0.5)}, {"p90", at(0.9)}};

@@ -116,8 +116,13 @@ std::size_t largest(const ResultFolder& folder) {
   return best;
 }
 
-/// Shapes that together take about `bytes`, judged by that of one result.
-Detail shape_detail(const PageData& data, std::size_t sample, double bytes) {
+struct ShapePlan {
+  Detail detail;
+  double bytes_each = 0;  ///< about
+};
+
+/// Shapes that together take at most about `bytes`, judged by that of one result.
+ShapePlan plan_shapes(const PageData& data, std::size_t sample, double bytes) {
   Detail detail;
   detail.shape_only = true;
   detail.max_faces = 4000;
@@ -129,8 +134,9 @@ Detail shape_detail(const PageData& data, std::size_t sample, double bytes) {
   const double rest = static_cast<double>(tried.embedded_bytes()) - mesh;
   const double room = bytes / static_cast<double>(data.size()) - rest;
   const double faces = room / std::max(1.0, mesh) * static_cast<double>(detail.max_faces);
+  const double per_face = mesh / static_cast<double>(detail.max_faces);
   detail.max_faces = static_cast<std::size_t>(std::clamp(faces, 500.0, 20'000.0));
-  return detail;
+  return {detail, rest + per_face * static_cast<double>(detail.max_faces)};
 }
 
 /// All results, each in the detail that there is room for.
@@ -143,12 +149,13 @@ std::vector<Collected> collect_all(const PageData& data, const PageOptions& opti
   const auto number = static_cast<double>(count);
   const double room = static_cast<double>(options.max_bytes) - 1e6;  // 1 MB: the page itself
   constexpr double kShareOfShapes = 0.6;
+  // Few results are all whole, if need be in less detail; of many, some are, and at least one.
   constexpr std::size_t kFew = 6;
+  constexpr std::size_t kWholeOfMany = 3;
   const std::size_t sample = largest(data.folder());
-  // Few results are all whole, if need be with less detail; of many, at least one.
-  const bool few = count <= kFew;
-  const Detail shape = count == 1 ? Detail{} : shape_detail(data, sample, kShareOfShapes * room);
-  const double left = few ? room / number : (1 - kShareOfShapes) * room;
+  const ShapePlan shape =
+      count == 1 ? ShapePlan{} : plan_shapes(data, sample, kShareOfShapes * room);
+  const auto wanted = static_cast<double>(count <= kFew ? count : kWholeOfMany);
   Detail full;
   double each = 0;
   for (const Detail& detail : kFullDetails) {
@@ -156,12 +163,11 @@ std::vector<Collected> collect_all(const PageData& data, const PageOptions& opti
     full.evaluate = count <= 8;
     collected[sample] = collect(data, sample, full);
     each = static_cast<double>(collected[sample].embedded_bytes());
-    if (each <= left) break;
+    if (wanted * each + (number - wanted) * shape.bytes_each <= room) break;
   }
   std::size_t whole = count;
   if (number * each > room) {
-    const double shapes = kShareOfShapes * room;
-    const double fit = (room - shapes) / std::max(1.0, each - shapes / number);
+    const double fit = (room - number * shape.bytes_each) / std::max(1.0, each - shape.bytes_each);
     whole = static_cast<std::size_t>(std::clamp(fit, 1.0, number));
   }
   // Evenly picked, the one that is there already among them.
@@ -173,7 +179,7 @@ std::vector<Collected> collect_all(const PageData& data, const PageOptions& opti
     parallel_for(last - first, [&](std::size_t i) {
       const std::size_t result = first + i;
       if (result == sample) return;
-      collected[result] = collect(data, result, is_whole[result] != 0 ? full : shape);
+      collected[result] = collect(data, result, is_whole[result] != 0 ? full : shape.detail);
     });
     if (progress) progress("reading results", static_cast<double>(last) / number);
   }
@@ -222,6 +228,7 @@ ordered_json PageData::entry(std::size_t result, ResultReader& reader,
                         {"run", found.run},
                         {"rig", rig_of_result_[result]},
                         {"truth", !found.truth.empty()},
+                        {"scan", reader.is_scan()},
                         {"detail", "full"},
                         {"summary", reader.summary()},
                         {"parts", parts}};

@@ -222,6 +222,7 @@ TEST(Histogram, CountsEveryValueOnce) {
   EXPECT_EQ(std::accumulate(counts.begin(), counts.end(), h["above"].get<std::size_t>()), 1000U);
   EXPECT_NEAR(h["median"].get<double>(), 499.5, 1);
   EXPECT_TRUE(histogram(std::vector<float>{}).is_null());
+  EXPECT_EQ(histogram(std::vector<float>(7, 1.0F), 10)["counts"].back(), 7U);  // the end counts
 }
 
 TEST(Advice, NamesWhatToDoAndToleratesAnything) {
@@ -288,6 +289,17 @@ TEST_F(Folder, WhatIsMissingOrBrokenIsSaidInThePage) {
   EXPECT_THAT(what, Contains("mesh_measured.ply"));
   EXPECT_THAT(what, Contains("the devices"));
   EXPECT_THAT(index["results"][0]["parts"], Contains("mesh"));
+}
+
+TEST_F(Folder, OfAScanNothingIsMissingButTheDevices) {
+  write_points(root_ / "points.ply", sample::points(sample::rig()));
+  write_mesh(root_ / "mesh.ply", sample::ball());
+  static_cast<void>(report());
+  ASSERT_EQ(last_.missing.size(), 1U);
+  EXPECT_THAT(last_.missing[0], HasSubstr("--rig"));
+  write_rig(sample::rig(), root_ / "rig.json");
+  static_cast<void>(report());
+  EXPECT_THAT(last_.missing, ::testing::IsEmpty());
 }
 
 TEST_F(Folder, AnEmptyFolderGivesAPage) {

@@ -59,10 +59,18 @@ void ResultReader::note(const std::string& what, const std::string& why) {
   if (!known) missing_.push_back({what, why});
 }
 
+bool ResultReader::is_scan() const {
+  const fs::path& folder = files_.entry().folder;
+  return is_file(folder / "points.ply") && !is_file(folder / "report.json") &&
+         !is_file(folder / "curves.ply") && !is_file(folder / "mesh_measured.ply") &&
+         !fs::is_directory(folder / "pictures");
+}
+
 void ResultReader::note_missing_files() {
   if (rig_ == nullptr)
     note("the devices",
          "no readable devices.json or rig.json beside the results; name the rig with --rig");
+  if (is_scan()) return;
   const auto need = [&](const char* file, const char* consequence) {
     if (!is_file(files_.entry().folder / file))
       note(file, std::string("not in the folder: ") + consequence);

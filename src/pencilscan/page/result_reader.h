@@ -37,6 +37,9 @@ class ResultReader {
   [[nodiscard]] std::optional<std::string> part(const std::string& name);
   /// A few numbers of report.json for lists and timelines.
   [[nodiscard]] nlohmann::ordered_json summary();
+  /// True for points and a surface alone, as `scan` writes them: `line` is a column or row of the
+  /// panel then.
+  [[nodiscard]] bool is_scan() const;
   /// What is not there, and why: file, reason.
   struct Missing {
     std::string what;
