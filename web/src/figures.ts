@@ -48,13 +48,24 @@ export class Figures {
       list.append(h('li', {class: 'warning'}, h('strong', {}, text), action ? h('p', {}, action) : null));
     }
     for (const {what, why} of found.missing) {
-      list.append(h('li', {class: 'absent'}, h('strong', {}, `Missing: ${what}`), h('p', {}, why)));
+      const absent = /^(not in|no )/.test(why);
+      list.append(h('li', {class: absent ? 'absent' : 'warning'},
+        h('strong', {}, `${absent ? 'Missing' : 'Cannot be read'}: ${this.nameOf(what)}`),
+        h('p', {}, why.replace(/^unreadable: /, ''))));
     }
     if (!list.childElementCount) {
       list.append(h('li', {class: 'fine'}, h('strong', {}, 'Nothing to warn of in this result.')));
     }
     byId('warning-count').textContent = items.length + found.missing.length > 0
       ? `${items.length + found.missing.length} to look at` : 'all fine';
+  }
+
+  /** "image/1" in words. */
+  private nameOf(part: string): string {
+    const [, kind, camera] = part.match(/^(image|holes|depth)\/(\d+)$/) ?? [];
+    if (!kind) return part;
+    const name = this.app.cameras[Number(camera)]?.name ?? `camera ${camera}`;
+    return `${{image: 'picture', holes: 'hole map', depth: 'depth'}[kind]} of ${name}`;
   }
 
   private tiles(details: Details): HTMLElement {

@@ -46,6 +46,8 @@ export class Images {
     this.view = new ImageView(this.canvas, () => app.cameras[this.camera] ?? null,
       () => this.draw(), (x, y) => this.select(x, y));
     this.canvas.addEventListener('keydown', (event) => this.key(event));
+    this.canvas.addEventListener('focus', () => this.draw());
+    this.canvas.addEventListener('blur', () => this.draw());
     new ResizeObserver(() => this.resize()).observe(byId('canvas-image'));
     app.on('result', () => this.load());
     app.on('points', () => this.prepare());
@@ -85,8 +87,9 @@ export class Images {
     // Without devices nothing can be drawn here: the 3-D picture gets the room.
     byId('stage').classList.toggle('one-panel', app.rig === null);
     byId('panel-tabs').classList.toggle('one-panel', app.rig === null);
+    const pictures = app.cameras.some((_, c) => app.source.has(app.result, `image/${c}`));
     this.strip = app.cameras.map((camera, c) => {
-      const thumb = app.source.has(app.result, `image/${c}`)
+      const thumb = pictures
         ? h('canvas', {width: 96, height: 72, 'aria-hidden': 'true'}) : null;
       return h('button', {type: 'button', title: camera.name, onclick: () => this.showCamera(c)},
         thumb, h('span', {}, camera.name), h('i', {class: 'seen', 'aria-hidden': 'true'}));
@@ -255,6 +258,23 @@ export class Images {
       context.fill(this.crossings);
     }
     this.paintSelection(context);
+    if (this.canvas.matches(':focus-visible')) this.paintMiddle(context, ratio);
+  }
+
+  /** Who moves by keys sees what Enter would select. */
+  private paintMiddle(context: CanvasRenderingContext2D, ratio: number): void {
+    const {width, height} = this.view.size();
+    context.setTransform(ratio, 0, 0, ratio, (width / 2) * ratio, (height / 2) * ratio);
+    for (const [lineWidth, color] of [[3, '#000a'], [1.2, '#fff']] as const) {
+      context.lineWidth = lineWidth;
+      context.strokeStyle = color;
+      context.beginPath();
+      for (const [x, y] of [[1, 0], [-1, 0], [0, 1], [0, -1]]) {
+        context.moveTo(5 * x, 5 * y);
+        context.lineTo(14 * x, 14 * y);
+      }
+      context.stroke();
+    }
   }
 
   private paintSelection(context: CanvasRenderingContext2D): void {
@@ -297,9 +317,10 @@ export class Images {
     this.draw();
   }
 
-  private select(x: number, y: number): void {
+  /** near: of what a click may miss, CSS pixels. */
+  private select(x: number, y: number, near = 9): void {
     const {u, v} = this.view.toImage(x, y);
-    const reach = Math.max(1.5, 9 / this.view.scale);
+    const reach = Math.max(1.5, near / this.view.scale);
     if (!this.app.pick(this.camera, u, v, reach)) this.app.clearSelection();
   }
 
@@ -312,7 +333,7 @@ export class Images {
       ArrowUp: () => view.pan(0, step), ArrowDown: () => view.pan(0, -step),
       '+': () => view.zoomMiddle(1.3), '=': () => view.zoomMiddle(1.3),
       '-': () => view.zoomMiddle(1 / 1.3), '0': () => view.fit(),
-      Enter: () => this.select(width / 2, height / 2),
+      Enter: () => this.select(width / 2, height / 2, 30),
       '[': () => this.app.step(-1), ']': () => this.app.step(1),
       Escape: () => this.app.clearSelection(),
     };

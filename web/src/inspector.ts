@@ -24,7 +24,8 @@ export class Inspector {
       const can = app.points !== null || app.curves !== null;
       this.root.append(h('p', {}, can
         ? 'Click a curve in the image or a place on the shape: its measurement appears here, in 3-D and in the other cameras.'
-        : 'Measurements load here when the result holds them.'));
+        : app.source.has(app.result, 'points') || app.source.has(app.result, 'curves')
+          ? 'Points and curves are being read.' : 'This result holds no points and no curves to select.'));
       return;
     }
     const facts = h('dl', {class: 'facts'});

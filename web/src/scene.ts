@@ -42,6 +42,7 @@ export class Picture3d {
   private ball = new Sphere(new Vector3(), 100);
   private deviceView: Device | null = null;
   private pending = false;
+  private shapeDrawn = false;
   private drawn = false; // once at least
   beforeRender: (() => void) | null = null;
 
@@ -217,6 +218,10 @@ export class Picture3d {
     this.drawn = true;
     this.beforeRender?.();
     this.renderer.render(this.scene, this.camera);
+    if (!this.shapeDrawn && (this.mesh.visible || this.points.visible)) {
+      this.shapeDrawn = true;
+      performance.mark('shape-drawn'); // for web/benchmark.mjs
+    }
   }
 
   screenshot(): Promise<Blob | null> {

@@ -257,7 +257,10 @@ export class Viewer {
 
   /** Some colours only points have: show them then. */
   private modeChosen(): void {
-    const ofPoints = ['camera', 'projector', 'line'].includes(this.mode);
+    const mesh = this.currentMesh();
+    const ofPoints = ['camera', 'projector', 'line'].includes(this.mode) ||
+      (this.mode === 'sigma' && !mesh?.sigma) || (this.mode === 'confidence' && !mesh?.confidence) ||
+      (this.mode === 'distance' && !mesh?.distance);
     const ofMesh = this.mode === 'hole';
     if (ofPoints && !this.showPoints.checked) {
       this.showPoints.checked = true;

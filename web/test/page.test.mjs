@@ -267,6 +267,106 @@ test('every control has a name', async () => {
   await page.context().close();
 });
 
+/** Texts whose contrast with their ground is below WCAG 2.1's level AA (4.5, large ones 3). */
+const faintTexts = (page) => page.evaluate(() => {
+  const parse = (color) => {
+    const [r, g, b, a = 1] = color.match(/[\d.]+/g).map(Number);
+    return color.startsWith('color(') ? [255 * r, 255 * g, 255 * b, a] : [r, g, b, a];
+  };
+  const over = (top, ground) => [0, 1, 2].map((k) => top[3] * top[k] + (1 - top[3]) * ground[k]);
+  const groundOf = (element) => {
+    if (!element) return [255, 255, 255];
+    const own = parse(getComputedStyle(element).backgroundColor);
+    return own[3] === 1 ? own.slice(0, 3) : over(own, groundOf(element.parentElement));
+  };
+  const luminance = (rgb) => {
+    const [r, g, b] = rgb.map((x) => (x / 255 <= 0.04045 ? x / 255 / 12.92 : ((x / 255 + 0.055) / 1.055) ** 2.4));
+    return 0.2126 * r + 0.7152 * g + 0.0722 * b;
+  };
+  const faint = [];
+  const walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
+  while (walker.nextNode()) {
+    const element = walker.currentNode.parentElement;
+    if (!walker.currentNode.textContent.trim() || !element.checkVisibility() ||
+        element.closest('script, option, canvas, figure[data-state=hidden]')) continue;
+    const style = getComputedStyle(element);
+    const ground = groundOf(element);
+    const text = over(parse(element.closest('svg') ? style.fill : style.color), ground);
+    const [dark, light] = [luminance(text), luminance(ground)].sort((a, b) => a - b);
+    const size = parseFloat(style.fontSize);
+    const large = size >= 24 || (size >= 18.66 && Number(style.fontWeight) >= 700);
+    const contrast = (light + 0.05) / (dark + 0.05);
+    if (contrast < (large ? 3 : 4.5)) {
+      faint.push(`${contrast.toFixed(2)} ${element.tagName}.${element.className}: ${walker.currentNode.textContent.slice(0, 40)}`);
+    }
+  }
+  return [...new Set(faint)];
+});
+
+test('text stands out from its ground, light and dark', async () => {
+  for (const colorScheme of ['light', 'dark']) {
+    const {page} = await openPage(browser, sequence, undefined, {colorScheme});
+    await page.locator('.camera-strip button').first().click();
+    await page.locator('#canvas-image canvas').focus();
+    await page.keyboard.press('Enter');
+    assert.deepEqual(await faintTexts(page), []);
+    await page.context().close();
+  }
+});
+
+test('keys alone reach and use everything', async () => {
+  const {page} = await openPage(browser, sequence);
+  const stops = [];
+  for (let i = 0; i < 60; ++i) {
+    await page.keyboard.press('Tab');
+    const stop = await page.evaluate(() => {
+      const e = document.activeElement;
+      if (!e || e === document.body) return null;
+      const style = getComputedStyle(e);
+      return {what: e.id || e.getAttribute('aria-label') || e.textContent.trim().slice(0, 30), outline: style.outlineStyle,
+        where: [...document.querySelectorAll('*')].indexOf(e)};
+    });
+    if (!stop) break;
+    stops.push(stop);
+  }
+  assert.match(stops[0].what, /^Skip/);
+  for (const wanted of ['theme', 'color-mode', 'view-from', 'layer', 'play', 'frame-slider']) {
+    assert.ok(stops.some(({what}) => what === wanted), `Tab does not reach ${wanted}`);
+  }
+  assert.deepEqual(stops.filter(({outline}) => outline === 'none'), []); // where one is, is seen
+  assert.deepEqual(stops.map(({where}) => where), stops.map(({where}) => where).sort((a, b) => a - b));
+  // From the picture to a measurement, along its line, and back.
+  await page.locator('#canvas-image canvas').focus();
+  for (let k = 0; k < 20 && !(await page.locator('[data-fact=Vertex]').count()); ++k) {
+    await page.keyboard.press(k % 2 ? 'ArrowLeft' : '+'); // until a labelled curve is in the middle
+    await page.keyboard.press('Enter');
+  }
+  const vertex = await fact(page, 'Vertex');
+  await page.keyboard.press(']');
+  assert.notEqual(await fact(page, 'Vertex'), vertex);
+  await page.keyboard.press('Escape');
+  assert.equal(await page.locator('[data-fact]').count(), 0);
+  await page.context().close();
+});
+
+test('headings, landmarks and names are those of a document', async () => {
+  const {page} = await openPage(browser, single);
+  const found = await page.evaluate(() => ({
+    levels: [...document.querySelectorAll('h1, h2, h3, h4')].filter((e) => e.checkVisibility()).map((e) => Number(e.tagName[1])),
+    ids: [...document.querySelectorAll('[id]')].map((e) => e.id),
+    unnamed: [...document.querySelectorAll('[role=img], [role=region], [role=radiogroup], [role=group], [role=application], section')]
+      .filter((e) => e.checkVisibility() && !e.getAttribute('aria-label') && !e.querySelector('h2')).map((e) => e.outerHTML.slice(0, 80)),
+    main: document.querySelectorAll('main').length,
+    lang: document.documentElement.lang,
+  }));
+  assert.equal(found.levels[0], 1);
+  assert.ok(found.levels.every((level, i) => i === 0 || level <= found.levels[i - 1] + 1), String(found.levels));
+  assert.equal(new Set(found.ids).size, found.ids.length);
+  assert.deepEqual(found.unnamed, []);
+  assert.deepEqual([found.main, found.lang], [1, 'en']);
+  await page.context().close();
+});
+
 test('a folder without anything opens with a reason', async () => {
   const empty = mkdtempSync(join(tmpdir(), 'pencilscan_empty_'));
   mkdirSync(join(empty, '000000', 'pictures'), {recursive: true});

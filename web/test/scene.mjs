@@ -73,12 +73,11 @@ export function makeScene(frames) {
     dispose: () => rmSync(folder, {recursive: true, force: true})};
 }
 
-export async function openBrowser() {
-  return chromium.launch({
-    executablePath: process.env.CHROMIUM ?? '/usr/bin/chromium',
-    // Software rendering everywhere; root in a container has no sandbox to offer.
-    args: ['--no-sandbox', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--ignore-gpu-blocklist'],
-  });
+// Software rendering everywhere; root in a container has no sandbox to offer.
+const kFlags = ['--no-sandbox', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--ignore-gpu-blocklist'];
+
+export async function openBrowser(args = kFlags) {
+  return chromium.launch({executablePath: process.env.CHROMIUM ?? '/usr/bin/chromium', args});
 }
 
 /** A page that remembers every complaint of the console and every request. */
