@@ -88,7 +88,7 @@ function commonScale(devices: Calibrated[]): number {
   return Math.max(1e-6, ...high);
 }
 
-/** Arrows over the image, magnified; none longer than three times the scale's end. */
+/** Residuals over the image, magnified; none longer than three times the scale's end. */
 function residualChart(device: Calibrated, high: number): HTMLElement | null {
   const residuals = residualsOf(device);
   if (!residuals.length) return null;
@@ -118,7 +118,7 @@ function residualChart(device: Calibrated, high: number): HTMLElement | null {
 function residualLegend(high: number): HTMLElement {
   const stops = [0, 0.25, 0.5, 0.75, 1].map((x) => css(sequential(x)));
   return h('p', {class: 'inline-legend'},
-    'Residuals: from each observation an arrow to where the model puts it, magnified, on one scale for all devices. ',
+    'Residuals: how far, and in which direction, observation and model differ; magnified, on one scale for all devices. ',
     h('span', {class: 'ramp', style: `background:linear-gradient(90deg,${stops.join(',')})`}),
     ` 0 – ${format(high, 2)} px`);
 }

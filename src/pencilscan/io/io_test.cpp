@@ -266,8 +266,7 @@ TEST_F(Io, MeshRoundTripKeepsReasonsOfHolesAndColors) {
   ASSERT_EQ(back.color.size(), box.color.size());
   constexpr float kHalfAStep = 0.0045F;  // of 8 bits, where sRGB is steepest in linear light
   for (std::size_t i = 0; i < box.color.size(); ++i) {
-    for (std::size_t k = 0; k < 3; ++k)
-      EXPECT_NEAR(back.color[i][k], box.color[i][k], kHalfAStep);
+    for (std::size_t k = 0; k < 3; ++k) EXPECT_NEAR(back.color[i][k], box.color[i][k], kHalfAStep);
   }
 }
 
