@@ -27,7 +27,7 @@ double error_scale(const BundleProblem& problem) {
     for (Eigen::Index k = 0; k < 2; ++k)
       errors.push_back(std::abs(error[k]) * std::sqrt(2 * n / (2 * n - 1)));
   });
-  return 1.4826 * lower_quantile(errors, 0.5);
+  return kDeviationPerMedian * lower_quantile(errors, 0.5);
 }
 
 double median_sigma(const BundleProblem& problem) {

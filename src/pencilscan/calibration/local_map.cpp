@@ -97,7 +97,8 @@ std::optional<AxisFit> fit_axis(const std::vector<Crossing>& crossings, double e
       residuals[i] = std::abs(crossings[i].value -
                               fit.coefficients.dot(basis(crossings[i].a, crossings[i].b)));
     const double gradient = std::hypot(fit.coefficients[1], fit.coefficients[2]);
-    scale = std::max(1.4826 * upper_median(residuals), 0.5 * edge_sigma * std::max(gradient, 0.2));
+    scale = std::max(kDeviationPerMedian * upper_median(residuals),
+                     0.5 * edge_sigma * std::max(gradient, 0.2));
     weight_sum = 0;
     for (std::size_t i = 0; i < crossings.size(); ++i) {
       const double t = residuals[i] / (4.685 * scale);  // Tukey: 95 % efficient

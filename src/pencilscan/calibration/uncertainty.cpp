@@ -45,7 +45,7 @@ class NormalEquations {
   [[nodiscard]] const Eigen::MatrixXd& H() const { return H_; }
   [[nodiscard]] bool is_free(Eigen::Index i) const { return free_[static_cast<std::size_t>(i)]; }
   [[nodiscard]] double variance_factor() const {
-    const double scale = 1.4826 * lower_quantile(residuals_, 0.5);
+    const double scale = kDeviationPerMedian * lower_quantile(residuals_, 0.5);
     return scale * scale;
   }
 

@@ -6,6 +6,9 @@
 
 namespace pencilscan {
 
+/// Standard deviation of a Gaussian per median of its absolute value: 1 / quantile(0.75).
+inline constexpr double kDeviationPerMedian = 1.4826;
+
 /// The upper median: element size / 2 in order of size. 0 for no values.
 template <typename Number>
 [[nodiscard]] Number upper_median(std::vector<Number> values) {

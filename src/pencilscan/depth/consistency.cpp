@@ -239,7 +239,7 @@ double sigma_scale(const Links& links) {
   }
   constexpr std::size_t kEnough = 200;
   if (ratios.size() < kEnough) return kUsual;
-  return 1.4826 * static_cast<double>(upper_median(std::move(ratios)));
+  return kDeviationPerMedian * static_cast<double>(upper_median(std::move(ratios)));
 }
 
 constexpr double kUnseenErrors = 1.15;  // what the cameras have in common, as a factor

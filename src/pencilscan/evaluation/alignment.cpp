@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "pencilscan/core/check.h"
+#include "pencilscan/core/median.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/evaluation/statistics.h"
 #include "pencilscan/evaluation/surface_figures.h"
@@ -73,7 +74,8 @@ Similarity compose(const Similarity& c_from_b, const Similarity& b_from_a) {
 Similarity plane_step(const std::vector<Match>& matches, AlignmentKind kind, double size_mm) {
   using Vector7 = Eigen::Matrix<double, 7, 1>;
   // Never below float resolution, so that a perfect fit does not reweight noise of 1e-6 mm.
-  const double cut = std::max(4.685 * 1.4826 * median_distance(matches), 1e-7 * size_mm);
+  const double cut =
+      std::max(4.685 * kDeviationPerMedian * median_distance(matches), 1e-7 * size_mm);
   Vec3 center = Vec3::Zero();
   double total = 0;
   for (const Match& m : matches) {
@@ -105,7 +107,7 @@ Similarity plane_step(const std::vector<Match>& matches, AlignmentKind kind, dou
 
 /// One step of point-to-point alignment, by Umeyama's closed form.
 Similarity point_step(const std::vector<Match>& matches, AlignmentKind kind) {
-  const double cut = 4.685 * 1.4826 * median_distance(matches);
+  const double cut = 4.685 * kDeviationPerMedian * median_distance(matches);
   std::vector<const Match*> kept;
   for (const Match& m : matches) {
     if (m.distance <= cut) kept.push_back(&m);

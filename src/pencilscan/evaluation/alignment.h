@@ -35,10 +35,10 @@ struct AlignmentReport {
 /// point of the mesh and the distance along its normal. For p moved by a small rotation w,
 /// translation t and growth l about the centroid c, the residual is n . (p + w x (p - c) + l (p -
 /// c) + t - q) (Chen and Medioni 1992; l only for a similarity), weighted by Tukey's biweight with
-/// a scale of 1.4826 times the median residual, so that wrong points count nothing. Starts from
-/// where the points are; where that ends far from the surface, also from the poses that match
-/// centroid, size and principal axes (four signs), a point-to-point step (Umeyama 1991) first.
-/// Points: at least 10.
+/// a scale of kDeviationPerMedian times the median residual, so that wrong points count nothing.
+/// Starts from where the points are; where that ends far from the surface, also from the poses that
+/// match centroid, size and principal axes (four signs), a point-to-point step (Umeyama 1991)
+/// first. Points: at least 10.
 [[nodiscard]] AlignmentReport align_to_surface(std::span<const Vec3> points, const RayScene& truth,
                                                AlignmentKind kind,
                                                const AlignmentOptions& options = {});

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "pencilscan/core/check.h"
+#include "pencilscan/core/median.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/core/stopwatch.h"
 #include "pencilscan/pipeline/rig_refinement.h"
@@ -62,8 +63,13 @@ std::string disagreement_warning(const CrossingDisagreement& crossings, bool lab
   return text.data();
 }
 
-/// Where the rig is off, labels decided with a corrected one: the same crossings that miss each
-/// other tell how the devices stand (refine_rig_on_frames). Nothing where they do not.
+CrossingDisagreement disagreement(const Rig& rig, const PointResult& result) {
+  return crossing_disagreement(rig, crossing_tracks(rig, result.graphs, result.labeling));
+}
+
+/// Names the lines of a frame whose crossings miss each other with a rig that these crossings
+/// correct (refine_rig_on_frames). Returns that rig; nothing, with the labels as they were, where
+/// the frame does not tell how the devices stand.
 std::optional<Rig> correct_labels(const Rig& rig, const PointOptions& options,
                                   PointResult& result) {
   const FrameCurves curves{result.families, result.graphs};
@@ -71,13 +77,28 @@ std::optional<Rig> correct_labels(const Rig& rig, const PointOptions& options,
   refinement.points = options;
   RigRefinement found = refine_rig_on_frames(rig, {&curves, 1}, refinement);
   if (!found.report.refined) return std::nullopt;
-  result.labeling = solve(found.rig, result.families, result.graphs, options.solution);
+  Labeling before = std::exchange(
+      result.labeling, solve(found.rig, result.families, result.graphs, options.solution));
+  if (disagrees(disagreement(found.rig, result))) {
+    result.labeling = std::move(before);
+    return std::nullopt;
+  }
   return std::move(found.rig);
+}
+
+/// Labels of the joint solution, and the rig that they were decided with where it is not `rig`.
+std::optional<Rig> name_lines(const Rig& rig, const PointOptions& options, PointResult& result) {
+  result.labeling = solve(rig, result.families, result.graphs, options.solution);
+  result.crossings = disagreement(rig, result);
+  if (!disagrees(result.crossings)) return std::nullopt;
+  std::optional<Rig> corrected = correct_labels(rig, options, result);
+  if (corrected) result.crossings = disagreement(rig, result);
+  result.warnings.push_back(disagreement_warning(result.crossings, corrected.has_value()));
+  return corrected;
 }
 
 /// Error of each plane, projector px, that makes crossings miss each other as they do.
 double plane_error_px(const CrossingDisagreement& crossings) {
-  constexpr double kDeviationPerMedian = 1.4826;  // of a Gaussian's absolute value
   const double noise2 = crossings.expected_px * crossings.expected_px;
   const double devices2 = crossings.median_px * crossings.median_px - noise2;
   return kDeviationPerMedian * std::sqrt(std::max(0.0, devices2) / 2);
@@ -155,28 +176,15 @@ PointResult detect_frame(const Rig& rig, const Frame& frame, const PointOptions&
 PointResult measure_points(const Rig& rig, const Frame& frame, const PointOptions& options) {
   PointResult result = detect_frame(rig, frame, options);
   Stopwatch solution_watch;
-  result.labeling = solve(rig, result.families, result.graphs, options.solution);
-  const auto triangulate_with = [&](const TriangulationOptions& triangulation) {
-    return triangulate(rig, result.graphs, result.labeling, triangulation);
-  };
   if (options.solution.method != Method::kJoint) {
+    result.labeling = solve(rig, result.families, result.graphs, options.solution);
     result.times.push_back({"solution", solution_watch.seconds()});
     const Stopwatch triangulation_watch;
-    result.points = triangulate_with(options.triangulation);
+    result.points = triangulate(rig, result.graphs, result.labeling, options.triangulation);
     result.times.push_back({"triangulation", triangulation_watch.seconds()});
     return result;
   }
-
-  const auto crossings = [&] {
-    return crossing_disagreement(rig, crossing_tracks(rig, result.graphs, result.labeling));
-  };
-  result.crossings = crossings();
-  std::optional<Rig> corrected;
-  if (disagrees(result.crossings)) {
-    corrected = correct_labels(rig, options, result);
-    if (corrected) result.crossings = crossings();
-    result.warnings.push_back(disagreement_warning(result.crossings, corrected.has_value()));
-  }
+  const std::optional<Rig> corrected = name_lines(rig, options, result);
   result.times.push_back({"solution", solution_watch.seconds()});
 
   const Stopwatch second_look_watch;
@@ -196,7 +204,7 @@ PointResult measure_points(const Rig& rig, const Frame& frame, const PointOption
         std::max(triangulation.projection_sigma_px, plane_error_px(result.crossings));
     settle.errors_are_shared = true;
   }
-  result.points = triangulate_with(triangulation);
+  result.points = triangulate(rig, result.graphs, result.labeling, triangulation);
   if (corrected) surfaces = local_surfaces(rig, result.points, options.second_look.surface);
   result.points = settle_points(rig, result.points, surfaces, settle);
   result.times.push_back({"triangulation", triangulation_watch.seconds()});

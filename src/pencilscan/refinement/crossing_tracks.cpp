@@ -195,9 +195,8 @@ CrossingDisagreement crossing_disagreement(const Rig& rig, std::span<const Cross
       noises.push_back(m.noise_px);
     }
   }
-  constexpr double kMedianOfAbsoluteNormal = 0.6745;
   return {misses.size(), upper_median(std::move(misses)),
-          kMedianOfAbsoluteNormal * upper_median(std::move(noises))};
+          upper_median(std::move(noises)) / kDeviationPerMedian};
 }
 
 bool disagrees(const CrossingDisagreement& crossings) {
