@@ -7,6 +7,17 @@ function(pencilscan_target_options target)
   target_compile_options(${target} PRIVATE -Wall -Wextra -Wpedantic -Wshadow -Wconversion)
   # Nobody reads errno or floating-point traps: square roots and comparisons may run in registers.
   target_compile_options(${target} PRIVATE -fno-math-errno -fno-trapping-math)
+  if(PENCILSCAN_HAS_AVX2)
+    # No fused multiply-add: it would round otherwise than the same code elsewhere. Eigen's alignment
+    # stays that of Debian's libraries. GCC 12 then sees overflows that are none.
+    target_compile_options(${target} PRIVATE -march=x86-64-v3 -ffp-contract=off
+                           -Wno-array-bounds -Wno-stringop-overflow -Wno-stringop-overread)
+    target_compile_definitions(${target} PUBLIC EIGEN_MAX_ALIGN_BYTES=16)
+  endif()
+  if(CMAKE_UNITY_BUILD)
+    # Names of files that meet in one unit; what is private to a file looks shared in it.
+    target_compile_options(${target} PRIVATE -Wno-shadow -Wno-subobject-linkage)
+  endif()
   if(PENCILSCAN_WERROR)
     target_compile_options(${target} PRIVATE -Werror)
   endif()

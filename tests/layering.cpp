@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <fstream>
+#include <map>
 #include <regex>
 
 namespace pencilscan {
@@ -70,6 +71,27 @@ std::vector<std::string> layering_violations(const fs::path& source_root,
   }
   std::sort(violations.begin(), violations.end());
   return violations;
+}
+
+std::vector<std::string> repeated_types(const fs::path& source_root) {
+  static const std::regex definition(R"re(^(?:struct|class|enum class) (\w+)[^;]*\{.*)re");
+  std::map<std::string, std::vector<std::string>> headers;
+  for (const fs::directory_entry& entry : fs::recursive_directory_iterator(source_root)) {
+    if (entry.path().extension() != ".h") continue;
+    std::ifstream file(entry.path());
+    std::smatch match;
+    for (std::string line; std::getline(file, line);) {
+      if (std::regex_match(line, match, definition))
+        headers[match[1]].push_back(fs::relative(entry.path(), source_root).generic_string());
+    }
+  }
+  std::vector<std::string> repeated;
+  for (auto& [type, files] : headers) {
+    std::sort(files.begin(), files.end());
+    for (std::size_t i = 1; i < files.size(); ++i)
+      repeated.push_back(type + ": " + files[i - 1] + " and " + files[i]);
+  }
+  return repeated;
 }
 
 }  // namespace pencilscan

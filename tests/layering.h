@@ -23,4 +23,8 @@ struct LayeringRules {
 [[nodiscard]] std::vector<std::string> layering_violations(const std::filesystem::path& source_root,
                                                            const LayeringRules& rules);
 
+/// Types that two headers below `source_root` define at the left margin, so in one namespace, as
+/// "<type>: <file> and <file>", sorted. The linker would merge what templates make of both.
+[[nodiscard]] std::vector<std::string> repeated_types(const std::filesystem::path& source_root);
+
 }  // namespace pencilscan

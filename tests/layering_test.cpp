@@ -104,5 +104,16 @@ TEST(Layering, FindsFoldersAndIncludesOutsideTheLayers) {
               ElementsAre("low/a.cpp:1: includes util, which is no layer", "util: is no layer"));
 }
 
+TEST(Layering, EachTypeHasAName) {
+  EXPECT_THAT(repeated_types(fs::path(PENCILSCAN_SOURCE_DIR) / "src" / "pencilscan"), IsEmpty());
+}
+
+TEST(Layering, FindsATypeOfTwoHeaders) {
+  const SourceTree tree;
+  tree.add("low/a.h", "struct Sample {\n};\nstruct Other;\n");
+  tree.add("high/b.h", "class Sample : public Base {\n};\nclass Other {};\n");
+  EXPECT_THAT(repeated_types(tree.root()), ElementsAre("Sample: high/b.h and low/a.h"));
+}
+
 }  // namespace
 }  // namespace pencilscan

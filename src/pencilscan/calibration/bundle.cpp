@@ -199,6 +199,12 @@ BundleDevice bundle_device(const Device& device) {
   return result;
 }
 
+void set_pose(BundleDevice& device, const Mat3& rotation, const Vec3& translation) {
+  ceres::RotationMatrixToAngleAxis(rotation.data(), device.pose.data());
+  for (Eigen::Index i = 0; i < 3; ++i)
+    device.pose[static_cast<std::size_t>(3 + i)] = translation[i];
+}
+
 void set_device(const BundleDevice& from, Device& device) {
   device.K = Mat3::Identity();
   device.K(0, 0) = from.inner[kFx];

@@ -32,6 +32,9 @@ struct BundleDevice {
 /// Writes K, distortion and pose back.
 void set_device(const BundleDevice& from, Device& device);
 
+/// device_from_world.
+void set_pose(BundleDevice& device, const Mat3& rotation, const Vec3& translation);
+
 /// A flat board of known size seen by devices: chessboard corners.
 struct BoardView {
   std::size_t board = 0;  ///< which placing of the board

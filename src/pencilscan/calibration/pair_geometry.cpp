@@ -8,32 +8,14 @@
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core/eigen.hpp>
 
+#include "pencilscan/calibration/pair_matches.h"
 #include "pencilscan/core/parallel.h"
 
 namespace pencilscan {
 namespace {
 
-struct Match {
-  std::size_t capture;
-  Vec2 in_camera;
-  Vec2 in_projector;
-};
-
-using PairKey = std::array<std::size_t, 2>;  ///< camera, projector
-
-PairKey key_of(const Track& track, const TrackView& view) {
-  const std::size_t hub = track.views[0].device;
-  return {std::min(hub, view.device), std::max(hub, view.device)};
-}
-
-Match match_of(const Track& track, const TrackView& view) {
-  const bool hub_is_camera = track.views[0].device < view.device;
-  return hub_is_camera ? Match{track.capture, track.views[0].pixel, view.pixel}
-                       : Match{track.capture, view.pixel, track.views[0].pixel};
-}
-
 /// Distance of a match to its epipolar lines as the share of each image's width, the larger one.
-double epipolar_distance(const Rig& rig, const PairGeometry& pair, const Match& match) {
+double epipolar_distance(const Rig& rig, const PairGeometry& pair, const PairMatch& match) {
   const Vec3 line_p = pair.fundamental * match.in_camera.homogeneous();
   const Vec3 line_c = pair.fundamental.transpose() * match.in_projector.homogeneous();
   const double error = std::abs(match.in_projector.homogeneous().dot(line_p));
@@ -50,7 +32,7 @@ double planar_share(const std::vector<cv::Point2d>& a, const std::vector<cv::Poi
   return static_cast<double>(cv::countNonZero(mask)) / static_cast<double>(a.size());
 }
 
-void solve_pair(const Rig& rig, const std::vector<Match>& matches, PairGeometry& pair,
+void solve_pair(const Rig& rig, const std::vector<PairMatch>& matches, PairGeometry& pair,
                 const PairGeometryOptions& options) {
   pair.matches = matches.size();
   if (matches.size() < options.least_matches) return;
@@ -59,7 +41,7 @@ void solve_pair(const Rig& rig, const std::vector<Match>& matches, PairGeometry&
   // Widths alike, so that one tolerance holds on both sides.
   std::vector<cv::Point2d> a;
   std::vector<cv::Point2d> b;
-  for (const Match& m : matches) {
+  for (const PairMatch& m : matches) {
     a.emplace_back(m.in_camera.x() * 1000 / width_c, m.in_camera.y() * 1000 / width_c);
     b.emplace_back(m.in_projector.x() * 1000 / width_p, m.in_projector.y() * 1000 / width_p);
   }
@@ -92,14 +74,6 @@ void solve_pair(const Rig& rig, const std::vector<Match>& matches, PairGeometry&
   pair.planar_share = planar_share(inlier_a, inlier_b, 1000 * options.planar_tolerance);
 }
 
-std::map<PairKey, std::vector<Match>> matches_by_pair(std::span<const Track> tracks) {
-  std::map<PairKey, std::vector<Match>> matches;
-  for (const Track& track : tracks)
-    for (std::size_t i = 1; i < track.views.size(); ++i)
-      matches[key_of(track, track.views[i])].push_back(match_of(track, track.views[i]));
-  return matches;
-}
-
 /// How unequal the two large singular values of an almost essential matrix are, in [0, 1].
 double inequality(const Mat3& E) {
   const Vec3 s = Eigen::JacobiSVD<Mat3>(E).singularValues();
@@ -120,10 +94,10 @@ std::vector<PairGeometry> pair_geometries(const Rig& rig, std::span<const Track>
                                           const PairGeometryOptions& options) {
   const auto matches = matches_by_pair(tracks);
   std::vector<PairGeometry> pairs;
-  std::vector<const std::vector<Match>*> lists;
+  std::vector<const std::vector<PairMatch>*> lists;
   for (const auto& [key, list] : matches) {
-    pairs.emplace_back().camera = key[0];
-    pairs.back().projector = key[1];
+    pairs.emplace_back().camera = key.first;
+    pairs.back().projector = key.second;
     lists.push_back(&list);
   }
   parallel_for(pairs.size(), [&](std::size_t i) { solve_pair(rig, *lists[i], pairs[i], options); });
@@ -132,13 +106,13 @@ std::vector<PairGeometry> pair_geometries(const Rig& rig, std::span<const Track>
 
 void drop_epipolar_outliers(const Rig& rig, std::span<const PairGeometry> pairs, double least_share,
                             std::vector<Track>& tracks, const PairGeometryOptions& options) {
-  std::map<PairKey, const PairGeometry*> by_key;
+  std::map<DevicePair, const PairGeometry*> by_key;
   for (const PairGeometry& pair : pairs) by_key[{pair.camera, pair.projector}] = &pair;
   std::vector<Track> kept;
   for (Track& track : tracks) {
     Track cleaned{{track.views[0]}, track.capture};
     for (std::size_t i = 1; i < track.views.size(); ++i) {
-      const auto found = by_key.find(key_of(track, track.views[i]));
+      const auto found = by_key.find(pair_of(track, track.views[i]));
       if (found == by_key.end()) continue;
       const PairGeometry& pair = *found->second;
       if (pair.inliers < options.least_matches || pair.inlier_share() < least_share) continue;

@@ -13,12 +13,6 @@
 namespace pencilscan {
 namespace {
 
-void set_pose(BundleDevice& device, const Mat3& rotation, const Vec3& translation) {
-  ceres::RotationMatrixToAngleAxis(rotation.data(), device.pose.data());
-  for (Eigen::Index i = 0; i < 3; ++i)
-    device.pose[static_cast<std::size_t>(3 + i)] = translation[i];
-}
-
 Vec3 middle_of_points(const BundleProblem& problem) {
   std::array<std::vector<double>, 3> coordinates;
   for (std::size_t t = 0; t < problem.points.size(); ++t)

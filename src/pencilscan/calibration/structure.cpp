@@ -24,12 +24,6 @@ const TrackView* view_in(const Track& track, std::size_t device) {
   return nullptr;
 }
 
-void set_pose(BundleDevice& device, const Mat3& rotation, const Vec3& translation) {
-  ceres::RotationMatrixToAngleAxis(rotation.data(), device.pose.data());
-  for (Eigen::Index i = 0; i < 3; ++i)
-    device.pose[static_cast<std::size_t>(3 + i)] = translation[i];
-}
-
 std::vector<cv::Point2d> normalized(const BundleDevice& device, const std::vector<Vec2>& pixels) {
   std::vector<cv::Point2d> result;
   for (const Vec2& p : pixels) {

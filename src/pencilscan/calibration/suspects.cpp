@@ -5,6 +5,7 @@
 #include <map>
 #include <set>
 
+#include "pencilscan/calibration/pair_matches.h"
 #include "pencilscan/calibration/structure.h"
 
 namespace pencilscan {
@@ -14,28 +15,7 @@ constexpr double kFitsShare = 0.6;         ///< of a pair that agrees with the r
 constexpr double kContradictsShare = 0.4;  ///< of one that does not
 constexpr std::size_t kLeastMatches = 24;
 
-struct Match {
-  std::size_t capture;
-  Vec2 in_camera;
-  Vec2 in_projector;
-};
-using Pair = std::pair<std::size_t, std::size_t>;  ///< camera, projector (devices)
-using Matches = std::map<Pair, std::vector<Match>>;
-
-Matches matches_of(const CalibrationInput& input) {
-  Matches matches;
-  for (const Track& track : input.tracks) {
-    const TrackView& hub = track.views[0];
-    for (std::size_t i = 1; i < track.views.size(); ++i) {
-      const TrackView& view = track.views[i];
-      const bool hub_is_camera = hub.device < view.device;
-      const Pair pair = std::minmax(hub.device, view.device);
-      matches[pair].push_back({track.capture, hub_is_camera ? hub.pixel : view.pixel,
-                               hub_is_camera ? view.pixel : hub.pixel});
-    }
-  }
-  return matches;
-}
+using Matches = std::map<DevicePair, std::vector<PairMatch>>;
 
 /// The devices of the solution, and how well correspondences agree with them.
 class PairFit {
@@ -46,7 +26,7 @@ class PairFit {
   [[nodiscard]] bool placed(std::size_t d) const { return devices_[d].present; }
 
   /// Share of matches near their epipolar planes, if taken as those of the given devices.
-  [[nodiscard]] double share(const std::vector<Match>& matches, std::size_t camera,
+  [[nodiscard]] double share(const std::vector<PairMatch>& matches, std::size_t camera,
                              std::size_t projector, std::size_t* count = nullptr,
                              std::size_t capture = SIZE_MAX) const {
     const BundleDevice& c = devices_[camera];
@@ -56,7 +36,7 @@ class PairFit {
     const Vec3 baseline = (center_of(p) - center_of(c)).normalized();
     std::size_t all = 0;
     std::size_t near = 0;
-    for (const Match& m : matches) {
+    for (const PairMatch& m : matches) {
       if (capture != SIZE_MAX && m.capture != capture) continue;
       ++all;
       const Vec3 a = (world_from_c * device_ray(c, m.in_camera)).normalized();
@@ -73,14 +53,14 @@ class PairFit {
   double tolerance_px_;
 };
 
-std::string folder(const Rig& rig, const Pair& pair) {
+std::string folder(const Rig& rig, const DevicePair& pair) {
   return calibrated_device(rig, pair.second).name + "/" + calibrated_device(rig, pair.first).name;
 }
 
 std::vector<Finding> find_swaps(const CalibrationInput& input, const Matches& matches,
-                                const PairFit& fit, std::set<Pair>& bad) {
+                                const PairFit& fit, std::set<DevicePair>& bad) {
   std::vector<Finding> findings;
-  const std::vector<Pair> all(bad.begin(), bad.end());
+  const std::vector<DevicePair> all(bad.begin(), bad.end());
   for (std::size_t i = 0; i < all.size(); ++i) {
     for (std::size_t j = i + 1; j < all.size(); ++j) {
       if (!bad.contains(all[i]) || !bad.contains(all[j])) continue;
@@ -106,10 +86,10 @@ std::string join(const std::vector<std::string>& names) {
 }
 
 /// The device that most of the contradicting pairs have in common.
-Finding name_mover(const CalibrationInput& input, const std::set<Pair>& bad,
-                   const std::map<Pair, std::vector<std::size_t>>& captures) {
+Finding name_mover(const CalibrationInput& input, const std::set<DevicePair>& bad,
+                   const std::map<DevicePair, std::vector<std::size_t>>& captures) {
   std::map<std::size_t, std::size_t> count;
-  for (const Pair& pair : bad) {
+  for (const DevicePair& pair : bad) {
     ++count[pair.first];
     ++count[pair.second];
   }
@@ -117,7 +97,7 @@ Finding name_mover(const CalibrationInput& input, const std::set<Pair>& bad,
       count.begin(), count.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
   std::vector<std::string> partners;
   std::set<std::size_t> when;
-  for (const Pair& pair : bad) {
+  for (const DevicePair& pair : bad) {
     if (pair.first != mover->first && pair.second != mover->first) continue;
     const std::size_t partner = pair.first == mover->first ? pair.second : pair.first;
     partners.push_back(calibrated_device(input.rig, partner).name);
@@ -142,10 +122,10 @@ Finding name_mover(const CalibrationInput& input, const std::set<Pair>& bad,
 
 std::vector<Finding> find_suspects(const CalibrationInput& input, const CalibrationResult& result) {
   if (!result.solved) return {};
-  const Matches matches = matches_of(input);
+  const Matches matches = matches_by_pair(input.tracks);
   const PairFit fit(result);
-  std::set<Pair> bad;
-  std::map<Pair, std::vector<std::size_t>> captures;  // where only some contradict
+  std::set<DevicePair> bad;
+  std::map<DevicePair, std::vector<std::size_t>> captures;  // where only some contradict
   for (const auto& [pair, list] : matches) {
     if (!fit.placed(pair.first) || !fit.placed(pair.second)) continue;
     if (list.size() >= kLeastMatches &&
@@ -154,7 +134,7 @@ std::vector<Finding> find_suspects(const CalibrationInput& input, const Calibrat
       continue;
     }
     std::set<std::size_t> numbers;
-    for (const Match& m : list) numbers.insert(m.capture);
+    for (const PairMatch& m : list) numbers.insert(m.capture);
     for (const std::size_t capture : numbers) {
       std::size_t count = 0;
       const double share = fit.share(list, pair.first, pair.second, &count, capture);

@@ -12,13 +12,13 @@ namespace {
 
 constexpr int kCells = 4;
 
-std::string number(double value, const char* format = "%.2g") {
+std::string formatted(double value, const char* format = "%.2g") {
   std::array<char, 40> text{};
   std::snprintf(text.data(), text.size(), format, value);
   return text.data();
 }
 
-std::string percent(double share) { return number(100 * share, "%.3g") + " %"; }
+std::string percent(double share) { return formatted(100 * share, "%.3g") + " %"; }
 
 class Judge {
  public:
@@ -111,13 +111,13 @@ class Judge {
     const double rms = result_.rms_px;
     if (rms > options_.good_rms_px) {
       add(rms > options_.usable_rms_px ? Grade::kUnusable : Grade::kDoubtful,
-          "the reprojection error is " + number(rms) + " px (RMS)",
+          "the reprojection error is " + formatted(rms) + " px (RMS)",
           "check focus, and that nothing moved while capturing");
     }
     if (result_.held_out_rms_px > 1.5 * rms + 0.05) {
       add(Grade::kDoubtful,
-          "correspondences that were held out miss by " + number(result_.held_out_rms_px) +
-              " px, the others by " + number(rms) + " px: the rig fits its own data only",
+          "correspondences that were held out miss by " + formatted(result_.held_out_rms_px) +
+              " px, the others by " + formatted(rms) + " px: the rig fits its own data only",
           "add captures that fill the volume");
     }
     const auto trends = residual_trends(result_);
@@ -127,8 +127,8 @@ class Judge {
         if (cell.views >= 30) worst = std::max(worst, cell.mean.norm());
       if (worst > options_.trend_px)
         add(Grade::kDoubtful,
-            "errors of " + name(d) + " point the same way in parts of its image (" + number(worst) +
-                " px): the lens model does not fit, or it moved",
+            "errors of " + name(d) + " point the same way in parts of its image (" +
+                formatted(worst) + " px): the lens model does not fit, or it moved",
             "add captures that reach the corners of the image");
     }
   }
@@ -153,7 +153,7 @@ class Judge {
       const double scale = device.inner[kFx] / placed.width;
       if (scale < 0.3 || scale > 10)
         add(Grade::kUnusable,
-            "the focal length of " + name(d) + ", " + number(device.inner[kFx], "%.0f") +
+            "the focal length of " + name(d) + ", " + formatted(device.inner[kFx], "%.0f") +
                 " px, is implausible for an image " + std::to_string(placed.width) + " px wide",
             "give a rough K for it in the devices file");
     }
@@ -190,7 +190,7 @@ class Judge {
     }
     if (worst < 3) return;
     add(Grade::kDoubtful,
-        std::string(which) + " of " + name(d) + " lies " + number(worst) +
+        std::string(which) + " of " + name(d) + " lies " + formatted(worst) +
             " standard deviations from what such devices have: the data contradict the model",
         "check that nothing moved and that no glass or mirror is in the way, and add captures");
   }
@@ -201,9 +201,9 @@ class Judge {
     if (share <= options_.good_volume_sigma) return;
     const std::string unit = result_.rig.unit_known ? " mm" : "";
     add(share > options_.usable_volume_sigma ? Grade::kUnusable : Grade::kDoubtful,
-        "a measured point is off by " + number(uncertainty_.volume_median) + unit +
+        "a measured point is off by " + formatted(uncertainty_.volume_median) + unit +
             " (one standard deviation) from the rig's errors alone, in a volume of radius " +
-            number(uncertainty_.volume_radius, "%.3g") + unit,
+            formatted(uncertainty_.volume_radius, "%.3g") + unit,
         "add captures that fill the volume");
   }
 

@@ -30,8 +30,6 @@ struct Links {
   std::vector<std::vector<Link>> contradiction;
 };
 
-constexpr std::size_t kChunk = 256;
-
 /// The four nodes around a pixel, or fewer at the border.
 std::array<std::int64_t, 4> nodes_around(const DepthMap& map, const Vec2& pixel) {
   const int c = static_cast<int>(std::floor(pixel[0] / map.stride));
@@ -73,7 +71,7 @@ class Comparison {
     Links links;
     links.support.resize(nodes_.size());
     links.contradiction.resize(nodes_.size());
-    parallel_chunks(nodes_.size(), kChunk, [&](std::size_t i) { compare_with_cameras(i, links); });
+    parallel_chunks(nodes_.size(), [&](std::size_t i) { compare_with_cameras(i, links); });
     for (std::size_t p = 0; p < rig_.projectors.size(); ++p) compare_with_projector(p, links);
     // Whoever contradicts is contradicted.
     std::vector<std::vector<Link>> heard(nodes_.size());
@@ -178,7 +176,7 @@ class Comparison {
     std::vector<Lit> farthest(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows));
     std::vector<std::int32_t> cell_of(nodes_.size(), -1);
     std::vector<float> z_of(nodes_.size());
-    parallel_chunks(nodes_.size(), kChunk, [&](std::size_t i) {
+    parallel_chunks(nodes_.size(), [&](std::size_t i) {
       const auto pixel = projector.project(nodes_[i].x);
       if (!pixel || !projector.contains(*pixel)) return;
       cell_of[i] = static_cast<std::int32_t>(((*pixel)[1] + 0.5) / kCell) * columns +
@@ -195,7 +193,7 @@ class Comparison {
         lit.node = static_cast<std::int32_t>(i);
       }
     }
-    parallel_chunks(nodes_.size(), kChunk, [&](std::size_t i) {
+    parallel_chunks(nodes_.size(), [&](std::size_t i) {
       if (cell_of[i] < 0) return;
       const Lit& lit = farthest[static_cast<std::size_t>(cell_of[i])];
       if (lit.node < 0 || lit.node == static_cast<std::int32_t>(i)) return;
@@ -282,7 +280,7 @@ void widen_uncertain(const Rig& rig, std::span<DepthMap> maps) {
   for (DepthMap& map : maps) {
     const Vec3 eye = rig.cameras[static_cast<std::size_t>(map.camera)].center();
     std::vector<float> factor(map.nodes.size(), 1.F);
-    parallel_chunks(map.nodes.size(), kChunk, [&](std::size_t i) {
+    parallel_chunks(map.nodes.size(), [&](std::size_t i) {
       if (!map.nodes[i].measured()) return;
       int neighbors = 0;
       for_each_neighbor(map, i, 1, [&](std::size_t) { ++neighbors; });
@@ -304,7 +302,7 @@ std::size_t drop_lone(const Comparison& comparison, std::span<DepthMap> maps) {
   constexpr int kLeastNeighborsGrown = 7;
   constexpr float kMisfit = 2.5F;
   std::vector<char> drop(comparison.nodes().size(), 0);
-  parallel_chunks(drop.size(), kChunk, [&](std::size_t i) {
+  parallel_chunks(drop.size(), [&](std::size_t i) {
     const Node& node = comparison.nodes()[i];
     const DepthNode& n = maps[node.map].nodes[node.index];
     if (!n.measured() || std::popcount(n.lit) > 1 || n.support > 0.01F) return;
@@ -387,11 +385,11 @@ ConsistencyReport check_consistency(const Rig& rig, std::span<const int> pattern
   std::vector<float> contradiction(count);
   const auto weight = static_cast<float>(options.contradiction_weight);
   for (int round = 0; round < options.rounds; ++round) {
-    parallel_chunks(count, kChunk, [&](std::size_t i) {
+    parallel_chunks(count, [&](std::size_t i) {
       support[i] = tally(links.support[i], belief);
       contradiction[i] = tally(links.contradiction[i], belief);
     });
-    parallel_chunks(count, kChunk, [&](std::size_t i) {
+    parallel_chunks(count, [&](std::size_t i) {
       const Node& node = comparison.nodes()[i];
       float s = support[i];
       float c = contradiction[i];

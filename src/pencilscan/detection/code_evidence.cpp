@@ -11,8 +11,8 @@
 namespace pencilscan {
 namespace {
 
-constexpr int kHalf = 4;      ///< profile half-length, px
-constexpr int kUnknowns = 4;  ///< own line, other families, background level and slope
+constexpr int kHalf = 4;           ///< profile half-length, px
+constexpr int kColorUnknowns = 4;  ///< own line, other families, background level and slope
 
 constexpr int kRightSides = 3;  ///< red, green, blue
 
@@ -20,8 +20,8 @@ constexpr int kRightSides = 3;  ///< red, green, blue
 /// rows, then the right sides of each unknown; zeros before the first and after the last point.
 class PointSums {
  public:
-  static constexpr std::size_t kMatrix = kUnknowns * (kUnknowns + 1) / 2;
-  static constexpr std::size_t kNumbers = kMatrix + kUnknowns * kRightSides;
+  static constexpr std::size_t kMatrix = kColorUnknowns * (kColorUnknowns + 1) / 2;
+  static constexpr std::size_t kNumbers = kMatrix + kColorUnknowns * kRightSides;
 
   PointSums(int points, int margin)
       : margin_(margin), row_(static_cast<std::size_t>(points + 2 * margin + kLanes)) {
@@ -78,21 +78,21 @@ void sum_profiles(const Images& images, const EightPoints& points,
     y &= is_inside;
     const Lanes d = (__builtin_convertvector(x, Lanes) - points.x) * points.nx +
                     (__builtin_convertvector(y, Lanes) - points.y) * points.ny;
-    std::array<Lanes, kUnknowns> unknown;
+    std::array<Lanes, kColorUnknowns> unknown;
     exponential(-0.5F * d * d / (points.width * points.width), unknown[0]);
     gather(others, y * others_row + x, unknown[1]);
     unknown[2] = zero + 1;
     unknown[3] = d * (1 / static_cast<float>(kHalf));
     for (Lanes& u : unknown) u = is_inside ? u : zero;
     std::size_t number = 0;
-    for (std::size_t i = 0; i < kUnknowns; ++i) {
-      for (std::size_t j = i; j < kUnknowns; ++j) sums[number++] += unknown[i] * unknown[j];
+    for (std::size_t i = 0; i < kColorUnknowns; ++i) {
+      for (std::size_t j = i; j < kColorUnknowns; ++j) sums[number++] += unknown[i] * unknown[j];
     }
     const IntLanes at = y * color_row + 3 * x;
     for (std::size_t c = 0; c < kRightSides; ++c) {
       Lanes value{};
       gather(color + c, at, value);
-      for (std::size_t i = 0; i < kUnknowns; ++i)
+      for (std::size_t i = 0; i < kColorUnknowns; ++i)
         sums[PointSums::kMatrix + i * kRightSides + c] += unknown[i] * value;
     }
   }
@@ -112,29 +112,29 @@ void solve_amplitudes(const PointSums& sums, int first, int half_arc,
     }
   }
   // The line itself last: elimination then ends with its amplitude.
-  constexpr std::array<std::size_t, kUnknowns> kOrder = {3, 2, 1, 0};
-  std::array<std::array<Lanes, kUnknowns>, kUnknowns> matrix{};
-  std::array<std::array<Lanes, kRightSides>, kUnknowns> right{};
+  constexpr std::array<std::size_t, kColorUnknowns> kOrder = {3, 2, 1, 0};
+  std::array<std::array<Lanes, kColorUnknowns>, kColorUnknowns> matrix{};
+  std::array<std::array<Lanes, kRightSides>, kColorUnknowns> right{};
   std::size_t number = 0;
-  for (std::size_t i = 0; i < kUnknowns; ++i) {
-    for (std::size_t j = i; j < kUnknowns; ++j) matrix[kOrder[j]][kOrder[i]] = total[number++];
+  for (std::size_t i = 0; i < kColorUnknowns; ++i) {
+    for (std::size_t j = i; j < kColorUnknowns; ++j) matrix[kOrder[j]][kOrder[i]] = total[number++];
   }
-  for (std::size_t i = 0; i < kUnknowns; ++i) {
+  for (std::size_t i = 0; i < kColorUnknowns; ++i) {
     for (std::size_t c = 0; c < kRightSides; ++c) right[kOrder[i]][c] = total[number++];
   }
-  for (std::size_t i = 0; i < kUnknowns; ++i) matrix[i][i] += 1e-4F;
+  for (std::size_t i = 0; i < kColorUnknowns; ++i) matrix[i][i] += 1e-4F;
   // The others' coefficient lies between 0 and about 1: a ridge keeps it there when unobserved.
   matrix[kOrder[1]][kOrder[1]] += 1e-3F;
-  for (std::size_t i = 0; i + 1 < kUnknowns; ++i) {
+  for (std::size_t i = 0; i + 1 < kColorUnknowns; ++i) {
     const Lanes inverse = 1 / matrix[i][i];
-    for (std::size_t j = i + 1; j < kUnknowns; ++j) {
+    for (std::size_t j = i + 1; j < kColorUnknowns; ++j) {
       const Lanes factor = matrix[i][j] * inverse;
-      for (std::size_t k = j; k < kUnknowns; ++k) matrix[j][k] -= factor * matrix[i][k];
+      for (std::size_t k = j; k < kColorUnknowns; ++k) matrix[j][k] -= factor * matrix[i][k];
       for (std::size_t c = 0; c < kRightSides; ++c) right[j][c] -= factor * right[i][c];
     }
   }
   for (std::size_t c = 0; c < kRightSides; ++c)
-    rgb[c] = right[kUnknowns - 1][c] / matrix[kUnknowns - 1][kUnknowns - 1];
+    rgb[c] = right[kColorUnknowns - 1][c] / matrix[kColorUnknowns - 1][kColorUnknowns - 1];
 }
 
 /// Colour amplitude of each point of a curve.

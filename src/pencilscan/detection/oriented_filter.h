@@ -47,7 +47,7 @@ struct FilterMaximum {
 /// The filter bank's responses over one tile of an image.
 class FilterTile {
  public:
-  static constexpr int kTile = 32;  ///< px
+  static constexpr int kTile = 38;  ///< px; with its border, a row is whole registers
 
   explicit FilterTile(const std::vector<FilterDirection>& directions);
 

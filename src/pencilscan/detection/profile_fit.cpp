@@ -74,31 +74,31 @@ struct Parameters {
 };
 
 /// Order of the unknowns: the centre last, so that elimination ends with its variance.
-constexpr int kUnknowns = 4;
+constexpr int kProfileUnknowns = 4;
 enum Unknown { kHeight, kWidth, kTilt, kCenter };
 
 /// Normal equations of one step, for unknowns divided by the height: pure numbers whatever the
 /// amplitude. Upper triangle.
 struct NormalEquations {
-  std::array<std::array<Lanes, kUnknowns>, kUnknowns> matrix;
-  std::array<Lanes, kUnknowns> right;
+  std::array<std::array<Lanes, kProfileUnknowns>, kProfileUnknowns> matrix;
+  std::array<Lanes, kProfileUnknowns> right;
 };
 
 /// Solves in place by Cholesky's decomposition without roots; `right` becomes the solution.
 PENCILSCAN_INLINE void solve(NormalEquations& n, Lanes& center_variance) {
   auto& [m, x] = n;
-  for (std::size_t i = 0; i < kUnknowns; ++i) {
+  for (std::size_t i = 0; i < kProfileUnknowns; ++i) {
     const Lanes inverse = 1 / m[i][i];
-    for (std::size_t j = i + 1; j < kUnknowns; ++j) {
+    for (std::size_t j = i + 1; j < kProfileUnknowns; ++j) {
       const Lanes factor = m[i][j] * inverse;
-      for (std::size_t k = j; k < kUnknowns; ++k) m[j][k] -= factor * m[i][k];
+      for (std::size_t k = j; k < kProfileUnknowns; ++k) m[j][k] -= factor * m[i][k];
       x[j] -= factor * x[i];
     }
     m[i][i] = inverse;
   }
   center_variance = m[kCenter][kCenter];
-  for (std::size_t i = kUnknowns; i-- > 0;) {
-    for (std::size_t j = i + 1; j < kUnknowns; ++j) x[i] -= m[i][j] * x[j];
+  for (std::size_t i = kProfileUnknowns; i-- > 0;) {
+    for (std::size_t j = i + 1; j < kProfileUnknowns; ++j) x[i] -= m[i][j] * x[j];
     x[i] *= m[i][i];
   }
 }
@@ -156,8 +156,8 @@ PENCILSCAN_INLINE void linearize(const std::array<Lanes, kProfileSize>& measured
   Lanes ratio;
   exponential(shape.rate * (at.center + static_cast<float>(kMaxHalf)), e);
   exponential(-shape.rate, ratio);
-  std::array<Lanes, kUnknowns> sum{};
-  std::array<Lanes, kUnknowns> slope{};
+  std::array<Lanes, kProfileUnknowns> sum{};
+  std::array<Lanes, kProfileUnknowns> slope{};
   n = {};
   // d scale / d half, relative
   const Lanes scale_change = -2 * shape.rate * shape.tail / ((1 - shape.tail) * (1 + shape.tail));
@@ -179,26 +179,27 @@ PENCILSCAN_INLINE void linearize(const std::array<Lanes, kProfileSize>& measured
     const Lanes f_width =
         is_blunt ? -d * inverse_width * f_d : (rise + fall + scale_change * f) * half_per_width;
     const Lanes light = (1 + at.tilt * d) * background.inside[s];
-    std::array<Lanes, kUnknowns> J;
+    std::array<Lanes, kProfileUnknowns> J;
     J[kHeight] = light * f;
     J[kWidth] = light * f_width;
     J[kTilt] = background.inside[s] * d * f;
     J[kCenter] = -light * f_d;
     model[s] = J[kHeight];
-    for (std::size_t j = 0; j < kUnknowns; ++j) {
+    for (std::size_t j = 0; j < kProfileUnknowns; ++j) {
       sum[j] += J[j];
       slope[j] += J[j] * o;
       n.right[j] += J[j] * measured[s];
-      for (std::size_t k = j; k < kUnknowns; ++k) n.matrix[j][k] += J[j] * J[k];
+      for (std::size_t k = j; k < kProfileUnknowns; ++k) n.matrix[j][k] += J[j] * J[k];
     }
   }
   model_slope = slope[kHeight] * background.inverse_moment;
-  for (std::size_t j = 0; j < kUnknowns; ++j) {
+  for (std::size_t j = 0; j < kProfileUnknowns; ++j) {
     const Lanes mean = sum[j] * background.inverse_count;
     const Lanes lean = slope[j] * background.inverse_moment;
-    for (std::size_t k = j; k < kUnknowns; ++k) n.matrix[j][k] -= mean * sum[k] + lean * slope[k];
+    for (std::size_t k = j; k < kProfileUnknowns; ++k)
+      n.matrix[j][k] -= mean * sum[k] + lean * slope[k];
   }
-  for (std::size_t j = 0; j < kUnknowns; ++j) n.right[j] -= at.height * n.matrix[0][j];
+  for (std::size_t j = 0; j < kProfileUnknowns; ++j) n.right[j] -= at.height * n.matrix[0][j];
 }
 
 /// Only the odd part of the residual can move the line; the even part holds the misfit of the

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "pencilscan/core/check.h"
+#include "pencilscan/core/chunks.h"
 #include "pencilscan/core/median.h"
-#include "pencilscan/core/parallel.h"
 #include "pencilscan/evaluation/statistics.h"
 #include "pencilscan/evaluation/surface_figures.h"
 
@@ -24,16 +24,12 @@ struct Match {
 std::vector<Match> match(std::span<const Vec3> points, const RayScene& truth,
                          const Similarity& pose) {
   std::vector<Match> matches(points.size());
-  constexpr std::size_t kChunk = 256;
-  parallel_for((points.size() + kChunk - 1) / kChunk, [&](std::size_t chunk) {
-    const std::size_t end = std::min(points.size(), (chunk + 1) * kChunk);
-    for (std::size_t i = chunk * kChunk; i < end; ++i) {
-      const Vec3 moved = pose * points[i];
-      const auto closest = truth.closest_point(moved);
-      if (!closest) continue;
-      matches[i] = {moved, closest->point, face_normal(truth.mesh(), closest->face),
-                    closest->distance};
-    }
+  parallel_chunks(points.size(), [&](std::size_t i) {
+    const Vec3 moved = pose * points[i];
+    const auto closest = truth.closest_point(moved);
+    if (!closest) return;
+    matches[i] = {moved, closest->point, face_normal(truth.mesh(), closest->face),
+                  closest->distance};
   });
   return matches;
 }

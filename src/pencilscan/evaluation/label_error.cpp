@@ -7,7 +7,7 @@
 #include <numeric>
 #include <tuple>
 
-#include "pencilscan/core/parallel.h"
+#include "pencilscan/core/chunks.h"
 
 namespace pencilscan {
 namespace {
@@ -81,12 +81,8 @@ std::vector<PointVerdict> judge_points(const TruthScene& truth,
   std::vector<PointVerdict> verdicts(points.size());
   mark_duplicates(points, verdicts);
   const auto disc = disc_offsets();
-  constexpr std::size_t kChunk = 512;
-  parallel_for((points.size() + kChunk - 1) / kChunk, [&](std::size_t chunk) {
-    const std::size_t end = std::min(points.size(), (chunk + 1) * kChunk);
-    for (std::size_t i = chunk * kChunk; i < end; ++i) {
-      if (verdicts[i].counted) judge(truth, points[i], disc, options, verdicts[i]);
-    }
+  parallel_chunks(points.size(), [&](std::size_t i) {
+    if (verdicts[i].counted) judge(truth, points[i], disc, options, verdicts[i]);
   });
   return verdicts;
 }

@@ -4,7 +4,7 @@
 #include <limits>
 #include <numbers>
 
-#include "pencilscan/core/parallel.h"
+#include "pencilscan/core/chunks.h"
 #include "pencilscan/evaluation/pixel_index.h"
 
 namespace pencilscan {
@@ -73,15 +73,11 @@ RecallFigures line_recall(const Rig& rig, std::span<const TrueLinePixel> truth,
 
   std::vector<unsigned char> found(truth.size());
   std::vector<unsigned char> found_any(truth.size());
-  constexpr std::size_t kChunk = 4096;
-  parallel_for((truth.size() + kChunk - 1) / kChunk, [&](std::size_t chunk) {
-    const std::size_t end = std::min(truth.size(), (chunk + 1) * kChunk);
-    for (std::size_t i = chunk * kChunk; i < end; ++i) {
-      const TrueLinePixel& t = truth[i];
-      found[i] = labelled.any(line_key(t.camera, t.channel, t.line), t.pixel, options.radius_px);
-      found_any[i] =
-          unlabelled.any(family_key(t.camera, family_of(t.channel)), t.pixel, options.radius_px);
-    }
+  parallel_chunks(truth.size(), [&](std::size_t i) {
+    const TrueLinePixel& t = truth[i];
+    found[i] = labelled.any(line_key(t.camera, t.channel, t.line), t.pixel, options.radius_px);
+    found_any[i] =
+        unlabelled.any(family_key(t.camera, family_of(t.channel)), t.pixel, options.radius_px);
   });
 
   RecallFigures figures;

@@ -4,27 +4,16 @@
 #include <cmath>
 #include <numbers>
 
-#include "pencilscan/core/parallel.h"
+#include "pencilscan/core/chunks.h"
 #include "pencilscan/core/random.h"
 
 namespace pencilscan {
 namespace {
 
-constexpr std::size_t kChunk = 1024;
-
 double cos_deg(double degrees) { return std::cos(degrees * std::numbers::pi / 180); }
 
-/// Calls body(i) for i in [0, count) on chunks.
-template <class Body>
-void for_each_index(std::size_t count, const Body& body) {
-  parallel_for((count + kChunk - 1) / kChunk, [&](std::size_t chunk) {
-    const std::size_t end = std::min(count, (chunk + 1) * kChunk);
-    for (std::size_t i = chunk * kChunk; i < end; ++i) body(i);
-  });
-}
-
 Coverage cover(const TruthScene& truth, const std::vector<PatternChannel>& channels,
-               const SurfaceSample& sample, const CoverageOptions& options) {
+               const DrawnPoint& sample, const CoverageOptions& options) {
   const Rig& rig = truth.rig();
   const double limit = cos_deg(options.max_incidence_deg);
   std::vector<std::optional<Lighting>> lights(rig.projectors.size());
@@ -65,11 +54,11 @@ struct Nearest {
   bool normal_agrees = false;
 };
 
-std::vector<Nearest> nearest_facets(const RayScene& scene,
-                                    const std::vector<SurfaceSample>& samples, double max_deg) {
+std::vector<Nearest> nearest_facets(const RayScene& scene, const std::vector<DrawnPoint>& samples,
+                                    double max_deg) {
   std::vector<Nearest> nearest(samples.size());
   const double limit = cos_deg(max_deg);
-  for_each_index(samples.size(), [&](std::size_t i) {
+  parallel_chunks(samples.size(), [&](std::size_t i) {
     const auto closest = scene.closest_point(samples[i].point);
     if (!closest) return;
     const Vec3 normal = face_normal(scene.mesh(), closest->face);
@@ -80,8 +69,8 @@ std::vector<Nearest> nearest_facets(const RayScene& scene,
 
 }  // namespace
 
-std::vector<SurfaceSample> sample_surface(const TriangleMesh& mesh, std::size_t count,
-                                          std::uint64_t seed) {
+std::vector<DrawnPoint> sample_surface(const TriangleMesh& mesh, std::size_t count,
+                                       std::uint64_t seed) {
   std::vector<double> cumulative;
   cumulative.reserve(mesh.faces.size());
   double area = 0;
@@ -93,7 +82,7 @@ std::vector<SurfaceSample> sample_surface(const TriangleMesh& mesh, std::size_t 
     cumulative.push_back(area);
   }
   if (!(area > 0)) return {};
-  std::vector<SurfaceSample> samples;
+  std::vector<DrawnPoint> samples;
   samples.reserve(count);
   Random random(seed);
   for (std::size_t i = 0; i < count; ++i) {
@@ -113,18 +102,19 @@ std::vector<SurfaceSample> sample_surface(const TriangleMesh& mesh, std::size_t 
 }
 
 std::vector<Coverage> surface_coverage(const TruthScene& truth,
-                                       const std::vector<SurfaceSample>& samples,
+                                       const std::vector<DrawnPoint>& samples,
                                        const CoverageOptions& options) {
   const auto channels = pattern_channels(truth.rig());
   std::vector<Coverage> coverage(samples.size());
-  for_each_index(samples.size(),
-                 [&](std::size_t i) { coverage[i] = cover(truth, channels, samples[i], options); });
+  parallel_chunks(samples.size(), [&](std::size_t i) {
+    coverage[i] = cover(truth, channels, samples[i], options);
+  });
   return coverage;
 }
 
 std::vector<double> distances_to(const RayScene& scene, const std::vector<Vec3>& points) {
   std::vector<double> distances(points.size(), std::numeric_limits<double>::infinity());
-  for_each_index(points.size(), [&](std::size_t i) {
+  parallel_chunks(points.size(), [&](std::size_t i) {
     if (const auto closest = scene.closest_point(points[i])) distances[i] = closest->distance;
   });
   return distances;

@@ -10,15 +10,15 @@
 namespace pencilscan {
 
 /// A point drawn from a surface.
-struct SurfaceSample {
+struct DrawnPoint {
   Vec3 point = Vec3::Zero();   ///< mm
   Vec3 normal = Vec3::Zero();  ///< unit, of the facet
 };
 
 /// `count` points, uniform by area, stratified along the face list; the seed moves them within
 /// their strata. Empty for a mesh without area.
-[[nodiscard]] std::vector<SurfaceSample> sample_surface(const TriangleMesh& mesh, std::size_t count,
-                                                        std::uint64_t seed);
+[[nodiscard]] std::vector<DrawnPoint> sample_surface(const TriangleMesh& mesh, std::size_t count,
+                                                     std::uint64_t seed);
 
 /// Which devices reach a point of the true surface.
 struct Coverage {
@@ -32,7 +32,7 @@ struct CoverageOptions {
   double min_spacing_px = 5;
 };
 [[nodiscard]] std::vector<Coverage> surface_coverage(const TruthScene& truth,
-                                                     const std::vector<SurfaceSample>& samples,
+                                                     const std::vector<DrawnPoint>& samples,
                                                      const CoverageOptions& options = {});
 
 /// Exact distances of points to the surface of a scene.

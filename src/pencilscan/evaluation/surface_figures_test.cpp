@@ -14,7 +14,7 @@
 namespace pencilscan {
 namespace {
 
-constexpr int kRings = 60;
+constexpr int kSphereRings = 60;
 constexpr double kSagMm = 0.05;  // of the facets of such a sphere below the ideal one
 
 CompletenessOptions few_samples() {
@@ -35,9 +35,9 @@ TEST(SampleSurface, PointsLieOnTheSurfaceUniformly) {
 }
 
 TEST(SurfaceFigures, SphereLargerByOneMillimetreIsOneMillimetreAway) {
-  const TruthScene truth(make_sphere(oracle::kRadiusMm, kRings), oracle::ring(3));
+  const TruthScene truth(make_sphere(oracle::kRadiusMm, kSphereRings), oracle::ring(3));
   const auto figures =
-      surface_figures(truth, make_sphere(oracle::kRadiusMm + 1, kRings), few_samples());
+      surface_figures(truth, make_sphere(oracle::kRadiusMm + 1, kSphereRings), few_samples());
   EXPECT_NEAR(figures.distance.median_mm, 1, kSagMm);
   EXPECT_NEAR(figures.distance.p90_mm, 1, kSagMm);
   EXPECT_NEAR(figures.distance.rms_mm, 1, kSagMm);
@@ -49,7 +49,7 @@ TEST(SurfaceFigures, SphereLargerByOneMillimetreIsOneMillimetreAway) {
 }
 
 TEST(SurfaceFigures, HalfASphereIsHalfComplete) {
-  const TriangleMesh whole = make_sphere(oracle::kRadiusMm, kRings);
+  const TriangleMesh whole = make_sphere(oracle::kRadiusMm, kSphereRings);
   TriangleMesh half = whole;
   std::erase_if(half.faces, [&](const std::array<int, 3>& f) {
     double z = 0;
@@ -148,11 +148,11 @@ TEST(Evaluate, PerfectPointsHavePerfectFigures) {
   const Rig rig = oracle::ring(3);
   EvaluationInput input;
   input.points = oracle::sphere_points(rig);
-  input.mesh = make_sphere(oracle::kRadiusMm, kRings);
+  input.mesh = make_sphere(oracle::kRadiusMm, kSphereRings);
   EvaluationOptions options;
   options.completeness = few_samples();
-  const auto json =
-      figures_json(evaluate(make_sphere(oracle::kRadiusMm, kRings), rig, input, options), rig);
+  const auto json = figures_json(
+      evaluate(make_sphere(oracle::kRadiusMm, kSphereRings), rig, input, options), rig);
   constexpr double kRim = 0.001;  // rays at the rim of the ideal sphere that miss the faceted one
   EXPECT_LT(json.at("label_error").get<double>(), kRim);
   EXPECT_GT(json.at("line_recall").get<double>(), 0.99);
@@ -169,7 +169,7 @@ TEST(Evaluate, SimilarityAlignmentCountsInTheUnitOfTheTruth) {
   const Rig rig = oracle::ring(3);
   EvaluationInput input;
   input.points = oracle::sphere_points(rig);
-  input.mesh = make_sphere(oracle::kRadiusMm, kRings);
+  input.mesh = make_sphere(oracle::kRadiusMm, kSphereRings);
   // The truth is ten times as large and elsewhere: the result's unit is a centimetre.
   Similarity truth_from_result;
   truth_from_result.scale = 10;

@@ -12,7 +12,7 @@
 namespace pencilscan {
 namespace {
 
-constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
+constexpr float kNoDistance = std::numeric_limits<float>::quiet_NaN();
 
 /// 0..1 in 255 steps.
 std::uint8_t share_byte(float share) {
@@ -41,8 +41,8 @@ std::vector<T> integers(const Items& items, Get get) {
 PointErrors point_errors(const Rig& rig, std::span<const MeasuredPoint> points,
                          const RayScene& truth) {
   PointErrors errors;
-  errors.distance_mm.assign(points.size(), kNone);
-  errors.along_ray_mm.assign(points.size(), kNone);
+  errors.distance_mm.assign(points.size(), kNoDistance);
+  errors.along_ray_mm.assign(points.size(), kNoDistance);
   parallel_for(points.size(), [&](std::size_t i) {
     const MeasuredPoint& p = points[i];
     const Vec3 x(p.x, p.y, p.z);
@@ -141,7 +141,7 @@ TriangleMesh decimated(const TriangleMesh& mesh, std::size_t max_faces) {
 }
 
 std::vector<float> vertex_distances(const TriangleMesh& mesh, const RayScene& truth) {
-  std::vector<float> distances(mesh.vertices.size(), kNone);
+  std::vector<float> distances(mesh.vertices.size(), kNoDistance);
   parallel_for(distances.size(), [&](std::size_t i) {
     if (const auto closest = truth.closest_point(mesh.vertices[i]))
       distances[i] = static_cast<float>(closest->distance);

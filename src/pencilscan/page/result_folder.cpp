@@ -4,16 +4,12 @@
 #include <optional>
 
 #include "pencilscan/core/error.h"
+#include "pencilscan/page/result_files.h"
 
 namespace pencilscan {
 namespace {
 
 namespace fs = std::filesystem;
-
-bool is_file(const fs::path& path) {
-  std::error_code ignored;
-  return fs::is_regular_file(path, ignored);
-}
 
 /// A frame's folder has points or the report of a frame; `truth/` has a mesh only.
 bool holds_result(const fs::path& folder) {

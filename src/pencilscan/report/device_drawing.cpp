@@ -12,10 +12,6 @@
 namespace pencilscan {
 namespace {
 
-constexpr int kShift = 4;
-
-cv::Scalar scalar(const Color& c) { return {double(c[0]), double(c[1]), double(c[2])}; }
-
 /// Mean of a projector's pattern colours, made strong enough to be seen on a light ground.
 Color light_color(const Projector& projector) {
   Rgb sum{};
@@ -43,8 +39,8 @@ std::optional<Frustum> project_frustum(const Device& device, const Device& view,
   const auto fixed = [&](const Vec3& x) -> std::optional<cv::Point> {
     const auto pixel = view.project(x);
     if (!pixel || pixel->cwiseAbs().maxCoeff() > 1e5) return std::nullopt;
-    return cv::Point(static_cast<int>(std::lround((*pixel)[0] * (1 << kShift))),
-                     static_cast<int>(std::lround((*pixel)[1] * (1 << kShift))));
+    return cv::Point(static_cast<int>(std::lround((*pixel)[0] * (1 << kSubpixelBits))),
+                     static_cast<int>(std::lround((*pixel)[1] * (1 << kSubpixelBits))));
   };
   Frustum frustum;
   const auto apex = fixed(device.center());
@@ -67,15 +63,16 @@ void draw_frustum(const Frustum& frustum, const Color& color, bool filled, cv::M
   const double opacity = filled ? 0.32 : 0.12;
   for (std::size_t i = 0; i < 4; ++i) {
     const std::vector<cv::Point> side = {frustum.apex, base[i], base[(i + 1) % 4]};
-    cv::fillConvexPoly(layer, side, scalar(color), cv::LINE_AA, kShift);
+    cv::fillConvexPoly(layer, side, scalar(color), cv::LINE_AA, kSubpixelBits);
   }
-  cv::fillConvexPoly(layer, base, scalar(color), cv::LINE_AA, kShift);
+  cv::fillConvexPoly(layer, base, scalar(color), cv::LINE_AA, kSubpixelBits);
   cv::addWeighted(layer, opacity, picture, 1 - opacity, 0, picture);
-  cv::polylines(picture, base, true, scalar(color), 1, cv::LINE_AA, kShift);
+  cv::polylines(picture, base, true, scalar(color), 1, cv::LINE_AA, kSubpixelBits);
   for (const cv::Point& corner : base) {
-    cv::line(picture, frustum.apex, corner, scalar(color), 1, cv::LINE_AA, kShift);
+    cv::line(picture, frustum.apex, corner, scalar(color), 1, cv::LINE_AA, kSubpixelBits);
   }
-  cv::circle(picture, frustum.apex, 3 << kShift, scalar(color), cv::FILLED, cv::LINE_AA, kShift);
+  cv::circle(picture, frustum.apex, 3 << kSubpixelBits, scalar(color), cv::FILLED, cv::LINE_AA,
+             kSubpixelBits);
 }
 
 }  // namespace
@@ -88,7 +85,8 @@ void draw_devices(const Rig& rig, const Device& view, double size_mm, double dep
     const auto frustum = project_frustum(device, view, size_mm);
     if (!frustum) return;
     draw_frustum(*frustum, color, filled, picture);
-    const cv::Point at(frustum->apex.x / (1 << kShift) + 8, frustum->apex.y / (1 << kShift) - 6);
+    const cv::Point at(frustum->apex.x / (1 << kSubpixelBits) + 8,
+                       frustum->apex.y / (1 << kSubpixelBits) - 6);
     draw_text(picture, device.name, at, {88, 92, 100}, 0.4);
   };
   for (const Projector& projector : rig.projectors) draw(projector, light_color(projector), true);

@@ -11,10 +11,6 @@
 namespace pencilscan {
 namespace {
 
-constexpr int kShift = 4;  // OpenCV draws at sixteenths of a pixel
-
-cv::Scalar scalar(const Color& c) { return {double(c[0]), double(c[1]), double(c[2])}; }
-
 void draw_curve(cv::Mat& picture, const OverlayCurve& curve, const OverlayOptions& options) {
   std::vector<cv::Point> path;
   path.reserve(curve.points.size());
@@ -23,16 +19,16 @@ void draw_curve(cv::Mat& picture, const OverlayCurve& curve, const OverlayOption
     if (!p.allFinite()) continue;
     const auto fixed = [&](float value) {
       return static_cast<int>(
-          std::lround((options.zoom * static_cast<double>(value) + offset) * (1 << kShift)));
+          std::lround((options.zoom * static_cast<double>(value) + offset) * (1 << kSubpixelBits)));
     };
     path.emplace_back(fixed(p[0]), fixed(p[1]));
   }
   const cv::Scalar color = scalar(categorical_color(curve.key));
   if (path.size() == 1) {
-    cv::circle(picture, path[0], (options.thickness_px << kShift) * 3 / 4, color, cv::FILLED,
-               cv::LINE_AA, kShift);
+    cv::circle(picture, path[0], (options.thickness_px << kSubpixelBits) * 3 / 4, color, cv::FILLED,
+               cv::LINE_AA, kSubpixelBits);
   } else if (path.size() > 1) {
-    cv::polylines(picture, path, false, color, options.thickness_px, cv::LINE_AA, kShift);
+    cv::polylines(picture, path, false, color, options.thickness_px, cv::LINE_AA, kSubpixelBits);
   }
 }
 

@@ -12,8 +12,6 @@ namespace {
 const Color kDark{27, 30, 36};
 const Color kLightText{225, 228, 233};
 
-cv::Scalar scalar(const Color& c) { return {double(c[0]), double(c[1]), double(c[2])}; }
-
 int text_width(const std::string& text, double size) {
   int baseline = 0;
   return cv::getTextSize(text, cv::FONT_HERSHEY_SIMPLEX, size, 1, &baseline).width;

@@ -9,6 +9,13 @@ namespace pencilscan {
 /// A colour as shown: 8-bit sRGB in RGB order.
 using Color = cv::Vec3b;
 
+[[nodiscard]] inline cv::Scalar scalar(const Color& c) {
+  return {double(c[0]), double(c[1]), double(c[2])};
+}
+
+/// Pictures are drawn at sixteenths of a pixel (OpenCV's `shift`).
+inline constexpr int kSubpixelBits = 4;
+
 inline const Color kUndecidedColor{128, 128, 128};
 
 /// Eight colours that stay apart on a dark ground, for local IDs and for projectors; key modulo 8.

@@ -23,7 +23,7 @@ Lamp make_lamp(const Rig& rig, std::size_t projector) {
 }
 
 /// Reflected share of the light that arrives: everything of the model but M * pattern.
-double reflected(const SimulatedObject& object, const SurfaceSample& sample, double albedo,
+double reflected(const SimulatedObject& object, const SightedPoint& sample, double albedo,
                  const Lamp& lamp, const Incidence& light, const RenderOptions& options) {
   double value = albedo * light.cosine;
   const Reflectance& surface = object.surface();
@@ -78,7 +78,7 @@ cv::Mat render_camera(const Rig& rig, std::size_t camera_index, const SimulatedO
     for (int x = 0; x < camera.width; ++x) {
       if (!tracer.may_hit(x, y)) continue;
       Vec3 sum = Vec3::Zero();
-      for_each_hit(tracer, x, y, options.samples, [&](const SurfaceSample& sample) {
+      for_each_hit(tracer, x, y, options.samples, [&](const SightedPoint& sample) {
         const double albedo = object.albedo_at(sample.point);
         sum += Vec3::Constant(options.ambient * albedo);
         for (const Source& source : sources) {
@@ -122,7 +122,7 @@ std::vector<cv::Mat> render_sequence(const Rig& rig, std::size_t camera_index,
     const int y = static_cast<int>(row);
     for (int x = 0; x < camera.width; ++x) {
       if (!tracer.may_hit(x, y)) continue;
-      for_each_hit(tracer, x, y, options.samples, [&](const SurfaceSample& sample) {
+      for_each_hit(tracer, x, y, options.samples, [&](const SightedPoint& sample) {
         const double albedo = object.albedo_at(sample.point);
         if (options.ambient > 0) {
           const auto even = static_cast<float>(per_ray * options.ambient * albedo);

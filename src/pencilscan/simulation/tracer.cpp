@@ -55,12 +55,12 @@ void CameraTracer::mark_tiles() {
   }
 }
 
-std::optional<SurfaceSample> CameraTracer::trace(const Vec2& pixel) const {
+std::optional<SightedPoint> CameraTracer::trace(const Vec2& pixel) const {
   const Vec3 direction = world_from_camera_ * camera_->normalized_from_pixel(pixel).homogeneous();
   const double length = direction.norm();
   const auto hit = object_->rays().first_hit({center_, direction / length});
   if (!hit) return std::nullopt;
-  SurfaceSample sample;
+  SightedPoint sample;
   sample.point = hit->point;
   sample.depth = hit->distance / length;  // the direction has z = 1 in the camera
   sample.to_camera = -direction / length;
@@ -79,7 +79,7 @@ std::optional<SurfaceSample> CameraTracer::trace(const Vec2& pixel) const {
 }
 
 std::optional<Incidence> incidence(const Device& projector, const Vec3& center,
-                                   const SurfaceSample& sample) {
+                                   const SightedPoint& sample) {
   Incidence light;
   const Vec3 way = center - sample.point;
   light.distance = way.norm();

@@ -10,7 +10,7 @@
 namespace pencilscan {
 
 /// What one camera ray meets.
-struct SurfaceSample {
+struct SightedPoint {
   Vec3 point;        ///< world, mm
   Vec3 face_normal;  ///< unit, towards the camera
   Vec3 normal;       ///< unit, for shading
@@ -31,7 +31,7 @@ class CameraTracer {
     return tiles_[static_cast<std::size_t>(y / kTile) * tiles_across_ +
                   static_cast<std::size_t>(x / kTile)] != 0;
   }
-  [[nodiscard]] std::optional<SurfaceSample> trace(const Vec2& pixel) const;
+  [[nodiscard]] std::optional<SightedPoint> trace(const Vec2& pixel) const;
 
  private:
   static constexpr int kTile = 8;  ///< px
@@ -55,6 +55,6 @@ struct Incidence {
 };
 /// Nothing when the sample faces away from the projector or lies outside its panel.
 [[nodiscard]] std::optional<Incidence> incidence(const Device& projector, const Vec3& center,
-                                                 const SurfaceSample& sample);
+                                                 const SightedPoint& sample);
 
 }  // namespace pencilscan

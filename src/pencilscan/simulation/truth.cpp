@@ -12,7 +12,7 @@ namespace {
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 void fill_projector(const Projector& projector, const Vec3& center, const SimulatedObject& object,
-                    const SurfaceSample& sample, int x, int y, ProjectorTruth& truth) {
+                    const SightedPoint& sample, int x, int y, ProjectorTruth& truth) {
   truth.cosine.at<float>(y, x) =
       static_cast<float>((center - sample.point).normalized().dot(sample.face_normal));
   const auto pixel = projector.project(sample.point);

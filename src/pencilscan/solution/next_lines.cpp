@@ -11,15 +11,15 @@ namespace {
 
 using Eigen::Vector2f;
 
-struct Place {
+struct LinePlace {
   Vector2f pixel;
   Vector2f tangent;
   int curve;
   int piece;
 };
 
-constexpr int kCell = 16;
-constexpr float kReachPx = 48;
+constexpr int kNextLineCellPx = 16;
+constexpr float kNextLinePx = 48;
 
 }  // namespace
 
@@ -29,7 +29,7 @@ bool lacks_crossings(const PieceGraph& graph) {
 
 std::vector<NextPiece> next_pieces(const Camera& camera, const GridGraph& graph,
                                    const PieceGraph& pieces) {
-  Places<Place> places(camera.width, camera.height, kCell);
+  Places<LinePlace> places(camera.width, camera.height, kNextLineCellPx);
   for (std::size_t p = 0; p < pieces.pieces.size(); ++p) {
     const CurvePiece& piece = pieces.pieces[p];
     for (int i = piece.begin; i < piece.end; ++i) {
@@ -49,10 +49,10 @@ std::vector<NextPiece> next_pieces(const Camera& camera, const GridGraph& graph,
     const Vector2f tangent = middle.tangent();
     const Vector2f normal(tangent.y(), -tangent.x());
     for (const float side : {1.F, -1.F}) {
-      float nearest = kReachPx;
-      const Place* found = nullptr;
+      float nearest = kNextLinePx;
+      const LinePlace* found = nullptr;
       const Vector2f& at = middle.position;
-      places.around(at, kReachPx, [&](const Place& place) {
+      places.around(at, kNextLinePx, [&](const LinePlace& place) {
         const Vector2f way = place.pixel - at;
         const float across = side * way.dot(normal);
         if (across < 1.5F || across >= nearest || std::abs(way.dot(tangent)) > 1) return;

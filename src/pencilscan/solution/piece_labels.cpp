@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <tuple>
 
@@ -36,20 +37,40 @@ bool before(const PieceLabel& a, const PieceLabel& b) {
          std::tie(b.pattern.projector, b.pattern.pattern, b.line);
 }
 
-/// Labels of one piece at one crossing, ordered by inverse depth.
-struct DepthOrder {
-  std::vector<std::pair<float, std::size_t>> entries;
-  float largest_per_px = 0;
-
-  void assign(const std::vector<PieceLabel>& labels, const Eigen::Vector3f& ray) {
-    entries.clear();
-    largest_per_px = 0;
-    for (std::size_t i = 0; i < labels.size(); ++i) {
-      entries.emplace_back(labels[i].q.dot(ray), i);
-      largest_per_px = std::max(largest_per_px, labels[i].inverse_depth_per_px);
+/// Labels of one piece at a crossing, ordered by inverse depth.
+class DepthOrder {
+ public:
+  explicit DepthOrder(const std::vector<PieceLabel>& labels) {
+    for (std::size_t i = 0; i < labels.size(); ++i) entries_.emplace_back(0.F, i);
+    for (const PieceLabel& label : labels) {
+      largest_per_px_ = std::max(largest_per_px_, label.inverse_depth_per_px);
+      smallest_per_px_ = std::min(smallest_per_px_, label.inverse_depth_per_px);
     }
-    std::sort(entries.begin(), entries.end());
   }
+
+  /// Goes to a crossing; the next one of a piece lies near, and has nearly the same order.
+  void go_to(const std::vector<PieceLabel>& labels, const Eigen::Vector3f& ray) {
+    for (auto& [w, i] : entries_) w = labels[i].q.dot(ray);
+    if (!is_ordered_) std::sort(entries_.begin(), entries_.end());
+    is_ordered_ = true;
+    for (std::size_t k = 1; k < entries_.size(); ++k) {
+      const Entry entry = entries_[k];
+      std::size_t at = k;
+      for (; at > 0 && entry < entries_[at - 1]; --at) entries_[at] = entries_[at - 1];
+      entries_[at] = entry;
+    }
+  }
+
+  using Entry = std::pair<float, std::size_t>;  ///< inverse depth, label
+  [[nodiscard]] const std::vector<Entry>& entries() const { return entries_; }
+  [[nodiscard]] float largest_per_px() const { return largest_per_px_; }
+  [[nodiscard]] float smallest_per_px() const { return smallest_per_px_; }
+
+ private:
+  std::vector<Entry> entries_;
+  bool is_ordered_ = false;
+  float largest_per_px_ = 0;
+  float smallest_per_px_ = std::numeric_limits<float>::max();
 };
 
 /// What the crossings say of each label of each piece, every other piece free to choose.
@@ -59,26 +80,30 @@ std::vector<std::vector<float>> crossing_support(const LabelledPieces& pieces,
   std::vector<std::vector<float>> support;
   for (const auto& labels : pieces.labels) support.emplace_back(labels.size(), 0.F);
   const CrossingCost crossing_cost(pieces.inverse_depth_range, options);
-  DepthOrder order_a;
-  DepthOrder order_b;
+  std::vector<DepthOrder> orders(pieces.labels.begin(), pieces.labels.end());
   std::vector<float> best_a;
   std::vector<float> best_b;
   for (const PieceCrossing& x : pieces.graph.crossings) {
     const auto& a = pieces.labels[static_cast<std::size_t>(x.a)];
     const auto& b = pieces.labels[static_cast<std::size_t>(x.b)];
+    DepthOrder& order_a = orders[static_cast<std::size_t>(x.a)];
+    DepthOrder& order_b = orders[static_cast<std::size_t>(x.b)];
     const Eigen::Vector3f ray = x.position.homogeneous();
-    order_a.assign(a, ray);
-    order_b.assign(b, ray);
+    order_a.go_to(a, ray);
+    order_b.go_to(b, ray);
     best_a.assign(a.size(), 0.F);
     best_b.assign(b.size(), 0.F);
     const auto projection = kReach * static_cast<float>(options.projection_sigma_px);
-    const float window = projection * std::hypot(order_a.largest_per_px, order_b.largest_per_px);
+    const float window =
+        projection * std::hypot(order_a.largest_per_px(), order_b.largest_per_px());
+    const float lowest = crossing_cost.lowest(order_a.smallest_per_px(), order_b.smallest_per_px());
+    const auto& entries = order_b.entries();
     std::size_t first = 0;
-    for (const auto& [w, i] : order_a.entries) {
-      while (first < order_b.entries.size() && order_b.entries[first].first < w - window) ++first;
-      for (std::size_t k = first;
-           k < order_b.entries.size() && order_b.entries[k].first <= w + window; ++k) {
-        const std::size_t j = order_b.entries[k].second;
+    for (const auto& [w, i] : order_a.entries()) {
+      while (first < entries.size() && entries[first].first < w - window) ++first;
+      for (std::size_t k = first; k < entries.size() && entries[k].first <= w + window; ++k) {
+        const std::size_t j = entries[k].second;
+        if (lowest + b[j].cost >= best_a[i] && lowest + a[i].cost >= best_b[j]) continue;
         const float cost = crossing_cost(a[i], b[j], x);
         best_a[i] = std::min(best_a[i], cost + b[j].cost);
         best_b[j] = std::min(best_b[j], cost + a[i].cost);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <span>
 #include <vector>
@@ -53,6 +54,11 @@ class CrossingCost {
                      crossing.sigma * crossing.sigma * q.head<2>().squaredNorm();
     if (r * r > kFarthest2 * s2) return disagreement_;
     return -std::log(wrong_ + density_ / std::sqrt(s2) * std::exp(-0.5F * r * r / s2));
+  }
+  /// No cost of labels with at least these inverse depths per projector px is lower.
+  [[nodiscard]] float lowest(float a_per_px, float b_per_px) const {
+    const float s2 = projection2_ * (a_per_px * a_per_px + b_per_px * b_per_px);
+    return std::min(disagreement_, -std::log(wrong_ + density_ / std::sqrt(s2)));
   }
 
  private:

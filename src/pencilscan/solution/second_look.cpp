@@ -19,7 +19,7 @@ namespace {
 
 using Eigen::Vector2f;
 
-constexpr int kCell = 8;  ///< px, of what is found by place
+constexpr int kPlaceCellPx = 8;  ///< px, of what is found by place
 
 struct KnownPoint {
   Vector2f position;
@@ -116,8 +116,8 @@ CameraLook::CameraLook(const Rig& rig, const std::vector<ColorFamily>& families,
       tentative_(tentative),
       options_(options),
       surface_(camera_, options.surface),
-      known_(camera_.width, camera_.height, kCell),
-      missing_places_(camera_.width, camera_.height, kCell) {
+      known_(camera_.width, camera_.height, kPlaceCellPx),
+      missing_places_(camera_.width, camera_.height, kPlaceCellPx) {
   for (const ColorFamily& family : families) {
     for (const PatternRef& ref : family.patterns) {
       if (can_see_pattern(rig, camera_, ref.projector)) patterns_.push_back(ref);

@@ -11,11 +11,10 @@
 namespace pencilscan {
 namespace {
 
-constexpr float kReachPx = 16;
+constexpr int kSurroundingsPx = 16;
 constexpr std::size_t kMaxNeighbors = 6;
-constexpr int kCell = 16;
 
-struct Place {
+struct PiecePlace {
   int piece = 0;
   int curve = 0;
   Eigen::Vector2f pixel;
@@ -26,7 +25,7 @@ struct Place {
 Surroundings::Surroundings(const Camera& camera, const GridGraph& graph,
                            const LabelledPieces& pieces)
     : pieces_(pieces) {
-  Places<Place> places(camera.width, camera.height, kCell);
+  Places<PiecePlace> places(camera.width, camera.height, kSurroundingsPx);
   const auto point = [&](const CurvePiece& piece, int i) -> const Eigen::Vector2f& {
     return graph.curves[static_cast<std::size_t>(piece.curve)]
         .points[static_cast<std::size_t>(i)]
@@ -51,9 +50,9 @@ Surroundings::Surroundings(const Camera& camera, const GridGraph& graph,
     const Eigen::Vector2f middle = point(list[p], (list[p].begin + list[p].end) / 2);
     nearest.clear();
     auto known = nearest.end();
-    places.around(middle, kReachPx, [&](const Place& place) {
+    places.around(middle, kSurroundingsPx, [&](const PiecePlace& place) {
       const float d = (place.pixel - middle).squaredNorm();
-      if (d > kReachPx * kReachPx || place.curve == list[p].curve) return;
+      if (d > kSurroundingsPx * kSurroundingsPx || place.curve == list[p].curve) return;
       // Places of one piece follow each other.
       if (known == nearest.end() || std::get<1>(*known) != place.piece) {
         known = std::find_if(nearest.begin(), nearest.end(),

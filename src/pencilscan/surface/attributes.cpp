@@ -11,8 +11,6 @@
 namespace pencilscan {
 namespace {
 
-constexpr std::size_t kChunk = 256;
-
 /// Declares invented those fringe vertices that connect to an invented one through the fringe. Gaps
 /// between lines have a fringe too, but nothing invented inside: they stay measured.
 void cut_fringe(std::span<const char> fringe, TriangleMesh& mesh) {
@@ -54,7 +52,7 @@ void attribute_vertices(std::span<const SurfaceSample> samples, double reach_spa
   std::vector<char> fringe(mesh.vertices.size(), 0);
   mesh.sigma.assign(mesh.vertices.size(), 0.0F);
   mesh.confidence.assign(mesh.vertices.size(), 0.0F);
-  parallel_chunks(mesh.vertices.size(), kChunk, [&](std::size_t v) {
+  parallel_chunks(mesh.vertices.size(), [&](std::size_t v) {
     double nearest = radius;  // mm, to any sample of this side
     double best = 1;          // distance / reach of the best sample
     double weight_sum = 0;

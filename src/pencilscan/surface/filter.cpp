@@ -20,7 +20,6 @@ constexpr double kSupportRadius = 2.0;      // spacings
 constexpr double kAlongRadius = 1.0;        // spacings, averaging along the curve
 constexpr double kTubeRadius = 0.15;        // spacings, of a sight or light line
 constexpr double kMargin = 0.6;             // spacings before the end of the line
-constexpr std::size_t kChunk = 128;
 
 /// One other sample's vote; only the strongest of each group counts.
 struct Vote {
@@ -71,7 +70,7 @@ std::vector<Vote> nearest_per_group(std::vector<Candidate>& candidates, std::siz
 Votes collect_support(std::span<const SurfaceSample> samples, const PointGrid& grid,
                       double spacing) {
   Votes support(samples.size());
-  parallel_chunks(samples.size(), kChunk, [&](std::size_t i) {
+  parallel_chunks(samples.size(), [&](std::size_t i) {
     const SurfaceSample& p = samples[i];
     std::vector<Candidate> candidates;
     grid.for_each_within(p.position, kSupportRadius * spacing, [&](std::size_t j, double d2) {
@@ -169,7 +168,7 @@ Votes collect_contradictions(const Rig& rig, std::span<const SurfaceSample> samp
                                      : rig.projectors[view - rig.cameras.size()].center();
   };
   Votes contradictions(samples.size());
-  parallel_chunks(samples.size(), kChunk, [&](std::size_t i) {
+  parallel_chunks(samples.size(), [&](std::size_t i) {
     const SurfaceSample& p = samples[i];
     std::vector<Candidate> candidates;
     for (std::size_t view = 0; view < views.size(); ++view) {
@@ -205,7 +204,7 @@ Votes collect_contradictions(const Rig& rig, std::span<const SurfaceSample> samp
 std::vector<std::vector<std::uint32_t>> collect_along(std::span<const SurfaceSample> samples,
                                                       const PointGrid& grid, double spacing) {
   std::vector<std::vector<std::uint32_t>> along(samples.size());
-  parallel_chunks(samples.size(), kChunk, [&](std::size_t i) {
+  parallel_chunks(samples.size(), [&](std::size_t i) {
     grid.for_each_within(samples[i].position, kAlongRadius * spacing, [&](std::size_t j, double) {
       if (samples[j].curve == samples[i].curve) along[i].push_back(static_cast<std::uint32_t>(j));
     });
@@ -224,11 +223,11 @@ std::vector<double> vote(const Rig& rig, std::span<const SurfaceSample> samples,
   std::vector<double> s(samples.size());
   std::vector<double> c(samples.size());
   for (int round = 0; round < kRounds; ++round) {
-    parallel_chunks(samples.size(), kChunk, [&](std::size_t i) {
+    parallel_chunks(samples.size(), [&](std::size_t i) {
       s[i] = tally(support[i], belief);
       c[i] = tally(contradictions[i], belief);
     });
-    parallel_chunks(samples.size(), kChunk, [&](std::size_t i) {
+    parallel_chunks(samples.size(), [&](std::size_t i) {
       double s_mean = 0;
       double c_mean = 0;
       for (const std::uint32_t j : along[i]) {

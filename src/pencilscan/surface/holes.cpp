@@ -6,12 +6,10 @@
 #include "pencilscan/depth/pattern_view.h"
 #include "pencilscan/geometry/ray_scene.h"
 #include "pencilscan/surface/mesh_parts.h"
+#include "pencilscan/surface/sight.h"
 
 namespace pencilscan {
 namespace {
-
-constexpr std::size_t kChunk = 256;
-constexpr double kOffSurface = 0.5;  // mm; keeps a ray's end off the surface it lies on
 
 /// What a camera could have measured at a place of the closed mesh.
 class Visibility {
@@ -30,19 +28,13 @@ class Visibility {
 
   [[nodiscard]] const RayScene& scene() const { return scene_; }
 
-  [[nodiscard]] bool sees(const Vec3& eye, const Vec3& x, const Vec3& normal,
-                          double least_cosine) const {
-    if ((eye - x).normalized().dot(normal) < least_cosine) return false;
-    return scene_.visible(eye, x + kOffSurface * normal, kOffSurface);
-  }
-
   /// Bit per projector that lights the place.
   [[nodiscard]] std::uint64_t lighting(const Vec3& x, const Vec3& normal) const {
     std::uint64_t lit = 0;
     for (std::size_t p = 0; p < std::min<std::size_t>(rig_.projectors.size(), 64); ++p) {
       const auto pixel = rig_.projectors[p].project(x);
       if (!pixel || !rig_.projectors[p].contains(*pixel)) continue;
-      if (sees(rig_.projectors[p].center(), x, normal, options_.least_cosine))
+      if (sees(scene_, rig_.projectors[p].center(), x, normal, options_.least_cosine))
         lit |= std::uint64_t{1} << p;
     }
     return lit;
@@ -84,7 +76,7 @@ bool found_by_depth(HoleReason reason) {
 void explain_nodes(const Rig& rig, const Visibility& visibility,
                    const std::vector<Vec3>& face_normals, DepthMap& map) {
   const auto c = static_cast<std::size_t>(map.camera);
-  parallel_chunks(map.nodes.size(), kChunk, [&](std::size_t i) {
+  parallel_chunks(map.nodes.size(), [&](std::size_t i) {
     DepthNode& node = map.nodes[i];
     if (node.measured() || found_by_depth(node.reason)) return;
     const auto hit = visibility.scene().first_hit(rig.cameras[c].ray(map.pixel(i)));
@@ -127,7 +119,7 @@ HoleReason explain_vertex(const Rig& rig, const Visibility& visibility,
     const auto c = static_cast<std::size_t>(map.camera);
     const auto pixel = rig.cameras[c].project(x);
     if (!pixel || !rig.cameras[c].contains(*pixel)) continue;
-    if (!visibility.sees(rig.cameras[c].center(), x, normal, 0.02)) continue;
+    if (!sees(visibility.scene(), rig.cameras[c].center(), x, normal, 0.02)) continue;
     HoleReason reason = visibility.reason(c, x, normal, lit);
     const int column = static_cast<int>(std::lround((*pixel)[0] / map.stride));
     const int row = static_cast<int>(std::lround((*pixel)[1] / map.stride));
@@ -157,7 +149,7 @@ HoleReport explain_holes(const Rig& rig, const TriangleMesh& mesh, std::span<Dep
   }
   const std::vector<Vec3> normals = vertex_normals(mesh);
   report.vertices.assign(mesh.vertices.size(), HoleReason::kMeasured);
-  parallel_chunks(mesh.vertices.size(), kChunk, [&](std::size_t v) {
+  parallel_chunks(mesh.vertices.size(), [&](std::size_t v) {
     if (mesh.confidence.empty() || mesh.confidence[v] > 0) return;
     report.vertices[v] = explain_vertex(rig, visibility, maps, mesh.vertices[v], normals[v]);
   });

@@ -9,9 +9,6 @@
 namespace pencilscan {
 namespace {
 
-/// Samples per unit of a parallel loop: enough work to hide the scheduling.
-constexpr std::size_t kChunk = 256;
-
 struct PlaneFit {
   Vec3 normal = Vec3::Zero();
   Vec3 tangent = Vec3::Zero();
@@ -101,7 +98,7 @@ bool fit_quadric(std::span<const SurfaceSample> samples, const PointGrid& grid, 
 std::vector<Vec3> initial_normals(std::span<const SurfaceSample> samples, const PointGrid& grid,
                                   double radius) {
   std::vector<Vec3> normals(samples.size());
-  parallel_chunks(samples.size(), kChunk, [&](std::size_t i) {
+  parallel_chunks(samples.size(), [&](std::size_t i) {
     const SurfaceSample& s = samples[i];
     std::vector<Vec3> points;
     std::vector<double> base;
@@ -135,7 +132,7 @@ void fit_local_surfaces(std::vector<SurfaceSample>& samples, double radius) {
     for (std::size_t i = 0; i < samples.size(); ++i) positions[i] = samples[i].position;
     const PointGrid grid(positions, radius);
     std::vector<SurfaceSample> fitted = samples;
-    parallel_chunks(samples.size(), kChunk,
+    parallel_chunks(samples.size(),
                     [&](std::size_t i) { fit_quadric(samples, grid, radius, fitted[i]); });
     if (round + 1 < kRounds) {
       for (std::size_t i = 0; i < samples.size(); ++i) samples[i].normal = fitted[i].normal;

@@ -153,7 +153,7 @@ void follow_nodes(const Rig& rig, std::span<const DepthMap> maps, const FollowOp
   std::vector<char> moved(start.size(), 0);
   for (int round = 0; round < options.rounds; ++round) {
     const std::vector<Vec3> normals = vertex_normals(mesh);
-    parallel_chunks(start.size(), 512, [&](std::size_t v) {
+    parallel_chunks(start.size(), [&](std::size_t v) {
       if (!(normals[v].squaredNorm() > 0.5)) return;
       thread_local std::vector<Prediction> predictions;
       predictions.clear();

@@ -9,15 +9,14 @@
 
 #include "pencilscan/core/chunks.h"
 #include "pencilscan/geometry/ray_scene.h"
+#include "pencilscan/surface/sight.h"
 
 namespace pencilscan {
 namespace {
 
-constexpr std::size_t kChunk = 256;
-constexpr double kOffSurface = 0.5;  // mm; keeps a ray's end off the surface it lies on
-constexpr double kGrazing = 0.02;    // cosine; beyond, a pixel says nothing of a vertex
-constexpr int kSmoothings = 6;       // per round: fewer leave folds where the moved part ends
-constexpr int kRoundsPerScene = 4;   // shadows of a few rounds ago are good enough
+constexpr double kLeastSightCosine = 0.02;  // cosine; beyond, a pixel says nothing of a vertex
+constexpr int kSmoothings = 6;      // per round: fewer leave folds where the moved part ends
+constexpr int kRoundsPerScene = 4;  // shadows of a few rounds ago are good enough
 
 class Verdict {
  public:
@@ -37,7 +36,7 @@ class Verdict {
       const int v =
           std::clamp(static_cast<int>(std::lround((*pixel)[1])), 0, silhouette.light.rows - 1);
       if (silhouette.light.at<std::uint8_t>(v, u) != 0) continue;
-      if (!sees(camera.center(), x, normal, kGrazing)) continue;
+      if (!sees(scene_, camera.center(), x, normal, kLeastSightCosine)) continue;
       if (nothing_measured_behind(camera.center(), x)) return true;
       dark = dark || (camera.center() - x).normalized().dot(normal) > least_cosine_;
     }
@@ -46,32 +45,26 @@ class Verdict {
                        [&](const Projector& projector) {
                          const auto pixel = projector.project(x);
                          return pixel && projector.contains(*pixel) &&
-                                sees(projector.center(), x, normal, least_cosine_);
+                                sees(scene_, projector.center(), x, normal, least_cosine_);
                        });
   }
 
   /// Distance to the opposite side of the mesh; nothing where there is none.
   [[nodiscard]] double thickness(const Vec3& x, const Vec3& normal) const {
     Ray ray;
-    ray.origin = x - kOffSurface * normal;
+    ray.origin = x - kOffSurfaceMm * normal;
     ray.direction = -normal;
     const auto hit = scene_.first_hit(ray);
     return hit ? hit->distance : 0;
   }
 
  private:
-  [[nodiscard]] bool sees(const Vec3& eye, const Vec3& x, const Vec3& normal,
-                          double least_cosine) const {
-    if ((eye - x).normalized().dot(normal) < least_cosine) return false;
-    return scene_.visible(eye, x + kOffSurface * normal, kOffSurface);
-  }
-
   /// True when the ray of sight meets invented faces only.
   [[nodiscard]] bool nothing_measured_behind(const Vec3& eye, const Vec3& x) const {
     constexpr int kMostHits = 12;
     Ray ray;
     ray.direction = (x - eye).normalized();
-    ray.origin = x - 2 * kOffSurface * ray.direction;
+    ray.origin = x - 2 * kOffSurfaceMm * ray.direction;
     const TriangleMesh& mesh = scene_.mesh();
     for (int k = 0; k < kMostHits; ++k) {
       const auto hit = scene_.first_hit(ray);
@@ -183,7 +176,7 @@ std::size_t draw_in(const Rig& rig, std::span<const Silhouette> silhouettes,
     }
     const std::vector<Vec3> normals = vertex_normals(mesh);
     std::vector<char> moves(mesh.vertices.size(), 0);
-    parallel_chunks(mesh.vertices.size(), kChunk, [&](std::size_t v) {
+    parallel_chunks(mesh.vertices.size(), [&](std::size_t v) {
       if (mesh.confidence[v] > 0 || !(normals[v].squaredNorm() > 0.5)) return;
       if (!verdict->is_outside(mesh.vertices[v], then[v], then_normals[v])) return;
       const double room = verdict->thickness(then[v], then_normals[v]);

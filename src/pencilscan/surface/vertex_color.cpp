@@ -8,12 +8,10 @@
 #include "pencilscan/core/chunks.h"
 #include "pencilscan/depth/pattern_view.h"
 #include "pencilscan/geometry/ray_scene.h"
+#include "pencilscan/surface/sight.h"
 
 namespace pencilscan {
 namespace {
-
-constexpr std::size_t kChunk = 256;
-constexpr double kOffSurface = 0.5;  // mm; keeps a ray's end off the surface it lies on
 
 using Channels = Eigen::Array3f;
 
@@ -72,8 +70,7 @@ class Light {
   }
 
   [[nodiscard]] bool sees(const Vec3& eye, const Vec3& x, const Vec3& normal) const {
-    if ((eye - x).normalized().dot(normal) < options_.least_cosine) return false;
-    return scene_.visible(eye, x + kOffSurface * normal, kOffSurface);
+    return pencilscan::sees(scene_, eye, x, normal, options_.least_cosine);
   }
 
   /// Of each projector at a place, relative to the centre of the volume at a right angle; 0 in
@@ -128,7 +125,7 @@ std::vector<Sample> collect(const Rig& rig, const TriangleMesh& mesh,
   const Light light(rig, mesh, views, options);
   const std::vector<Vec3> normals = vertex_normals(mesh);
   std::vector<Sample> samples(mesh.vertices.size() * views.size());
-  parallel_chunks(mesh.vertices.size(), kChunk, [&](std::size_t v) {
+  parallel_chunks(mesh.vertices.size(), [&](std::size_t v) {
     if (!mesh.confidence.empty() && !(mesh.confidence[v] > 0)) return;  // it may be elsewhere
     const Vec3& x = mesh.vertices[v];
     thread_local std::vector<double> irradiance;
@@ -240,7 +237,7 @@ std::vector<Channels> solve(const Neighbors& neighbors, std::span<const Evidence
     return sums[v].weight + smoothing * static_cast<float>(neighbors.of(v).size()) + 1e-9F;
   };
   const auto times = [&](const std::vector<Channels>& x, std::vector<Channels>& y) {
-    parallel_chunks(n, 4096, [&](std::size_t v) {
+    parallel_chunks(n, [&](std::size_t v) {
       Channels sum = diagonal(v) * x[v];
       for (const int k : neighbors.of(v)) sum -= smoothing * x[static_cast<std::size_t>(k)];
       y[v] = sum;
