@@ -1,9 +1,7 @@
 #include "pencilscan/pipeline/frame.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdio>
 #include <optional>
 #include <utility>
 
@@ -11,7 +9,7 @@
 #include "pencilscan/core/median.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/core/stopwatch.h"
-#include "pencilscan/pipeline/rig_refinement.h"
+#include "pencilscan/pipeline/line_naming.h"
 #include "pencilscan/surface/vertex_color.h"
 
 namespace pencilscan {
@@ -47,54 +45,6 @@ std::vector<std::string> detection_warnings(const Rig& rig, const Frame& frame,
     }
   }
   return warnings;
-}
-
-std::string disagreement_warning(const CrossingDisagreement& crossings, bool labels_are_corrected) {
-  std::array<char, 400> text{};
-  std::snprintf(
-      text.data(), text.size(),
-      "crossing lines miss each other by %.2f projector pixels (median) where image noise "
-      "explains %.2f: the rig's calibration is off. %s; --refine-rig can correct %s",
-      crossings.median_px, crossings.expected_px,
-      labels_are_corrected ? "Lines were named with the devices as this frame corrects them, "
-                             "points lie where the rig as given puts them"
-                           : "This frame does not say how, many lines may be named wrong",
-      labels_are_corrected ? "the points too" : "it from several frames");
-  return text.data();
-}
-
-CrossingDisagreement disagreement(const Rig& rig, const PointResult& result) {
-  return crossing_disagreement(rig, crossing_tracks(rig, result.graphs, result.labeling));
-}
-
-/// Names the lines of a frame whose crossings miss each other with a rig that these crossings
-/// correct (refine_rig_on_frames). Returns that rig; nothing, with the labels as they were, where
-/// the frame does not tell how the devices stand.
-std::optional<Rig> correct_labels(const Rig& rig, const PointOptions& options,
-                                  PointResult& result) {
-  const FrameCurves curves{result.families, result.graphs};
-  RigRefinementOptions refinement;
-  refinement.points = options;
-  RigRefinement found = refine_rig_on_frames(rig, {&curves, 1}, refinement);
-  if (!found.report.refined) return std::nullopt;
-  Labeling before = std::exchange(
-      result.labeling, solve(found.rig, result.families, result.graphs, options.solution));
-  if (disagrees(disagreement(found.rig, result))) {
-    result.labeling = std::move(before);
-    return std::nullopt;
-  }
-  return std::move(found.rig);
-}
-
-/// Labels of the joint solution, and the rig that they were decided with where it is not `rig`.
-std::optional<Rig> name_lines(const Rig& rig, const PointOptions& options, PointResult& result) {
-  result.labeling = solve(rig, result.families, result.graphs, options.solution);
-  result.crossings = disagreement(rig, result);
-  if (!disagrees(result.crossings)) return std::nullopt;
-  std::optional<Rig> corrected = correct_labels(rig, options, result);
-  if (corrected) result.crossings = disagreement(rig, result);
-  result.warnings.push_back(disagreement_warning(result.crossings, corrected.has_value()));
-  return corrected;
 }
 
 /// Error of each plane, projector px, that makes crossings miss each other as they do.
@@ -184,7 +134,11 @@ PointResult measure_points(const Rig& rig, const Frame& frame, const PointOption
     result.times.push_back({"triangulation", triangulation_watch.seconds()});
     return result;
   }
-  const std::optional<Rig> corrected = name_lines(rig, options, result);
+  LineNaming naming = name_lines(rig, result.families, result.graphs, options);
+  result.labeling = std::move(naming.labeling);
+  result.crossings = naming.crossings;
+  if (!naming.warning.empty()) result.warnings.push_back(std::move(naming.warning));
+  const std::optional<Rig>& corrected = naming.corrected;
   result.times.push_back({"solution", solution_watch.seconds()});
 
   const Stopwatch second_look_watch;

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "pencilscan/pipeline/frame.h"
+
+namespace pencilscan {
+
+/// Joint labels of one frame.
+struct LineNaming {
+  Labeling labeling;
+  std::optional<Rig> corrected;  ///< that the labels were made with, where it is not the one given
+  CrossingDisagreement crossings;  ///< of the labels, with the rig as given
+  std::string warning;             ///< empty: nothing to say
+};
+
+/// Names the lines with the rig as given. Where their crossings then miss each other, or many
+/// curves stay without a name, also with rigs that the crossings correct (refine_rig_on_frames),
+/// from several tolerances: labels and rig can be wrong together in many ways, but only the right
+/// ones name nearly all curves. The naming of most points wins that the crossings do not
+/// contradict.
+[[nodiscard]] LineNaming name_lines(const Rig& rig, const std::vector<ColorFamily>& families,
+                                    const std::vector<GridGraph>& graphs,
+                                    const PointOptions& options);
+
+}  // namespace pencilscan
