@@ -10,14 +10,6 @@
 namespace pencilscan {
 namespace {
 
-std::size_t labelled_points(const Labeling& labeling) {
-  std::size_t count = 0;
-  for (const auto& runs : labeling.runs) {
-    for (const LabeledRun& run : runs) count += static_cast<std::size_t>(run.end - run.begin);
-  }
-  return count;
-}
-
 std::size_t curve_points(const std::vector<GridGraph>& graphs) {
   std::size_t count = 0;
   for (const GridGraph& graph : graphs) {
@@ -45,38 +37,6 @@ std::string disagreement_warning(const CrossingDisagreement& crossings, bool lab
   return text.data();
 }
 
-/// One way to correct the rig, and the labels that come of it.
-struct Attempt {
-  Rig rig;
-  Labeling labeling;
-  std::size_t points = 0;
-};
-
-/// The attempt that names most points, of those whose own crossings agree.
-std::optional<Attempt> best_attempt(const Rig& rig, const FrameCurves& curves,
-                                    const PointOptions& options) {
-  constexpr std::array<double, 5> kFirstTolerancesPx = {2, 3, 4, 6, 1};
-  constexpr double kSame = 0.01;  // of the points: two attempts that end in the same place
-  std::optional<Attempt> best;
-  for (const double tolerance : kFirstTolerancesPx) {
-    RigRefinementOptions refinement;
-    refinement.points = options;
-    refinement.first_tolerance_px = tolerance;
-    // Names need the rig only as far as the crossings tell; what they leave open stays as given.
-    refinement.refine.max_remaining = std::numeric_limits<double>::infinity();
-    RigRefinement found = refine_rig_on_frames(rig, {&curves, 1}, refinement);
-    if (!found.report.refined) continue;
-    Labeling labeling = solve(found.rig, curves.families, curves.graphs, options.solution);
-    if (disagrees(disagreement(found.rig, curves.graphs, labeling))) continue;
-    const std::size_t points = labelled_points(labeling);
-    const double change =
-        best ? static_cast<double>(points) / static_cast<double>(best->points) : 2;
-    if (change > 1) best = Attempt{std::move(found.rig), std::move(labeling), points};
-    if (change > 1 - kSame && change < 1 + kSame) break;
-  }
-  return best;
-}
-
 }  // namespace
 
 LineNaming name_lines(const Rig& rig, const std::vector<ColorFamily>& families,
@@ -91,11 +51,22 @@ LineNaming name_lines(const Rig& rig, const std::vector<ColorFamily>& families,
   const auto points = static_cast<double>(labelled_points(result.labeling));
   if (result.crossings.crossings < kFewCrossings) return result;
   if (!is_off && points > kNearlyAll * static_cast<double>(curve_points(graphs))) return result;
-  std::optional<Attempt> best = best_attempt(rig, {families, graphs}, options);
-  if (best && (is_off || static_cast<double>(best->points) > kClearlyMore * points)) {
-    result.labeling = std::move(best->labeling);
-    result.corrected = std::move(best->rig);
-    result.crossings = disagreement(rig, graphs, result.labeling);
+
+  const FrameCurves curves{families, graphs};
+  RigRefinementOptions refinement;
+  refinement.points = options;
+  // Names need the rig only as far as the crossings tell; what they leave open stays as given.
+  refinement.refine.max_remaining = std::numeric_limits<double>::infinity();
+  RigRefinement found = refine_rig_on_frames(rig, {&curves, 1}, refinement);
+  if (found.report.refined) {
+    Labeling& labeling = found.labelings.front();
+    const bool names_more = static_cast<double>(labelled_points(labeling)) > kClearlyMore * points;
+    const bool agrees = !disagrees(disagreement(found.rig, graphs, labeling));
+    if (agrees && (is_off || names_more)) {
+      result.labeling = std::move(labeling);
+      result.corrected = std::move(found.rig);
+      result.crossings = disagreement(rig, graphs, result.labeling);
+    }
   }
   if (is_off || result.corrected)
     result.warning = disagreement_warning(result.crossings, result.corrected.has_value());

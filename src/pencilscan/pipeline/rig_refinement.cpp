@@ -1,44 +1,114 @@
 #include "pencilscan/pipeline/rig_refinement.h"
 
 #include <algorithm>
+#include <iterator>
+#include <limits>
+#include <optional>
 #include <utility>
 
 #include "pencilscan/solution/joint.h"
 
 namespace pencilscan {
+namespace {
 
-RigRefinement refine_rig_on_frames(const Rig& calibrated, std::span<const FrameCurves> frames,
-                                   const RigRefinementOptions& options) {
-  RigRefinement result;
-  result.rig = calibrated;
+std::vector<Labeling> label(const Rig& rig, std::span<const FrameCurves> frames,
+                            const JointOptions& options) {
+  std::vector<Labeling> labelings;
+  for (const FrameCurves& frame : frames)
+    labelings.push_back(solve_joint(rig, frame.families, frame.graphs, options));
+  return labelings;
+}
+
+std::vector<CrossingTrack> tracks_of(const Rig& rig, std::span<const FrameCurves> frames,
+                                     std::span<const Labeling> labelings,
+                                     const TrackOptions& options) {
+  std::vector<CrossingTrack> tracks;
+  for (std::size_t f = 0; f < frames.size(); ++f) {
+    auto of_frame = crossing_tracks(rig, frames[f].graphs, labelings[f], options);
+    std::move(of_frame.begin(), of_frame.end(), std::back_inserter(tracks));
+  }
+  return tracks;
+}
+
+/// What one first tolerance leads to.
+struct Attempt {
   RigCorrection correction;
-  const double last_tolerance = options.points.solution.joint.projection_sigma_px;
-  double tolerance = std::max(options.first_tolerance_px, last_tolerance);
+  RigRefinement refinement;
+  std::vector<CrossingTrack> tracks;  ///< of the last labels
+  bool agrees = false;
+  std::size_t points = 0;
+};
+
+Attempt attempt(const Rig& calibrated, std::span<const FrameCurves> frames, double tolerance,
+                const RigRefinementOptions& options) {
+  Attempt result;
+  RigRefinement& refinement = result.refinement;
+  refinement.rig = calibrated;
+  // What the first labels' crossings leave open stays as given; the last ones may tell.
+  RefineRigOptions refine = options.refine;
+  refine.max_remaining = std::numeric_limits<double>::infinity();
+  JointOptions joint = options.points.solution.joint;
+  const double last_tolerance = joint.projection_sigma_px;
+  tolerance = std::max(tolerance, last_tolerance);
   while (true) {
-    JointOptions joint = options.points.solution.joint;
     joint.projection_sigma_px = tolerance;
-    std::vector<CrossingTrack> tracks;
-    for (const FrameCurves& frame : frames) {
-      const Labeling labeling = solve_joint(result.rig, frame.families, frame.graphs, joint);
-      auto of_frame = crossing_tracks(result.rig, frame.graphs, labeling, options.tracks);
-      std::move(of_frame.begin(), of_frame.end(), std::back_inserter(tracks));
-    }
-    RefineRigResult refined = refine_rig(calibrated, tracks, correction, options.refine);
-    result.report = std::move(refined.report);
-    if (!result.report.refined) {
-      result.rig = calibrated;
-      return result;
-    }
-    RefinementRound round{tolerance, tracks.size(), crossing_disagreement(result.rig, tracks), {}};
-    correction = std::move(refined.correction);
-    result.rig = corrected_rig(calibrated, correction);
-    round.after = crossing_disagreement(result.rig, tracks);
-    result.rounds.push_back(round);
-    if (tolerance <= last_tolerance) return result;
+    const auto labelings = label(refinement.rig, frames, joint);
+    const auto tracks = tracks_of(refinement.rig, frames, labelings, options.tracks);
+    RefineRigResult refined = refine_rig(calibrated, tracks, result.correction, refine);
+    refinement.report = std::move(refined.report);
+    if (!refinement.report.refined) return result;
+    RefinementRound round{
+        tolerance, tracks.size(), crossing_disagreement(refinement.rig, tracks), {}};
+    result.correction = std::move(refined.correction);
+    refinement.rig = corrected_rig(calibrated, result.correction);
+    round.after = crossing_disagreement(refinement.rig, tracks);
+    refinement.rounds.push_back(round);
+    if (tolerance <= last_tolerance) break;
     constexpr double kTolerancePerMedian = 5;
     tolerance = std::max(last_tolerance,
                          std::min(0.5 * tolerance, kTolerancePerMedian * round.after.median_px));
   }
+  refinement.labelings = label(refinement.rig, frames, joint);
+  result.tracks = tracks_of(refinement.rig, frames, refinement.labelings, options.tracks);
+  result.agrees = !disagrees(crossing_disagreement(refinement.rig, result.tracks));
+  for (const Labeling& labeling : refinement.labelings) result.points += labelled_points(labeling);
+  return result;
+}
+
+bool is_better(const Attempt& a, const Attempt& b) {
+  if (a.agrees != b.agrees) return a.agrees;
+  return a.points > b.points;
+}
+
+bool end_alike(const Attempt& a, const Attempt& b) {
+  constexpr double kSame = 0.01;  // of the points
+  const auto more = static_cast<double>(std::max(a.points, b.points));
+  const auto fewer = static_cast<double>(std::min(a.points, b.points));
+  return a.agrees && b.agrees && more - fewer < kSame * more;
+}
+
+}  // namespace
+
+RigRefinement refine_rig_on_frames(const Rig& calibrated, std::span<const FrameCurves> frames,
+                                   const RigRefinementOptions& options) {
+  std::optional<Attempt> best;
+  for (const double tolerance : options.first_tolerances_px) {
+    Attempt next = attempt(calibrated, frames, tolerance, options);
+    const bool is_settled = best && end_alike(*best, next);
+    if (!best || is_better(next, *best)) best = std::move(next);
+    if (is_settled) break;
+  }
+  RigRefinement result = std::move(best->refinement);
+  if (result.report.refined) {
+    RefineRigResult last = refine_rig(calibrated, best->tracks, best->correction, options.refine);
+    result.report = std::move(last.report);
+    if (result.report.refined) result.rig = corrected_rig(calibrated, last.correction);
+  }
+  if (!result.report.refined) {
+    result.rig = calibrated;
+    result.labelings.clear();
+  }
+  return result;
 }
 
 }  // namespace pencilscan

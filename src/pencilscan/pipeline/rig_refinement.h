@@ -10,10 +10,12 @@ namespace pencilscan {
 
 struct RigRefinementOptions {
   PointOptions points;
-  /// Tolerance of the labels in the first round, projector px: about the error of a line with the
+  /// Tolerances of the labels in the first round, projector px: about the error of a line with the
   /// rig as given. Each later round takes half of it or what the crossings then show; the last one
-  /// is that of solution.joint.
-  double first_tolerance_px = 2;
+  /// is that of solution.joint. Labels and rig can be wrong together and agree, but only the right
+  /// ones name nearly all curves: of what the tolerances lead to, the one that names most points is
+  /// taken. Two that name equally many end the search. Not empty.
+  std::vector<double> first_tolerances_px = {2, 3, 4, 6, 1};
   TrackOptions tracks;
   RefineRigOptions refine;
 };
@@ -30,6 +32,7 @@ struct RigRefinement {
   Rig rig;                 ///< as given where report.refined is false
   RefineRigReport report;  ///< of the last round; "before" is the calibration as given
   std::vector<RefinementRound> rounds;
+  std::vector<Labeling> labelings;  ///< per frame, with the corrected rig; empty where not refined
 };
 
 /// Curves of one frame: what refinement needs of its images.
@@ -40,7 +43,7 @@ struct FrameCurves {
 
 /// Corrects the poses of the devices so that the crossings of labelled lines of all frames agree:
 /// joint labels with a wide tolerance, refinement of the rig, labels with a narrower one, and so
-/// on.
+/// on. Refused where the crossings of the last labels do not determine the devices.
 [[nodiscard]] RigRefinement refine_rig_on_frames(const Rig& calibrated,
                                                  std::span<const FrameCurves> frames,
                                                  const RigRefinementOptions& options = {});

@@ -166,6 +166,14 @@ float JointOptions::disagreement_cost() const {
   return static_cast<float>(-std::log(crossing_outliers));
 }
 
+std::size_t labelled_points(const Labeling& labeling) {
+  std::size_t count = 0;
+  for (const auto& runs : labeling.runs) {
+    for (const LabeledRun& run : runs) count += static_cast<std::size_t>(run.end - run.begin);
+  }
+  return count;
+}
+
 std::array<std::size_t, 4> undecided_points(std::span<const UndecidedRun> undecided,
                                             std::span<const LabeledRun> labelled) {
   std::array<std::size_t, 4> points{};

@@ -69,6 +69,9 @@ struct Labeling {
   std::vector<std::vector<UndecidedRun>> undecided;  ///< per camera; joint only
 };
 
+/// Points of all labelled runs.
+[[nodiscard]] std::size_t labelled_points(const Labeling& labeling);
+
 /// Points of undecided runs that no labelled run holds, per reason (the order of the enum).
 [[nodiscard]] std::array<std::size_t, 4> undecided_points(std::span<const UndecidedRun> undecided,
                                                           std::span<const LabeledRun> labelled);
