@@ -19,6 +19,7 @@
 #include "pencilscan/io/image.h"
 #include "pencilscan/io/mesh_file.h"
 #include "pencilscan/pipeline/frame_files.h"
+#include "pencilscan/pipeline/rig_refinement.h"
 #include "pencilscan/pipeline/sequence.h"
 #include "pencilscan/rig/sample_devices.h"
 #include "pencilscan/simulation/panel_light.h"
@@ -256,23 +257,41 @@ TEST_F(PipelineTest, WrongRigIsToldFromATrueOne) {
   EXPECT_THAT(measure_points(wrong, *frame_).warnings, hint);
 }
 
+/// Every device of the small rig about `px` pixels off.
+Rig rig_off_by(double px, const Rig& rig) {
+  const PoseCorrection one{px * Vec3(0.55, 0.8, -0.35), px * Vec3(0.1, 0.1, 0.2)};
+  const PoseCorrection other{px * Vec3(-0.65, 0.55, 0.45), px * Vec3(-0.1, 0.2, -0.1)};
+  return corrected_rig(rig, {one, other, other, one});
+}
+
 TEST_F(PipelineTest, LinesAreNamedRightWithARigThatIsOff) {
-  const PoseCorrection one{{1.0, 1.4, -0.6}, {0.2, 0.2, 0.4}};
-  const PoseCorrection other{{-1.2, 1.0, 0.8}, {-0.2, 0.4, -0.2}};
-  const Rig wrong = corrected_rig(*rig_, {one, other, other, one});
   using Place = std::tuple<int, float, float>;
   std::map<Place, std::pair<int, int>> names;
   const auto truth = measure_points(*rig_, *frame_).points;
   for (const MeasuredPoint& p : truth) names[{p.camera, p.u, p.v}] = {p.projector, p.line};
-  std::size_t same = 0;
-  std::size_t other_name = 0;
-  for (const MeasuredPoint& p : measure_points(wrong, *frame_).points) {
-    const auto found = names.find({p.camera, p.u, p.v});
-    if (found == names.end()) continue;
-    ++(found->second == std::pair<int, int>(p.projector, p.line) ? same : other_name);
+  for (const double px : {1.0, 2.0, 4.0}) {
+    std::size_t same = 0;
+    std::size_t other_name = 0;
+    for (const MeasuredPoint& p : measure_points(rig_off_by(px, *rig_), *frame_).points) {
+      const auto found = names.find({p.camera, p.u, p.v});
+      if (found == names.end()) continue;
+      ++(found->second == std::pair<int, int>(p.projector, p.line) ? same : other_name);
+    }
+    EXPECT_GT(same, 9 * truth.size() / 10) << px;
+    EXPECT_LT(other_name, truth.size() / 200) << px;
   }
-  EXPECT_GT(same, 9 * truth.size() / 10);
-  EXPECT_LT(other_name, truth.size() / 200);
+}
+
+TEST_F(PipelineTest, RefinementFindsTheTolerancesThatNameMost) {
+  const Rig wrong = rig_off_by(4.5, *rig_);
+  const PointResult seen = detect_frame(wrong, *frame_);
+  const FrameCurves curves{seen.families, seen.graphs};
+  const TruthScene truth(ball(), *rig_);
+  // From 1 px alone half of the names are wrong, though the crossings agree.
+  const RigRefinement found = refine_rig_on_frames(wrong, {&curves, 1});
+  ASSERT_TRUE(found.report.refined) << found.report.reason;
+  const auto points = triangulate(found.rig, seen.graphs, found.labelings.front());
+  EXPECT_LT(label_figures(truth, points, judge_points(truth, points)).wrong.value(), 0.002);
 }
 
 TEST_F(PipelineTest, MissingCameraIsAWarningAndNotAFailure) {
