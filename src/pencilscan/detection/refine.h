@@ -11,8 +11,8 @@ struct RefineOptions {
   int rounds = 2;    ///< fits of all curves, from the second on with the others subtracted
   int half_arc = 4;  ///< profiles averaged on either side along the curve
   double end_amplitude_ratio = 0.6;  ///< a curve ends where its amplitude falls below this share
-                                      ///< of that 5 px further in
-  double max_sigma_px = 0.8;          ///< less certain points are dropped
+                                     ///< of that 5 px further in
+  double max_sigma_px = 0.8;         ///< less certain points are dropped
   int min_points = 6;
 };
 
