@@ -278,10 +278,11 @@ std::vector<Curve> refine_curves(const cv::Mat& presence, std::vector<Curve> cur
       for (const Curve& curve : curves) subtract_curve(curve, residual);
     }
     for (Curve& curve : curves) {
-      const Curve before = curve;
-      fit_curve(residual, round == 0, options.half_arc, curve);
+      const bool is_first = round == 0;
+      const Curve before = is_first ? Curve{} : curve;
+      fit_curve(residual, is_first, options.half_arc, curve);
       smooth_widths(curve.points);
-      if (round == 0) continue;
+      if (is_first) continue;
       // The curves beside it meet the new fit at once, which saves a round.
       render_curve(before, 1, residual);
       subtract_curve(curve, residual);

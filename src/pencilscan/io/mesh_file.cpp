@@ -204,8 +204,7 @@ void write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh) {
     if (has_confidence) append_little_endian(bytes, mesh.confidence[i]);
     if (has_hole) append_little_endian(bytes, mesh.hole[i]);
     if (has_color) {
-      for (const float linear : mesh.color[i])
-        append_little_endian(bytes, static_cast<std::uint8_t>(std::lround(255 * to_srgb(linear))));
+      for (const float linear : mesh.color[i]) append_little_endian(bytes, to_srgb_byte(linear));
     }
   }
   for (const auto& face : mesh.faces) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 
 namespace pencilscan {
 
@@ -9,6 +10,11 @@ namespace pencilscan {
 [[nodiscard]] inline double to_srgb(double linear) {
   const double x = std::clamp(linear, 0.0, 1.0);
   return x <= 0.0031308 ? 12.92 * x : 1.055 * std::pow(x, 1 / 2.4) - 0.055;
+}
+
+/// The same in 255 steps.
+[[nodiscard]] inline std::uint8_t to_srgb_byte(double linear) {
+  return static_cast<std::uint8_t>(std::lround(255 * to_srgb(linear)));
 }
 
 /// The way back.

@@ -176,7 +176,7 @@ Block mesh_block(const TriangleMesh& mesh, std::span<const float> distance_mm,
   if (!mesh.color.empty() && fine) {
     const auto channel = [&](std::size_t k) {
       return integers<std::uint8_t>(mesh.color, [k](const std::array<float, 3>& linear) {
-        return std::lround(255 * to_srgb(static_cast<double>(linear[k])));
+        return to_srgb_byte(static_cast<double>(linear[k]));
       });
     };
     block.add_bytes("red", channel(0));

@@ -25,23 +25,18 @@ ordered_json number(double value) {
 ordered_json camera_report(const Rig& rig, const Frame& frame, const PointResult& result,
                            std::size_t c) {
   const GridGraph& graph = result.graphs[c];
-  std::size_t curve_points = 0;
-  std::size_t labelled_points = 0;
   std::size_t without_crossing = 0;
   std::vector<float> sigmas;
   for (std::size_t k = 0; k < graph.curves.size(); ++k) {
-    curve_points += graph.curves[k].points.size();
     without_crossing += graph.component_of_curve[k] < 0;
     for (const CurvePoint& p : graph.curves[k].points) sigmas.push_back(p.sigma_px);
   }
-  for (const LabeledRun& run : result.labeling.runs[c])
-    labelled_points += static_cast<std::size_t>(run.end - run.begin);
   ordered_json report;
   report["name"] = rig.cameras[c].name;
   report["image"] = !frame.images[c].empty();
   report["curves"] = graph.curves.size();
-  report["curve_points"] = curve_points;
-  report["labelled_curve_points"] = labelled_points;
+  report["curve_points"] = sigmas.size();
+  report["labelled_curve_points"] = labelled_points(result.labeling.runs[c]);
   report["curves_without_crossing"] = without_crossing;
   report["crossings"] = graph.crossings.size();
   report["components"] = graph.component_count;

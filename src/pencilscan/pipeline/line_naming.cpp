@@ -41,15 +41,14 @@ std::string disagreement_warning(const CrossingDisagreement& crossings, bool lab
 
 LineNaming name_lines(const Rig& rig, const std::vector<ColorFamily>& families,
                       const std::vector<GridGraph>& graphs, const PointOptions& options) {
-  constexpr double kNearlyAll = 0.8;         // of the curves' points; right names reach .9 and more
-  constexpr double kClearlyMore = 1.1;       // points, of a rig that shows no error in itself
-  constexpr std::size_t kFewCrossings = 30;  // say nothing about the devices
+  constexpr double kNearlyAll = 0.8;    // of the curves' points; right names reach .9 and more
+  constexpr double kClearlyMore = 1.1;  // points, of a rig that shows no error in itself
   LineNaming result;
   result.labeling = solve(rig, families, graphs, options.solution);
   result.crossings = disagreement(rig, graphs, result.labeling);
   const bool is_off = disagrees(result.crossings);
   const auto points = static_cast<double>(labelled_points(result.labeling));
-  if (result.crossings.crossings < kFewCrossings) return result;
+  if (!are_enough(result.crossings)) return result;
   if (!is_off && points > kNearlyAll * static_cast<double>(curve_points(graphs))) return result;
 
   const FrameCurves curves{families, graphs};

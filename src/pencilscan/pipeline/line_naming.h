@@ -17,10 +17,8 @@ struct LineNaming {
 };
 
 /// Names the lines with the rig as given. Where their crossings then miss each other, or many
-/// curves stay without a name, also with rigs that the crossings correct (refine_rig_on_frames),
-/// from several tolerances: labels and rig can be wrong together in many ways, but only the right
-/// ones name nearly all curves. The naming of most points wins that the crossings do not
-/// contradict.
+/// curves stay without a name, with the rig as the crossings correct it (refine_rig_on_frames), if
+/// its own crossings agree.
 [[nodiscard]] LineNaming name_lines(const Rig& rig, const std::vector<ColorFamily>& families,
                                     const std::vector<GridGraph>& graphs,
                                     const PointOptions& options);

@@ -199,10 +199,14 @@ CrossingDisagreement crossing_disagreement(const Rig& rig, std::span<const Cross
           upper_median(std::move(noises)) / kDeviationPerMedian};
 }
 
+bool are_enough(const CrossingDisagreement& crossings) {
+  constexpr std::size_t kEnough = 30;
+  return crossings.crossings >= kEnough;
+}
+
 bool disagrees(const CrossingDisagreement& crossings) {
-  constexpr std::size_t kEnough = 30;  // below, the median is chance
   constexpr double kFactor = 2;
-  return crossings.crossings >= kEnough &&
+  return are_enough(crossings) &&
          crossings.median_px > kFactor * std::max(0.05, crossings.expected_px);
 }
 

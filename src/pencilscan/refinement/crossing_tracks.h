@@ -63,6 +63,9 @@ struct CrossingDisagreement {
 [[nodiscard]] CrossingDisagreement crossing_disagreement(const Rig& rig,
                                                          std::span<const CrossingTrack> tracks);
 
+/// True when there are so many crossings that their median is no chance.
+[[nodiscard]] bool are_enough(const CrossingDisagreement& crossings);
+
 /// True when the crossings disagree by more than noise and the labels' own tolerance explain: the
 /// devices stand elsewhere than the rig says.
 [[nodiscard]] bool disagrees(const CrossingDisagreement& crossings);

@@ -166,11 +166,15 @@ float JointOptions::disagreement_cost() const {
   return static_cast<float>(-std::log(crossing_outliers));
 }
 
+std::size_t labelled_points(std::span<const LabeledRun> runs) {
+  std::size_t count = 0;
+  for (const LabeledRun& run : runs) count += static_cast<std::size_t>(run.end - run.begin);
+  return count;
+}
+
 std::size_t labelled_points(const Labeling& labeling) {
   std::size_t count = 0;
-  for (const auto& runs : labeling.runs) {
-    for (const LabeledRun& run : runs) count += static_cast<std::size_t>(run.end - run.begin);
-  }
+  for (const auto& runs : labeling.runs) count += labelled_points(runs);
   return count;
 }
 

@@ -69,7 +69,8 @@ struct Labeling {
   std::vector<std::vector<UndecidedRun>> undecided;  ///< per camera; joint only
 };
 
-/// Points of all labelled runs.
+[[nodiscard]] std::size_t labelled_points(std::span<const LabeledRun> runs);
+/// Of all cameras.
 [[nodiscard]] std::size_t labelled_points(const Labeling& labeling);
 
 /// Points of undecided runs that no labelled run holds, per reason (the order of the enum).

@@ -119,7 +119,7 @@ HoleReason explain_vertex(const Rig& rig, const Visibility& visibility,
     const auto c = static_cast<std::size_t>(map.camera);
     const auto pixel = rig.cameras[c].project(x);
     if (!pixel || !rig.cameras[c].contains(*pixel)) continue;
-    if (!sees(visibility.scene(), rig.cameras[c].center(), x, normal, 0.02)) continue;
+    if (!sees(visibility.scene(), rig.cameras[c].center(), x, normal, kLeastSightCosine)) continue;
     HoleReason reason = visibility.reason(c, x, normal, lit);
     const int column = static_cast<int>(std::lround((*pixel)[0] / map.stride));
     const int row = static_cast<int>(std::lround((*pixel)[1] / map.stride));

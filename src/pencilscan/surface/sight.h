@@ -7,6 +7,9 @@ namespace pencilscan {
 /// Keeps a ray's end off the surface it lies on, mm.
 inline constexpr double kOffSurfaceMm = 0.5;
 
+/// Cosine below which a surface is seen too flat for a pixel to say anything of it.
+inline constexpr double kLeastSightCosine = 0.02;
+
 /// True when nothing stands between `eye` and the place x of the scene's surface, which shows its
 /// front (normal) at a cosine of at least least_cosine.
 [[nodiscard]] inline bool sees(const RayScene& scene, const Vec3& eye, const Vec3& x,

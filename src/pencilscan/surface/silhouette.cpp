@@ -14,7 +14,6 @@
 namespace pencilscan {
 namespace {
 
-constexpr double kLeastSightCosine = 0.02;  // cosine; beyond, a pixel says nothing of a vertex
 constexpr int kSmoothings = 6;      // per round: fewer leave folds where the moved part ends
 constexpr int kRoundsPerScene = 4;  // shadows of a few rounds ago are good enough
 
