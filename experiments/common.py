@@ -39,6 +39,10 @@ def arguments(name, description, **numbers):
     if not args.program.exists():
         parser.error(f"{args.program} is missing: script/build")
     args.out.mkdir(parents=True, exist_ok=True)
+    title, _, text = description.strip().partition("\n")
+    about = {"name": name, "title": title.rstrip("."), "text": " ".join(text.split()),
+             "setting": "small" if args.small else "full"}
+    (args.out / "experiment.json").write_text(json.dumps(about, indent=1) + "\n")
     return args
 
 

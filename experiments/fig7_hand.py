@@ -109,6 +109,7 @@ def run(args):
                     keep = shown_folder(args, series)
                     shutil.rmtree(keep, ignore_errors=True)
                     shutil.copytree(out / "000000", keep)
+                    shutil.copy(rig, keep / "rig.json")
         common.progress(f"fig7_hand: fingers of {thickness} mm")
     return rows
 

@@ -61,7 +61,7 @@ export function tiles(list: Tile[]): HTMLElement {
 
 export function table(head: string[], rows: (string | number)[][], caption: string): HTMLElement {
   return h('div', {class: 'table-holder', tabindex: 0, role: 'region', 'aria-label': caption},
-    h('table', {}, h('caption', {}, caption),
+    h('table', {}, h('caption', {}, h('span', {}, caption)),
       h('thead', {}, h('tr', {}, ...head.map((text) => h('th', {scope: 'col'}, text)))),
       h('tbody', {}, ...rows.map((row) => h('tr', {}, ...row.map((cell, i) =>
         i === 0 ? h('th', {scope: 'row'}, cell) : h('td', {}, cell)))))));

@@ -39,6 +39,48 @@ export interface CalibrationEntry {
   broken?: string;
 }
 
+/** Texts as they stand in a Markdown or CSV file. */
+export interface TableJson {
+  file: string;
+  title: string;
+  header: string[];
+  rows: string[][];
+  total: number; // rows of the file
+}
+
+export interface PictureJson {
+  file: string;
+  group: string; // its folder; empty: the experiment's
+  kind: 'still' | 'drawing' | 'moving' | 'video';
+  type: string;
+  part: number;
+  packed?: boolean; // compressed
+  width?: number; // px, of the file
+  height?: number;
+}
+
+export interface RunJson {
+  folder: string;
+  kind: 'frame' | 'scan' | 'calibration';
+  report?: boolean; // has a report.html
+  summary?: Record<string, number>;
+  verdict?: string;
+  broken?: string;
+}
+
+export interface ExperimentJson {
+  name?: string;
+  title?: string;
+  text?: string;
+  setting?: string;
+  tables: TableJson[];
+  pictures: PictureJson[];
+  runs: RunJson[];
+  commands: string[];
+  commands_total?: number;
+  missing: {what: string; why: string}[];
+}
+
 export interface IndexJson {
   mode: 'report' | 'view';
   program: string;
@@ -47,6 +89,7 @@ export interface IndexJson {
   results: ResultJson[];
   failed: string[];
   calibrations: CalibrationEntry[];
+  experiment: ExperimentJson | null;
 }
 
 export interface HistogramJson {
@@ -155,7 +198,12 @@ export class Source {
     return this.index.results[result]?.parts.includes(part) ?? false;
   }
 
-  private async bytes(result: number, part: string): Promise<Uint8Array<ArrayBuffer>> {
+  /** A picture of the experiment. */
+  picture(part: number): Promise<Uint8Array<ArrayBuffer>> {
+    return this.bytes('experiment', String(part));
+  }
+
+  private async bytes(result: number | 'experiment', part: string): Promise<Uint8Array<ArrayBuffer>> {
     if (this.index.mode === 'report') {
       const element = document.getElementById(`part/${result}/${part}`);
       if (!element) throw new Error(`${part} is not in this report`);

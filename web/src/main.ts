@@ -2,6 +2,7 @@ import {App} from './app';
 import {showCalibrations} from './calibration';
 import {Source} from './data';
 import {byId, format, h, percent} from './dom';
+import {showExperiment} from './experiment';
 import {Figures} from './figures';
 import {Images} from './images';
 import {Inspector} from './inspector';
@@ -66,17 +67,16 @@ function start(): void {
   new Timeline(app, viewer);
   themeButton(app);
   showCalibrations(app);
+  showExperiment(app);
   const nothing = index.results.length === 0;
   document.body.classList.toggle('without-results', nothing);
-  if (nothing) document.querySelector('.skip')!.setAttribute('href', '#calibration-section');
+  if (nothing) document.querySelector('.skip')!.setAttribute('href', index.experiment ? '#experiment-section' : '#calibration-section');
   if (nothing) {
-    const text = index.calibrations.length ? '' :
+    const text = index.calibrations.length || index.experiment ? '' :
       'This folder holds no result: no points.ply, mesh.ply or report.json of a frame was found in it or in its folders.';
-    byId('nothing').textContent = text;
-    byId('nothing').hidden = text === '';
-    if (index.failed.length) {
-      byId('nothing').textContent += ` Frames without a result: ${index.failed.join(', ')}.`;
-    }
+    const failed = index.failed.length ? `Frames without a result: ${index.failed.join(', ')}.` : '';
+    byId('nothing').textContent = [text, failed].filter(Boolean).join(' ');
+    byId('nothing').hidden = !text && !failed;
   } else {
     // The first one that has everything: of long sequences, some have their shape only.
     app.show(Math.max(0, index.results.findIndex((result) => result.detail !== 'shape')));

@@ -100,7 +100,7 @@ export class Timeline {
 
   private async toggle(): Promise<void> {
     this.playing = !this.playing;
-    this.play.textContent = this.playing ? '⏸ Pause' : '▶ Play';
+    this.play.textContent = this.playing ? '▮▮ Pause' : '▶ Play';
     if (!this.playing) {
       this.app.show(this.at); // with all that belongs to it
       return;

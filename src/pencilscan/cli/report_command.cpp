@@ -49,7 +49,10 @@ void add_report_command(CLI::App& app) {
   auto options = std::make_shared<ReportOptions>();
   CLI::App* command = app.add_subcommand(
       "report", "One HTML file of an output folder, to look at in any browser and to mail.");
-  command->add_option("folder", options->folder, "output folder of reconstruct or calibrate")
+  command
+      ->add_option("folder", options->folder,
+                   "output folder of reconstruct, calibrate, scan or an experiment, or a folder of "
+                   "several runs")
       ->required();
   command->add_option("--out", options->out, "the file; default: <folder>/report.html");
   command->add_option("--title", options->page.title, "default: the folder's name");

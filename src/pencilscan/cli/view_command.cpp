@@ -53,7 +53,10 @@ void add_view_command(CLI::App& app) {
   auto options = std::make_shared<ViewCommandOptions>();
   CLI::App* command = app.add_subcommand(
       "view", "The report with the full data, for a browser on this computer (Ctrl-C stops).");
-  command->add_option("folder", options->folder, "output folder of reconstruct or calibrate")
+  command
+      ->add_option("folder", options->folder,
+                   "output folder of reconstruct, calibrate, scan or an experiment, or a folder of "
+                   "several runs")
       ->required();
   command->add_option("--port", options->view.port, "on 127.0.0.1; 0: any free one")
       ->check(CLI::Range(0, 65535))

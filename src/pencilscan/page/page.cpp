@@ -140,14 +140,14 @@ ShapePlan plan_shapes(const PageData& data, std::size_t sample, double bytes) {
 }
 
 /// All results, each in the detail that there is room for.
-std::vector<Collected> collect_all(const PageData& data, const PageOptions& options,
+std::vector<Collected> collect_all(const PageData& data, std::size_t max_bytes,
                                    const Progress& progress) {
   const std::size_t count = data.size();
   std::vector<Collected> collected(count);
   if (count == 0) return collected;
   if (progress) progress("reading results", 0);
   const auto number = static_cast<double>(count);
-  const double room = static_cast<double>(options.max_bytes) - 1e6;  // 1 MB: the page itself
+  const double room = static_cast<double>(max_bytes) - 1e6;  // 1 MB: the page itself
   constexpr double kShareOfShapes = 0.6;
   // Few results are all whole, if need be in less detail; of many, some are, and at least one.
   constexpr std::size_t kFew = 6;
@@ -186,6 +186,23 @@ std::vector<Collected> collect_all(const PageData& data, const PageOptions& opti
   return collected;
 }
 
+constexpr std::size_t kLeast = 1'000'000;  ///< bytes for results, whatever else there is
+
+std::size_t embedded_bytes(const ExperimentPage& experiment) {
+  std::size_t sum = 0;
+  for (const std::string& picture : experiment.pictures) sum += picture.size() * 4 / 3 + 80;
+  return sum;
+}
+
+/// Pictures may take most of the page where they are all there is, and else a third.
+ExperimentDetail experiment_detail(const PageData& data, std::size_t max_bytes) {
+  const auto bytes = static_cast<double>(max_bytes);
+  ExperimentDetail detail;
+  detail.max_bytes =
+      static_cast<std::size_t>(data.size() == 0 ? std::max(0.2 * bytes, bytes - 1.2e6) : bytes / 3);
+  return detail;
+}
+
 }  // namespace
 
 PageData::PageData(const fs::path& root, const PageOptions& options) : options_(options) {
@@ -195,6 +212,16 @@ PageData::PageData(const fs::path& root, const PageOptions& options) : options_(
       throw InputError(path.string(), "", "", "no such file or folder");
   }
   folder_ = find_results(root, options.sources);
+  experiment_ = find_experiment(root);
+  if (experiment_) {  // what the page shows whole need not be named
+    std::erase_if(experiment_->runs, [&](const fs::path& run) {
+      const auto is_run = [&](const ResultEntry& entry) { return entry.folder == run; };
+      const auto& calibrations = folder_.calibrations;
+      return std::any_of(folder_.results.begin(), folder_.results.end(), is_run) ||
+             std::find(calibrations.begin(), calibrations.end(), run / "calibration.json") !=
+                 calibrations.end();
+    });
+  }
   for (const ResultEntry& entry : folder_.results) {
     if (entry.rig.empty()) {
       rig_of_result_.push_back(-1);
@@ -238,7 +265,13 @@ ordered_json PageData::entry(std::size_t result, ResultReader& reader,
   return entry;
 }
 
-ordered_json PageData::index(const std::string& mode, std::vector<ordered_json> entries) const {
+std::optional<ExperimentPage> PageData::experiment(const ExperimentDetail& detail) const {
+  if (!experiment_) return std::nullopt;
+  return read_experiment(*experiment_, detail);
+}
+
+ordered_json PageData::index(const std::string& mode, std::vector<ordered_json> entries,
+                             const ordered_json& experiment) const {
   ordered_json index = {{"format", "pencilscan-page/1"},
                         {"mode", mode},
                         {"program", options_.program},
@@ -251,6 +284,7 @@ ordered_json PageData::index(const std::string& mode, std::vector<ordered_json> 
   }
   index["rigs"] = rig_jsons_;
   index["results"] = std::move(entries);
+  index["experiment"] = experiment;
   index["failed"] = ordered_json::array();
   for (const fs::path& path : folder_.failed)
     index["failed"].push_back(fs::relative(path, folder_.root).string());
@@ -270,7 +304,10 @@ ordered_json PageData::index(const std::string& mode, std::vector<ordered_json> 
 PageReport write_report(const fs::path& root, const fs::path& file, const PageOptions& options,
                         const Progress& progress) {
   const PageData data(root, options);
-  const std::vector<Collected> collected = collect_all(data, options, progress);
+  const auto experiment = data.experiment(experiment_detail(data, options.max_bytes));
+  const std::size_t taken = experiment ? embedded_bytes(*experiment) : 0;
+  const std::vector<Collected> collected =
+      collect_all(data, options.max_bytes - std::min(taken, options.max_bytes - kLeast), progress);
   const std::size_t count = collected.size();
   PageReport report;
   report.results = count;
@@ -284,8 +321,14 @@ PageReport write_report(const fs::path& root, const fs::path& file, const PageOp
       report.missing.push_back(data.folder().results[i].name + ": " + missing.what + ": " +
                                missing.why);
   }
+  if (experiment) {
+    for (const auto& missing : experiment->json["missing"])
+      report.missing.push_back(missing["what"].get<std::string>() + ": " +
+                               missing["why"].get<std::string>());
+  }
   const PageAssets assets = page_assets();
-  const std::string index = script_json(data.index("report", std::move(entries)));
+  const std::string index = script_json(
+      data.index("report", std::move(entries), experiment ? experiment->json : ordered_json()));
   write_atomically(file, [&](std::ostream& stream) {
     stream << assets.head;
     for (std::size_t i = 0; i < count; ++i) {
@@ -293,6 +336,10 @@ PageReport write_report(const fs::path& root, const fs::path& file, const PageOp
         stream << "<script type=\"text/plain\" id=\"part/" << i << "/" << part.name << "\">"
                << base64(part.bytes) << "</script>\n";
       }
+    }
+    for (std::size_t i = 0; experiment && i < experiment->pictures.size(); ++i) {
+      stream << "<script type=\"text/plain\" id=\"part/experiment/" << i << "\">"
+             << base64(experiment->pictures[i]) << "</script>\n";
     }
     stream << assets.middle << index << assets.tail;
   });

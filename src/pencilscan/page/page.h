@@ -3,10 +3,12 @@
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "pencilscan/core/progress.h"
+#include "pencilscan/page/experiment.h"
 #include "pencilscan/page/result_folder.h"
 #include "pencilscan/page/result_reader.h"
 
@@ -37,17 +39,22 @@ class PageData {
   [[nodiscard]] std::size_t size() const { return folder_.results.size(); }
   /// A reader of one result.
   [[nodiscard]] std::unique_ptr<ResultReader> open(std::size_t result, const Detail& detail) const;
-  /// The index of the page: devices, and per result what `entries` holds. mode: report or view.
+  /// The index of the page: devices, per result what `entries` holds, and what is known of the
+  /// experiment (null: none). mode: report or view.
   [[nodiscard]] nlohmann::ordered_json index(const std::string& mode,
-                                             std::vector<nlohmann::ordered_json> entries) const;
+                                             std::vector<nlohmann::ordered_json> entries,
+                                             const nlohmann::ordered_json& experiment = {}) const;
   /// One entry of the index.
   [[nodiscard]] nlohmann::ordered_json entry(std::size_t result, ResultReader& reader,
                                              const std::vector<std::string>& parts) const;
   [[nodiscard]] const ResultFolder& folder() const { return folder_; }
+  /// The experiment whose folder it is, read; nothing for other folders.
+  [[nodiscard]] std::optional<ExperimentPage> experiment(const ExperimentDetail& detail) const;
 
  private:
   PageOptions options_;
   ResultFolder folder_;
+  std::optional<ExperimentFolder> experiment_;
   std::vector<std::filesystem::path> rig_paths_;   ///< distinct ones
   std::vector<std::shared_ptr<const Rig>> rigs_;   ///< null where unreadable
   std::vector<nlohmann::ordered_json> rig_jsons_;  ///< null where unreadable

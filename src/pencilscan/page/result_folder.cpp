@@ -11,25 +11,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A frame's folder has points or the report of a frame; `truth/` has a mesh only.
-bool holds_result(const fs::path& folder) {
-  if (is_file(folder / "points.ply") || is_file(folder / "mesh_measured.ply")) return true;
-  return is_file(folder / "report.json") &&
-         (is_file(folder / "timing.json") || is_file(folder / "mesh.ply"));
-}
-
-std::vector<fs::path> folders_in(const fs::path& folder) {
-  std::vector<fs::path> folders;
-  std::error_code error;
-  for (fs::directory_iterator it(folder, fs::directory_options::skip_permission_denied, error), end;
-       !error && it != end; it.increment(error)) {
-    std::error_code ignored;
-    if (it->is_directory(ignored) && !it->is_symlink(ignored)) folders.push_back(it->path());
-  }
-  std::sort(folders.begin(), folders.end());
-  return folders;
-}
-
 fs::path first_file(std::initializer_list<fs::path> candidates) {
   for (const fs::path& path : candidates) {
     if (is_file(path)) return path;
@@ -78,6 +59,25 @@ bool looks_like_frame(const fs::path& folder) {
 }
 
 }  // namespace
+
+/// A frame's folder has points or the report of a frame; `truth/` has a mesh only.
+bool holds_result(const fs::path& folder) {
+  if (is_file(folder / "points.ply") || is_file(folder / "mesh_measured.ply")) return true;
+  return is_file(folder / "report.json") &&
+         (is_file(folder / "timing.json") || is_file(folder / "mesh.ply"));
+}
+
+std::vector<fs::path> folders_in(const fs::path& folder) {
+  std::vector<fs::path> folders;
+  std::error_code error;
+  for (fs::directory_iterator it(folder, fs::directory_options::skip_permission_denied, error), end;
+       !error && it != end; it.increment(error)) {
+    std::error_code ignored;
+    if (it->is_directory(ignored) && !it->is_symlink(ignored)) folders.push_back(it->path());
+  }
+  std::sort(folders.begin(), folders.end());
+  return folders;
+}
 
 ResultFolder find_results(const fs::path& root, const ResultSources& sources) {
   std::error_code ignored;

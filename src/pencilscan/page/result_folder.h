@@ -38,4 +38,9 @@ struct ResultFolder {
 [[nodiscard]] ResultFolder find_results(const std::filesystem::path& root,
                                         const ResultSources& sources = {});
 
+/// True for a folder that itself holds the result of a frame or a scan.
+[[nodiscard]] bool holds_result(const std::filesystem::path& folder);
+/// The folders directly in a folder, ordered by name; no links.
+[[nodiscard]] std::vector<std::filesystem::path> folders_in(const std::filesystem::path& folder);
+
 }  // namespace pencilscan

@@ -230,7 +230,8 @@ ordered_json ResultReader::details() {
     if (const auto* points = files_.points()) input.points = *points;
     const auto measured = files_.entry().folder / "mesh_measured.ply";
     if (files_.measured() != nullptr) input.mesh = read_mesh(measured);
-    result["figures"] = figures_json(evaluate(truth->mesh(), *rig_, input), *rig_);
+    evaluated_ = figures_json(evaluate(truth->mesh(), *rig_, input), *rig_);
+    result["figures"] = evaluated_;
   }
   return result;
 }
@@ -254,9 +255,10 @@ ordered_json ResultReader::summary() {
   if (report != nullptr && report->is_object() && report->contains("warnings"))
     summary["warnings"] = (*report)["warnings"].size();
   take(files_.timing(), {"seconds", "total"});
+  const json* figures = files_.figures();
   for (const char* key : {"label_error", "line_recall", "line_recall_3_5px", "distance_median_mm",
                           "completeness_1mm"}) {
-    take(files_.figures(), {key});
+    take(figures != nullptr ? figures : &evaluated_, {key});
   }
   return summary;
 }

@@ -35,7 +35,8 @@ class ResultReader {
   [[nodiscard]] std::vector<std::string> part_names() const;
   /// The bytes of a part: compressed JSON (details), an image (thumb, image, holes), or a Block.
   [[nodiscard]] std::optional<std::string> part(const std::string& name);
-  /// A few numbers of report.json for lists and timelines.
+  /// A few numbers of report.json for lists and timelines; figures against the truth where a file
+  /// has them or the part "details" was made before.
   [[nodiscard]] nlohmann::ordered_json summary();
   /// True for points and a surface alone, as `scan` writes them: `line` is a column or row of the
   /// panel then.
@@ -60,6 +61,7 @@ class ResultReader {
   ResultFiles files_;
   mutable std::mutex mutex_;  ///< guards everything above while a part is made
   std::vector<Missing> missing_;
+  nlohmann::json evaluated_;  ///< figures, once details() has computed them
 };
 
 }  // namespace pencilscan

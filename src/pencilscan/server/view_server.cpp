@@ -19,8 +19,8 @@ namespace fs = std::filesystem;
 
 constexpr const char* kPolicy =
     "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
-    "img-src 'self' data: blob:; connect-src 'self'; base-uri 'none'; form-action 'none'; "
-    "frame-ancestors 'none'";
+    "img-src 'self' data: blob:; media-src blob:; connect-src 'self'; base-uri 'none'; "
+    "form-action 'none'; frame-ancestors 'none'";
 constexpr std::size_t kOpenReaders = 4;
 constexpr std::size_t kPlayFaces = 20'000;  ///< of a mesh while a sequence plays
 
@@ -83,11 +83,12 @@ void fail(httplib::Response& response, int status, const std::string& why) {
 
 struct ViewServer::State {
   State(const fs::path& folder, const PageOptions& options)
-      : root(folder), data(folder, options), readers(data) {}
+      : root(folder), data(folder, options), readers(data), experiment(data.experiment({})) {}
 
   void add_routes();
   void answer_part(const httplib::Request& request, httplib::Response& response);
   void answer_list(const httplib::Request& request, httplib::Response& response);
+  void answer_picture(const httplib::Request& request, httplib::Response& response);
   void answer_file(const httplib::Request& request, httplib::Response& response);
   std::string make_page() const;
   bool names_this_host(const httplib::Request& request) const;
@@ -97,6 +98,7 @@ struct ViewServer::State {
   fs::path root;
   PageData data;
   Readers readers;
+  std::optional<ExperimentPage> experiment;
   httplib::Server server;
   int port = 0;
   std::string page;
@@ -108,7 +110,8 @@ std::string ViewServer::State::make_page() const {
     const auto reader = data.open(i, full_detail(data.size()));
     entries.push_back(data.entry(i, *reader, reader->part_names()));
   }
-  return served_page(data.index("view", std::move(entries)));
+  return served_page(data.index("view", std::move(entries),
+                                experiment ? experiment->json : nlohmann::ordered_json()));
 }
 
 bool ViewServer::State::names_this_host(const httplib::Request& request) const {
@@ -154,6 +157,16 @@ void ViewServer::State::answer_list(const httplib::Request& request, httplib::Re
   response.set_content(list.dump(), "application/json");
 }
 
+/// As bytes only: a drawing that is opened by its address must not run as a page of this server.
+void ViewServer::State::answer_picture(const httplib::Request& request,
+                                       httplib::Response& response) {
+  const std::string digits = request.matches[1];
+  const std::size_t count = experiment ? experiment->pictures.size() : 0;
+  const std::size_t index = digits.size() > 9 ? count : std::stoul(digits);
+  if (index >= count) return fail(response, 404, "no such picture");
+  response.set_content(experiment->pictures[index], "application/octet-stream");
+}
+
 void ViewServer::State::answer_file(const httplib::Request& request, httplib::Response& response) {
   const auto file = file_inside(root, request.matches[1]);
   if (!file) return fail(response, 404, "no such file in this folder");
@@ -189,6 +202,8 @@ void ViewServer::State::add_routes() {
   });
   server.Get(R"(/part/(\d+)/([a-z]+(?:/\d+)?))",
              [this](const auto& request, auto& response) { answer_part(request, response); });
+  server.Get(R"(/part/experiment/(\d+))",
+             [this](const auto& request, auto& response) { answer_picture(request, response); });
   server.Get(R"(/list/(\d+))",
              [this](const auto& request, auto& response) { answer_list(request, response); });
   server.Get(R"(/files/(.+))",
