@@ -4,6 +4,7 @@
 import type {App} from './app';
 import {table, tiles, type Tile} from './charts';
 import {dig, digList, digNumber, type CalibrationEntry, type Json} from './data';
+import {devicesInSpace} from './calibration3d';
 import {byId, format, h, percent, svg} from './dom';
 import {css, sequential} from './palette';
 
@@ -31,23 +32,46 @@ function devicesOf(report: Json): Calibrated[] {
 
 const kMeaning: Record<string, string> = {
   good: 'Nothing speaks against using this rig.',
-  doubtful: 'The rig was written; look at the reasons before relying on it.',
-  unusable: 'No rig was written.',
+  doubtful: 'A rig was written. Look at the reasons before relying on it.',
+  unusable: 'No rig was written. What is shown below is the attempt that was judged.',
 };
+
+type Severity = 'good' | 'unsure' | 'bad';
+const severityOf = (word: string): Severity =>
+  /unusable|bad|fail|poor|refus/i.test(word) ? 'bad' : /^(good|usable|ok|fine|pass)/i.test(word) ? 'good' : 'unsure';
+const kOrder: Severity[] = ['bad', 'unsure', 'good'];
+const kMark = {bad: '✕', unsure: '!', good: '✓'};
+const kWord = {bad: 'unusable', unsure: 'doubtful', good: 'note'};
+
+/** A sentence's first letter, unless it begins with the name of a parameter; options stay whole. */
+function sentence(text: string, begins = true): (string | HTMLElement)[] {
+  const begun = !begins || /^[fc][xy]\b|^[kp]\d\b/.test(text) ? text : text.charAt(0).toUpperCase() + text.slice(1);
+  return begun.split(/(--[a-z][a-z-]*)/).map((part, i) => (i % 2 ? h('code', {}, part) : part));
+}
+
+/** What was found, the gravest first, each with what to do about it. */
+function findings(reasons: Json[], verdict: Severity): HTMLElement | null {
+  if (!reasons.length) return null;
+  const list = reasons.map((r) => {
+    const grade = textOf(dig(r, 'grade'));
+    return {text: textOf(r) || textOf(dig(r, 'what')) || JSON.stringify(r), advice: textOf(dig(r, 'advice')),
+      severity: grade ? severityOf(grade) : verdict};
+  }).sort((x, y) => kOrder.indexOf(x.severity) - kOrder.indexOf(y.severity));
+  return h('ul', {class: 'findings'}, ...list.map(({text, advice, severity}) =>
+    h('li', {class: severity}, h('span', {class: 'grade'}, kWord[severity]),
+      h('div', {}, h('p', {class: 'what'}, ...sentence(text)),
+        advice ? h('p', {class: 'advice'}, h('strong', {}, 'What to do: '), ...sentence(advice, false)) : null))));
+}
 
 function verdict(report: Json): HTMLElement {
   const stated = dig(report, 'verdict');
   const word = textOf(stated) || textOf(dig(stated, 'word')) || textOf(dig(stated, 'status')) || 'no verdict stated';
-  const bad = /unusable|bad|fail|poor|refus/i.test(word);
-  const good = /^(good|usable|ok|fine|pass)/i.test(word);
+  const severity = severityOf(word);
   const reasons = [...digList(report, 'reasons'), ...digList(stated, 'reasons'), ...digList(report, 'warnings')];
-  return h('div', {class: `verdict ${bad ? 'bad' : good ? '' : 'unsure'}`, role: 'status'},
-    h('p', {}, h('strong', {}, `Verdict: ${word}`), kMeaning[word] ? ` ${kMeaning[word]}` : ''),
-    reasons.length ? h('ul', {}, ...reasons.map((r) => {
-      const advice = textOf(dig(r, 'advice'));
-      return h('li', {}, textOf(r) || textOf(dig(r, 'what')) || JSON.stringify(r),
-        advice ? h('span', {class: 'advice'}, ` → ${advice}`) : null);
-    })) : null);
+  return h('div', {class: `verdict large ${severity}`, role: 'status'},
+    h('p', {class: 'verdict-word'}, h('span', {class: 'mark', 'aria-hidden': 'true'}, kMark[severity]),
+      h('span', {}, h('strong', {}, `Verdict: ${word}`), kMeaning[word] ? h('span', {class: 'meaning'}, kMeaning[word]) : null)),
+    findings(reasons, severity));
 }
 
 function keyFigures(report: Json, unit: string): HTMLElement {
@@ -99,7 +123,7 @@ function residualChart(device: Calibrated, high: number): HTMLElement | null {
   const rms = digNumber(device.json, 'rms_px');
   const magnified = width / 25 / high;
   const stride = Math.ceil(residuals.length / 1500);
-  const words = `median ${format(median)} px${rms === undefined ? '' : `, RMS ${format(rms)} px`}`;
+  const words = `median ${format(median, 2)} px${rms === undefined ? '' : `, RMS ${format(rms, 2)} px`}`;
   const picture = svg('svg', {viewBox: `0 0 ${width} ${height}`, role: 'img', class: 'residuals',
     'aria-label': `${device.name}: residuals over the image, ${words}`});
   picture.append(svg('rect', {x: 0, y: 0, width, height, class: 'image-area'}));
@@ -142,22 +166,27 @@ function edgesOf(report: Json): Edge[] {
 function overlapGraph(edges: Edge[]): HTMLElement | null {
   if (!edges.length) return null;
   const names = [...new Set(edges.flatMap(({a, b}) => [a, b]))].sort();
+  // Two lie beside each other, more on a circle.
+  const [start, height] = names.length === 2 ? [-Math.PI, 110] : [-Math.PI / 2, 330];
   const at = (name: string) => {
-    const angle = (2 * Math.PI * names.indexOf(name)) / names.length - Math.PI / 2;
-    return [210 + 135 * Math.cos(angle), 165 + 135 * Math.sin(angle)];
+    const angle = (2 * Math.PI * names.indexOf(name)) / names.length + start;
+    return [210 + 135 * Math.cos(angle), height / 2 + 135 * Math.sin(angle)];
   };
   const most = Math.max(1, ...edges.map((e) => e.shared));
-  const picture = svg('svg', {viewBox: '0 0 420 330', role: 'img', class: 'overlap', 'aria-label':
+  const picture = svg('svg', {viewBox: `0 0 420 ${height}`, role: 'img', class: 'overlap', 'aria-label':
     `Shared points: ${edges.map((e) => `${e.a} and ${e.b} ${e.shared}`).join(', ')}`});
   for (const {a, b, shared} of edges) {
     const [[x1, y1], [x2, y2]] = [at(a), at(b)];
     picture.append(svg('line', {x1, y1, x2, y2, class: shared > 0 ? 'edge' : 'edge none',
       'stroke-width': 0.6 + (7 * shared) / most}, svg('title', {}, `${a} – ${b}: ${format(shared)}`)));
+    if (edges.length <= 3) {
+      picture.append(svg('text', {x: (x1 + x2) / 2, y: (y1 + y2) / 2 - 10, 'text-anchor': 'middle'}, format(shared)));
+    }
   }
   for (const name of names) {
     const [x, y] = at(name);
     picture.append(svg('circle', {cx: x, cy: y, r: 7, class: 'node'}),
-      svg('text', {x, y: y + (y < 165 ? -13 : 22), 'text-anchor': 'middle'}, name));
+      svg('text', {x, y: y + (y < height / 2 ? -13 : 22), 'text-anchor': 'middle'}, name));
   }
   return h('figure', {class: 'chart'}, h('figcaption', {}, h('strong', {}, 'Overlap'),
     ' the more points two devices share, the thicker their line'), picture);
@@ -227,7 +256,7 @@ function parameterTable(devices: Calibrated[], unit: string): HTMLElement | null
     'Parameters with one standard deviation (px; given: taken over, not adjusted)');
 }
 
-function showOne(root: HTMLElement, entry: CalibrationEntry): void {
+function showOne(app: App, root: HTMLElement, entry: CalibrationEntry): void {
   if (!entry.report) {
     root.append(h('p', {class: 'verdict bad'}, `${entry.file} cannot be read: ${entry.broken ?? 'unknown reason'}`));
     return;
@@ -238,7 +267,9 @@ function showOne(root: HTMLElement, entry: CalibrationEntry): void {
   const edges = edgesOf(report);
   const high = commonScale(devices);
   const residuals = devices.map((device) => residualChart(device, high)).filter((x) => x !== null);
-  const shared = [overlapGraph(edges), overlapTable(edges, report)].filter((x) => x !== null);
+  const projectors = new Set(edges.map(({b}) => b));
+  const space = devicesInSpace(devices, report, (name) => projectors.has(name), (paint) => app.on('theme', paint));
+  const shared = [space, overlapGraph(edges), overlapTable(edges, report)].filter((x) => x !== null);
   root.append(verdict(report), keyFigures(report, unit));
   if (shared.length) root.append(h('div', {class: 'grid wide'}, ...shared));
   if (residuals.length) root.append(residualLegend(high), h('div', {class: 'grid'}, ...residuals));
@@ -255,6 +286,6 @@ export function showCalibrations(app: App): void {
   const root = byId('calibration');
   for (const entry of calibrations) {
     if (calibrations.length > 1) root.append(h('h3', {}, entry.file));
-    showOne(root, entry);
+    showOne(app, root, entry);
   }
 }

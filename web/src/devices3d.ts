@@ -43,8 +43,8 @@ function frustum(device: Device, size: number, color: number): LineSegments {
   return new LineSegments(geometry, new LineBasicMaterial({color}));
 }
 
-/** All frusta with names. ink: of text and cameras, CSS and number. */
-export function drawDevices(rig: RigJson, ink: string): Group {
+/** All frusta with names. ink: of cameras, "#rrggbb"; of projectors, whose light is not known, too. */
+export function drawDevices(rig: RigJson, ink: string, projectorInk?: Rgb): Group {
   const group = new Group();
   const center = rig.volume.center;
   const add = (device: Device, color: Rgb | null) => {
@@ -56,7 +56,7 @@ export function drawDevices(rig: RigJson, ink: string): Group {
   };
   for (const camera of rig.cameras) add(new Device(camera), null);
   rig.projectors.forEach((projector, p) =>
-    add(new Device(projector), lightColor(rig.patterns[p]?.[0]?.colors[0])));
+    add(new Device(projector), projectorInk ?? lightColor(rig.patterns[p]?.[0]?.colors[0])));
   return group;
 }
 

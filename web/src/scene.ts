@@ -39,6 +39,8 @@ export class Picture3d {
     new BufferGeometry(), new MeshLambertMaterial({vertexColors: true, side: DoubleSide}));
   private readonly points = new ThreePoints(
     new BufferGeometry(), new PointsMaterial({vertexColors: true, sizeAttenuation: false, size: 2}));
+  private readonly up = new Vector3(0, 0, 1);
+  private home: [number, number, number] = [1, -0.55, 0.4];
   private ball = new Sphere(new Vector3(), 100);
   private deviceView: Device | null = null;
   private pending = false;
@@ -122,6 +124,12 @@ export class Picture3d {
     return this.mesh.visible;
   }
 
+  /** What is up in the free view, and from where fit() looks when it is not told. */
+  setHome(up: [number, number, number], direction: [number, number, number]): void {
+    if (Math.hypot(...up) > 0) this.up.set(...up).normalize();
+    this.home = direction;
+  }
+
   /** The sphere that fit() shows. */
   setBounds(center: [number, number, number], radius: number): void {
     this.ball = new Sphere(new Vector3(...center), radius);
@@ -136,10 +144,10 @@ export class Picture3d {
   }
 
   /** Everything of interest from direction (x, y, z) seen from the middle. */
-  fit(direction: [number, number, number] = [1, -0.55, 0.4]): void {
+  fit(direction = this.home): void {
     this.deviceView = null;
     const {width, height} = this.size();
-    this.camera.up.set(0, 0, 1);
+    this.camera.up.copy(this.up);
     this.camera.fov = kFov;
     const half = (kFov / 2) * (Math.PI / 180);
     const narrow = Math.min(1, width / height);

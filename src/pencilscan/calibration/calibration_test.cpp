@@ -293,6 +293,15 @@ TEST(CalibrationReport, IsOnePageAndValidJson) {
   const auto json = calibration_json(report);
   EXPECT_EQ(json["devices"].size(), 4U);
   EXPECT_EQ(json["verdict"], to_string(verdict.grade));
+  // Places for the 3-D picture: a point is where a device saw it.
+  EXPECT_GT(json["points"].size(), 100U);
+  const RigidTransform& pose = calibrated_device(result.rig, 1).device_from_world;
+  const auto& device = json["devices"][1];
+  for (int row = 0; row < 3; ++row) {
+    const auto axis = device["R"][static_cast<std::size_t>(row)].get<std::vector<double>>();
+    for (int k = 0; k < 3; ++k) EXPECT_EQ(axis[static_cast<std::size_t>(k)], pose.rotation(row, k));
+    EXPECT_EQ(device["t"][static_cast<std::size_t>(row)].get<double>(), pose.translation(row));
+  }
 }
 
 }  // namespace

@@ -23,6 +23,29 @@ Json residuals_json(const CalibrationReport& report, std::size_t d) {
   return residuals;
 }
 
+/// Some thousand of the surface points that were used, evenly picked, to 1 / 10,000 of their
+/// spread.
+Json points_json(const BundleProblem& problem) {
+  constexpr std::size_t kMost = 3000;
+  std::vector<Vec3> used;
+  for (std::size_t i = 0; i < problem.points.size(); ++i)
+    if (problem.used[i] != 0 && problem.points[i].allFinite()) used.push_back(problem.points[i]);
+  Json points = Json::array();
+  if (used.empty()) return points;
+  Vec3 mean = Vec3::Zero();
+  for (const Vec3& x : used) mean += x / static_cast<double>(used.size());
+  double square = 0;
+  for (const Vec3& x : used) square += (x - mean).squaredNorm() / static_cast<double>(used.size());
+  const double step = std::max(1e-4 * std::sqrt(square), 1e-9);
+  const double per_unit = std::pow(10, -std::floor(std::log10(step)));
+  const std::size_t count = std::min(used.size(), kMost);
+  for (std::size_t i = 0; i < count; ++i) {
+    const Vec3 x = (used[i * used.size() / count] * per_unit).array().round() / per_unit;
+    points.push_back(list(x));
+  }
+  return points;
+}
+
 Json device_json(const CalibrationReport& report, std::size_t d) {
   const CalibrationResult& result = report.result;
   Json json;
@@ -44,6 +67,9 @@ Json device_json(const CalibrationReport& report, std::size_t d) {
     if (u.is_prior[i]) parameter["held_at_prior"] = true;
     json["parameters"][kIntrinsicNames[i]] = parameter;
   }
+  const RigidTransform& pose = calibrated_device(result.rig, d).device_from_world;
+  for (int row = 0; row < 3; ++row) json["R"].push_back(list(pose.rotation.row(row).transpose()));
+  json["t"] = list(pose.translation);
   json["rotation_sigma_deg"] = u.rotation_rad * 180 / std::numbers::pi;
   json["position_sigma"] = list(u.position);
   json["residuals"] = residuals_json(report, d);
@@ -102,6 +128,7 @@ nlohmann::ordered_json calibration_json(const CalibrationReport& report) {
   json["devices"] = Json::array();
   for (std::size_t d = 0; d < result.placed.size(); ++d)
     json["devices"].push_back(device_json(report, d));
+  json["points"] = points_json(result.problem);
   json["pairs"] = pairs_json(report);
   json["decoding"] = decoding_json(report);
   return json;
