@@ -1,12 +1,12 @@
 // The page in a real browser: node --test web/test
 import assert from 'node:assert/strict';
-import {spawn} from 'node:child_process';
 import {mkdirSync, mkdtempSync, rmSync} from 'node:fs';
 import {tmpdir} from 'node:os';
 import {join} from 'node:path';
 import {after, before, test} from 'node:test';
 import {pathToFileURL} from 'node:url';
-import {makeScene, openBrowser, openPage, readPoints, run} from './scene.mjs';
+import {drawn, faintTexts, looksNew, pixels, until} from './looks.mjs';
+import {makeScene, openBrowser, openPage, patience, readPoints, run, startView} from './scene.mjs';
 
 let scene;
 let browser;
@@ -30,28 +30,6 @@ after(async () => {
   scene?.dispose();
 });
 
-/** Decoded pixels of a screenshot of one element: counts of distinct colours. */
-async function pixels(page, selector) {
-  const png = await page.locator(selector).screenshot();
-  return page.evaluate(async (base64) => {
-    const bytes = Uint8Array.from(atob(base64), (c) => c.charCodeAt(0));
-    const bitmap = await createImageBitmap(new Blob([bytes]));
-    const canvas = new OffscreenCanvas(bitmap.width, bitmap.height);
-    const context = canvas.getContext('2d');
-    context.drawImage(bitmap, 0, 0);
-    const {data} = context.getImageData(0, 0, bitmap.width, bitmap.height);
-    const counts = new Map();
-    let hash = 0;
-    for (let i = 0; i < data.length; i += 4) {
-      const key = (data[i] << 16) | (data[i + 1] << 8) | data[i + 2];
-      counts.set(key, (counts.get(key) ?? 0) + 1);
-      hash = (Math.imul(hash, 31) + key) | 0;
-    }
-    const most = Math.max(...counts.values());
-    return {colors: counts.size, ground: most / (data.length / 4), hash};
-  }, png.toString('base64'));
-}
-
 const fact = (page, name) => page.locator(`[data-fact="${name}"]`).innerText();
 
 test('opens from a file without a complaint or a request', async () => {
@@ -65,11 +43,12 @@ test('opens from a file without a complaint or a request', async () => {
 
 test('is interactive soon', async () => {
   const context = await browser.newContext({viewport: {width: 1366, height: 768}});
+  context.setDefaultTimeout(patience);
   const page = await context.newPage();
   const began = Date.now();
   await page.goto(single);
   await page.waitForSelector('html[data-ready]');
-  assert.ok(Date.now() - began < 10000); // a machine under load; quiet ones need a tenth
+  assert.ok(Date.now() - began < 60000); // a machine under load; web/benchmark.mjs has the time of a quiet one
   await context.close();
 });
 
@@ -81,10 +60,7 @@ test('the 3-D picture shows a shaded shape, in every colour mode another one', a
   const seen = new Set([before.hash]);
   for (const mode of ['sigma', 'confidence', 'hole', 'distance', 'projector', 'camera', 'line', 'albedo']) {
     await page.selectOption('#color-mode', mode);
-    await page.waitForTimeout(60);
-    const {hash} = await pixels(page, '#canvas-3d');
-    assert.ok(!seen.has(hash), `${mode} looks like another mode`);
-    seen.add(hash);
+    await looksNew(page, '#canvas-3d', seen, mode);
   }
   await page.context().close();
 });
@@ -92,12 +68,7 @@ test('the 3-D picture shows a shaded shape, in every colour mode another one', a
 test('views from devices, with keys and mouse', async () => {
   const {page} = await openPage(browser, single);
   const seen = new Set([(await pixels(page, '#canvas-3d')).hash]);
-  const differs = async (what) => {
-    await page.waitForTimeout(80);
-    const {hash} = await pixels(page, '#canvas-3d');
-    assert.ok(!seen.has(hash), what);
-    seen.add(hash);
-  };
+  const differs = (what) => looksNew(page, '#canvas-3d', seen, what);
   for (const view of ['c0', 'c1', 'p0', 'p1', 'Back']) {
     await page.selectOption('#view-from', view);
     await differs(view);
@@ -113,7 +84,7 @@ test('views from devices, with keys and mouse', async () => {
 test('the view of a camera puts a point where the camera has it', async () => {
   const {page} = await openPage(browser, single);
   await page.selectOption('#view-from', 'c0');
-  await page.waitForTimeout(100);
+  await drawn(page);
   const some = points.filter((p) => p.camera === 0).filter((_, i) => i % 500 === 0);
   const box = await page.locator('#canvas-3d canvas').boundingBox();
   const scale = Math.min(box.width / 480, box.height / 360);
@@ -132,11 +103,8 @@ test('layers of the images switch', async () => {
   const seen = new Set();
   for (const layer of ['none', 'local', 'projector', 'color', 'confidence', 'undecided']) {
     await page.selectOption('#layer', layer);
-    await page.waitForTimeout(60);
-    const {hash, colors} = await pixels(page, '#canvas-image');
+    const {colors} = await looksNew(page, '#canvas-image', seen, layer);
     assert.ok(colors > 10, layer);
-    assert.ok(!seen.has(hash), `${layer} looks like another layer`);
-    seen.add(hash);
   }
   for (const act of [
     () => page.check('#show-crossings'),
@@ -145,10 +113,7 @@ test('layers of the images switch', async () => {
     () => page.click('.camera-strip button:nth-child(2)'),
   ]) {
     await act();
-    await page.waitForTimeout(150);
-    const {hash} = await pixels(page, '#canvas-image');
-    assert.ok(!seen.has(hash), String(act));
-    seen.add(hash);
+    await looksNew(page, '#canvas-image', seen, String(act));
   }
   await page.context().close();
 });
@@ -162,14 +127,20 @@ test('a click on a curve tells what points.ply says of it', async () => {
     await page.locator('.camera-strip button').first().click();
     const canvas = page.locator('#canvas-image canvas');
     await canvas.focus();
+    await page.keyboard.press('Escape'); // what was selected before
+    await until(async () => (await page.locator('[data-fact]').count()) === 0, 'the selection stays');
     await page.keyboard.press('0');
     const where = () => canvas.evaluate((c, [u, v]) => c.pencilscanToCanvas(u, v), [p.u, p.v]);
     const box = await canvas.boundingBox();
+    const scale = () => canvas.evaluate((c, [u, v]) => {
+      const [a, b] = [c.pencilscanToCanvas(u, v), c.pencilscanToCanvas(u + 1, v)];
+      return Math.hypot(b.x - a.x, b.y - a.y);
+    }, [p.u, p.v]);
     for (let k = 0; k < 6; ++k) {
-      const at = await where();
+      const [at, before] = [await where(), await scale()];
       await page.mouse.move(box.x + at.x, box.y + at.y);
-      await page.mouse.wheel(0, -400);
-      await page.waitForTimeout(30);
+      await page.mouse.wheel(0, -400); // which does not wait for the page
+      if (before < 59) await until(async () => (await scale()) > before, 'the wheel does not zoom');
     }
     const at = await where();
     await page.mouse.click(box.x + at.x, box.y + at.y);
@@ -189,7 +160,7 @@ test('a click on a curve tells what points.ply says of it', async () => {
 test('a click on the shape selects the measurement there, and the image follows', async () => {
   const {page} = await openPage(browser, single);
   await page.selectOption('#view-from', 'c1');
-  await page.waitForTimeout(100);
+  await drawn(page);
   const p = points.find((q) => q.camera === 1 && Math.hypot(q.u - 240, q.v - 180) < 15);
   const canvas = page.locator('#canvas-3d canvas');
   const at = await canvas.evaluate((c, xyz) => c.pencilscanProject(xyz), [p.x, p.y, p.z]);
@@ -210,7 +181,7 @@ test('a click on the shape selects the measurement there, and the image follows'
 test('distances and angles are measured', async () => {
   const {page} = await openPage(browser, single);
   await page.selectOption('#view-from', 'c0');
-  await page.waitForTimeout(100);
+  await drawn(page);
   const box = await page.locator('#canvas-3d canvas').boundingBox();
   const [x, y] = [box.x + box.width / 2, box.y + box.height / 2];
   await page.click('[data-value=distance]');
@@ -235,8 +206,7 @@ test('a sequence plays and its frames open', async () => {
   await page.click('#play');
   await page.locator('.frame').nth(2).click();
   await page.waitForFunction(() => document.documentElement.dataset.loaded === '2');
-  await page.waitForTimeout(100);
-  assert.notEqual((await pixels(page, '#canvas-3d')).hash, still.hash);
+  await looksNew(page, '#canvas-3d', new Set([still.hash]), 'the third frame');
   assert.match(await page.locator('.frame-name').innerText(), /3 of 3/);
   assert.deepEqual(complaints, []);
   await page.context().close();
@@ -265,42 +235,6 @@ test('every control has a name', async () => {
         e.closest('label')?.textContent.trim())).map((e) => e.outerHTML.slice(0, 120)));
   assert.deepEqual(nameless, []);
   await page.context().close();
-});
-
-/** Texts whose contrast with their ground is below WCAG 2.1's level AA (4.5, large ones 3). */
-const faintTexts = (page) => page.evaluate(() => {
-  const parse = (color) => {
-    const [r, g, b, a = 1] = color.match(/[\d.]+/g).map(Number);
-    return color.startsWith('color(') ? [255 * r, 255 * g, 255 * b, a] : [r, g, b, a];
-  };
-  const over = (top, ground) => [0, 1, 2].map((k) => top[3] * top[k] + (1 - top[3]) * ground[k]);
-  const groundOf = (element) => {
-    if (!element) return [255, 255, 255];
-    const own = parse(getComputedStyle(element).backgroundColor);
-    return own[3] === 1 ? own.slice(0, 3) : over(own, groundOf(element.parentElement));
-  };
-  const luminance = (rgb) => {
-    const [r, g, b] = rgb.map((x) => (x / 255 <= 0.04045 ? x / 255 / 12.92 : ((x / 255 + 0.055) / 1.055) ** 2.4));
-    return 0.2126 * r + 0.7152 * g + 0.0722 * b;
-  };
-  const faint = [];
-  const walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
-  while (walker.nextNode()) {
-    const element = walker.currentNode.parentElement;
-    if (!walker.currentNode.textContent.trim() || !element.checkVisibility() ||
-        element.closest('script, option, canvas, figure[data-state=hidden]')) continue;
-    const style = getComputedStyle(element);
-    const ground = groundOf(element);
-    const text = over(parse(element.closest('svg') ? style.fill : style.color), ground);
-    const [dark, light] = [luminance(text), luminance(ground)].sort((a, b) => a - b);
-    const size = parseFloat(style.fontSize);
-    const large = size >= 24 || (size >= 18.66 && Number(style.fontWeight) >= 700);
-    const contrast = (light + 0.05) / (dark + 0.05);
-    if (contrast < (large ? 3 : 4.5)) {
-      faint.push(`${contrast.toFixed(2)} ${element.tagName}.${element.className}: ${walker.currentNode.textContent.slice(0, 40)}`);
-    }
-  }
-  return [...new Set(faint)];
 });
 
 test('text stands out from its ground, light and dark', async () => {
@@ -372,6 +306,7 @@ test('a folder without anything opens with a reason', async () => {
   mkdirSync(join(empty, '000000', 'pictures'), {recursive: true});
   run('report', empty);
   const context = await browser.newContext();
+  context.setDefaultTimeout(patience);
   const page = await context.newPage();
   await page.goto(pathToFileURL(join(empty, 'report.html')).href);
   assert.match(await page.locator('#nothing').innerText(), /holds no result/);
@@ -380,16 +315,7 @@ test('a folder without anything opens with a reason', async () => {
 });
 
 test('view serves the same page and stops on Ctrl-C', async () => {
-  const server = spawn(process.env.PENCILSCAN_PROGRAM, ['view', scene.out], {stdio: ['ignore', 'pipe', 'ignore']});
-  const ended = new Promise((done) => server.on('exit', (code, signal) => done({code, signal})));
-  const address = await new Promise((done) => {
-    let text = '';
-    server.stdout.on('data', (data) => {
-      text += data;
-      const found = text.match(/http:\/\/127\.0\.0\.1:\d+\//);
-      if (found) done(found[0]);
-    });
-  });
+  const {address, stop} = await startView(scene.out);
   const {page, complaints, requests} = await openPage(browser, address);
   assert.deepEqual(complaints, []);
   assert.ok(requests.every((url) => url.startsWith(address)));
@@ -397,6 +323,5 @@ test('view serves the same page and stops on Ctrl-C', async () => {
   await page.click('#play');
   await page.waitForFunction(() => Number(document.getElementById('timeline').dataset.played) >= 3);
   await page.context().close();
-  server.kill('SIGINT');
-  assert.deepEqual(await ended, {code: 0, signal: null});
+  assert.deepEqual(await stop(), {code: 0, signal: null});
 });

@@ -1,6 +1,6 @@
 // A small scene made by the program itself, and a browser to look at it. PENCILSCAN_PROGRAM names
 // the program; CHROMIUM the browser (default: Debian's).
-import {execFileSync} from 'node:child_process';
+import {execFileSync, spawn} from 'node:child_process';
 import {mkdtempSync, readFileSync, rmSync, writeFileSync} from 'node:fs';
 import {tmpdir} from 'node:os';
 import {join} from 'node:path';
@@ -10,6 +10,26 @@ const program = process.env.PENCILSCAN_PROGRAM ?? 'build/release/pencilscan';
 
 export function run(...args) {
   return execFileSync(program, args, {encoding: 'utf8', stdio: ['ignore', 'pipe', 'ignore']});
+}
+
+/** A server of a folder: its address, and how to end it by Ctrl-C; stop() tells how it ended. */
+export async function startView(folder) {
+  const server = spawn(program, ['view', folder], {stdio: ['ignore', 'pipe', 'ignore']});
+  const ended = new Promise((done) => server.on('exit', (code, signal) => done({code, signal})));
+  const address = await new Promise((done, failed) => {
+    server.on('error', failed).on('exit', (code) => failed(new Error(`view ended with ${code}`)));
+    let text = '';
+    server.stdout.on('data', (data) => {
+      text += data;
+      const found = text.match(/http:\/\/127\.0\.0\.1:\d+\//);
+      if (found) done(found[0]);
+    });
+  });
+  const stop = () => {
+    server.kill('SIGINT');
+    return ended;
+  };
+  return {address, stop};
 }
 
 const sub = (a, b) => a.map((x, k) => x - b[k]);
@@ -73,16 +93,21 @@ export function makeScene(frames) {
     dispose: () => rmSync(folder, {recursive: true, force: true})};
 }
 
+/** ms that anything may take before a test fails: only a stuck page takes as long, however busy the
+ * machine is. */
+export const patience = 180000;
+
 // Software rendering everywhere; root in a container has no sandbox to offer.
 const kFlags = ['--no-sandbox', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--ignore-gpu-blocklist'];
 
 export async function openBrowser(args = kFlags) {
-  return chromium.launch({executablePath: process.env.CHROMIUM ?? '/usr/bin/chromium', args});
+  return chromium.launch({timeout: patience, executablePath: process.env.CHROMIUM ?? '/usr/bin/chromium', args});
 }
 
 /** A page that remembers every complaint of the console and every request. */
 export async function openPage(browser, address, size = {width: 1366, height: 768}, more = {}) {
   const context = await browser.newContext({viewport: size, ...more});
+  context.setDefaultTimeout(patience);
   const page = await context.newPage();
   const complaints = [];
   const requests = [];
@@ -94,7 +119,7 @@ export async function openPage(browser, address, size = {width: 1366, height: 76
     if (!/^(data|blob):/.test(request.url())) requests.push(request.url());
   });
   await page.goto(address);
-  await page.waitForFunction(() => document.documentElement.dataset.loaded !== undefined, null, {timeout: 30000});
+  await page.waitForFunction(() => document.documentElement.dataset.loaded !== undefined);
   return {page, complaints, requests};
 }
 
