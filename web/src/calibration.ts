@@ -90,7 +90,7 @@ function keyFigures(report: Json, unit: string): HTMLElement {
   add('Views', digNumber(report, 'views'), (x) => format(x),
     dropped === undefined ? undefined : `${format(dropped)} more were dropped as outliers`);
   if (textOf(dig(report, 'unit')) === 'unknown') {
-    list.push({name: 'Scale', value: 'unknown', hint: '--known-distance or a --board gives millimetres'});
+    list.push({name: 'Scale', value: 'unknown', hint: 'distances are relative; see the notes'});
   }
   return tiles(list);
 }

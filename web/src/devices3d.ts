@@ -1,7 +1,7 @@
 // Frusta of the devices and the light sheet of one projected line, as three.js objects.
 import {
   BufferAttribute, BufferGeometry, CanvasTexture, DoubleSide, Group, LineBasicMaterial, LineSegments,
-  Mesh, MeshBasicMaterial, Sprite, SpriteMaterial,
+  Mesh, MeshBasicMaterial, SRGBColorSpace, Sprite, SpriteMaterial,
 } from 'three';
 import type {RigJson} from './data';
 import {Device} from './device';
@@ -9,19 +9,25 @@ import {css, lightColor, type Rgb} from './palette';
 
 const hex = ([r, g, b]: Rgb): number => (r << 16) | (g << 8) | b;
 
+function painted(canvas: HTMLCanvasElement): CanvasTexture {
+  const texture = new CanvasTexture(canvas);
+  texture.colorSpace = SRGBColorSpace; // as canvases are
+  return texture;
+}
+
 function label(text: string, color: string): Sprite {
   const canvas = document.createElement('canvas');
   const context = canvas.getContext('2d')!;
-  const font = '600 40px system-ui, sans-serif';
+  const font = '600 26px system-ui, sans-serif'; // about twice its size on the screen
   context.font = font;
-  canvas.width = Math.ceil(context.measureText(text).width) + 16;
-  canvas.height = 56;
+  canvas.width = Math.ceil(context.measureText(text).width) + 10;
+  canvas.height = 36;
   context.font = font;
   context.fillStyle = color;
   context.textBaseline = 'middle';
-  context.fillText(text, 8, 28);
+  context.fillText(text, 5, 18);
   const material = new SpriteMaterial({
-    map: new CanvasTexture(canvas), sizeAttenuation: false, depthTest: false, transparent: true});
+    map: painted(canvas), sizeAttenuation: false, depthTest: false, transparent: true});
   const sprite = new Sprite(material);
   const height = 0.026;
   sprite.scale.set((height * canvas.width) / canvas.height, height, 1);
@@ -116,7 +122,7 @@ export function drawMarker(color: string): Sprite {
   context.arc(32, 32, 5, 0, 7);
   context.fill();
   const sprite = new Sprite(new SpriteMaterial({
-    map: new CanvasTexture(canvas), sizeAttenuation: false, depthTest: false, transparent: true}));
+    map: painted(canvas), sizeAttenuation: false, depthTest: false, transparent: true}));
   sprite.scale.set(0.032, 0.032, 1);
   return sprite;
 }

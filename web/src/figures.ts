@@ -78,8 +78,10 @@ export class Figures {
     };
     add('Measured points', digNumber(report, 'points') ?? summary.points ?? histograms?.confidence?.count,
       (x) => format(x));
-    add('Surface measured', digNumber(report, 'surface', 'measured_share'), percent,
-      'share of the closed surface that was measured');
+    if (this.app.source.has(this.app.result, 'mesh')) {
+      add('Surface measured', digNumber(report, 'surface', 'measured_share'), percent,
+        'share of the closed surface that was measured');
+    }
     const sigma = histograms?.sigma_mm;
     if (sigma) add('Sigma, median', sigma.median, (x) => `${format(x)} ${unit}`, 'one standard deviation along the ray');
     add('Lines disagree by', digNumber(report, 'crossing_disagreement', 'median_px'),

@@ -22,7 +22,7 @@ export class Images {
   private strip: HTMLButtonElement[] = [];
   private readonly canvas = h('canvas', {tabindex: 0, role: 'application'});
   private readonly view: ImageView;
-  private readonly legend = h('div', {class: 'legend', hidden: true});
+  private readonly legend = h('div', {class: 'legend below', hidden: true});
   private readonly message = h('p', {class: 'overlay-message', hidden: true});
   private readonly cameraStrip = h('div', {class: 'camera-strip', role: 'group', 'aria-label': 'Cameras'});
   private readonly layerSelect = h('select', {id: 'layer', onchange: () => {
@@ -72,7 +72,7 @@ export class Images {
           button('−', 'Zoom out', () => this.view.zoomMiddle(1 / 1.5)),
           button('+', 'Zoom in', () => this.view.zoomMiddle(1.5)),
           button('Fit', 'Fit the whole image', () => this.view.fit()))),
-      h('div', {class: 'canvas-holder', id: 'canvas-image'}, this.canvas, this.message, this.legend));
+      h('div', {class: 'canvas-holder', id: 'canvas-image'}, this.canvas, this.message), this.legend);
     this.canvas.setAttribute('aria-label', 'Camera image. Arrow keys move, plus and minus zoom, ' +
       '0 fits, Enter selects what is in the middle, brackets step along the selected line.');
   }
@@ -175,7 +175,7 @@ export class Images {
     if (!app.rig) return 'The devices are not known: no camera images can be shown.';
     if (app.source.has(app.result, partOf(base, camera))) return '';
     if (app.source.index.results[app.result]?.detail === 'shape') {
-      return 'This frame has its shape only; pencilscan view shows the images of all frames.';
+      return 'This frame has its shape only. Frames with a dot have images, too; pencilscan view has all.';
     }
     return `This result holds no ${kBaseWords[base]} of ${app.cameras[camera]?.name ?? 'this camera'}.`;
   }

@@ -143,15 +143,16 @@ export class Picture3d {
     return this.ball;
   }
 
-  /** Everything of interest from direction (x, y, z) seen from the middle. */
-  fit(direction = this.home): void {
+  /** Everything of interest from direction (x, y, z) seen from the middle; larger: of this many
+   * times the size. */
+  fit(direction = this.home, larger = 1): void {
     this.deviceView = null;
     const {width, height} = this.size();
     this.camera.up.copy(this.up);
     this.camera.fov = kFov;
     const half = (kFov / 2) * (Math.PI / 180);
     const narrow = Math.min(1, width / height);
-    const distance = this.ball.radius / Math.sin(Math.atan(Math.tan(half) * narrow));
+    const distance = larger * this.ball.radius / Math.sin(Math.atan(Math.tan(half) * narrow));
     this.camera.position.copy(this.ball.center)
       .addScaledVector(new Vector3(...direction).normalize(), distance);
     this.resetControls(this.ball.center);

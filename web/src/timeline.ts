@@ -25,6 +25,7 @@ export class Timeline {
     if (results.length < 2) return;
     document.body.classList.add('with-timeline'); // which is in sight beside the pictures
     const sequence = new Set(results.map((r) => r.name)).size > 1;
+    const playable = sequence && results.filter((r) => r.parts.includes('mesh')).length > 1;
     const strip = h('div', {class: 'frames', role: 'group', 'aria-label': sequence ? 'Frames' : 'Runs'});
     const quality = (i: number): number | undefined => results[i].summary.measured_share;
     const partial = results.some((r) => r.detail === 'shape');
@@ -40,7 +41,7 @@ export class Timeline {
       const title = [r.run, r.name].filter(Boolean).join(' / ');
       return h('button', {type: 'button', class: 'frame', title: `${title}: ${about}`,
         'aria-label': `${title}: ${about}`, onclick: () => app.show(i)},
-      h('span', {class: 'thumb'}),
+      h('span', {class: 'thumb'}, r.parts.includes('thumb') ? null : 'no surface'),
       h('span', {class: 'quality', 'aria-hidden': 'true'},
         h('i', {style: `width:${100 * (share ?? (points ?? 0) / best)}%`})),
       h('span', {class: 'name'}, partial && r.detail === 'full' ? h('i', {class: 'whole'}) : null, sequence ? (r.run ? `${r.run} ${r.name}` : r.name) : r.run || r.name,
@@ -49,7 +50,7 @@ export class Timeline {
     strip.append(...this.items);
     this.slider.max = String(results.length - 1);
     this.root.append(
-      h('div', {class: 'timeline-tools'}, sequence ? this.play : null, sequence ? this.speed : null,
+      h('div', {class: 'timeline-tools'}, playable ? this.play : null, playable ? this.speed : null,
         sequence ? this.slider : null, this.name,
         partial ? h('span', {class: 'tool-label'}, h('i', {class: 'whole'}), 'with images and points') : null,
         failed.length ? h('span', {class: 'failed'}, `${failed.length} failed: ${failed.slice(0, 8).join(', ')}${

@@ -4,7 +4,7 @@ import type {App} from './app';
 import {
   colorMesh, colorPoints, kColorModes, legendOf, scaleOf, type ColorMode, type Legend, type Ramps,
 } from './coloring';
-import type {Mesh} from './data';
+import type {Mesh, RigJson} from './data';
 import {clear, drawDevices, drawMarker, drawSegments, drawSheet} from './devices3d';
 import {Device, type Vec3} from './device';
 import {byId, choice, format, h} from './dom';
@@ -154,7 +154,7 @@ export class Viewer {
       h('option', {value: 'free'}, 'Free'),
       ...['Front', 'Right', 'Back', 'Left', 'Above', 'Below'].map((name) =>
         h('option', {value: name}, name)),
-      ...(rig ? [group('Cameras', rig.cameras, 'c'), group('Projectors', rig.projectors, 'p')] : []));
+      ...(rig ? [h('option', {value: 'rig'}, 'Devices')] : []), ...(rig ? [group('Cameras', rig.cameras, 'c'), group('Projectors', rig.projectors, 'p')] : []));
     if ([...this.viewSelect.options].some((o) => o.value === chosen)) this.viewSelect.value = chosen;
     this.fillColorModes();
   }
@@ -227,10 +227,23 @@ export class Viewer {
     if (!picture) return;
     if (value === 'free' || sides[value]) {
       picture.fit(sides[value]);
+    } else if (value === 'rig' && app.rig) {
+      this.showRig(app.rig, picture);
     } else if (app.rig) {
       const list = value[0] === 'c' ? app.rig.cameras : app.rig.projectors;
       picture.viewFrom(new Device(list[Number(value.slice(1))]));
     }
+  }
+
+  /** From so far that the devices are in sight. */
+  private showRig(rig: RigJson, picture: Picture3d): void {
+    const {center, radius} = picture.bounds;
+    const away = [...rig.cameras, ...rig.projectors].map((d) => new Vector3(...new Device(d).center).distanceTo(center));
+    if (!this.showDevices.checked) {
+      this.showDevices.checked = true;
+      this.drawDevices();
+    }
+    picture.fit(undefined, Math.max(1, (0.8 * Math.max(...away)) / radius));
   }
 
   private pointsArrived(): void {

@@ -158,6 +158,14 @@ TEST_F(Experiment, LargePicturesShrinkAndWhatDoesNotFitIsLeftOut) {
   EXPECT_THAT(missing(read(detail)), ElementsAre("large.png", "pictures/"));
 }
 
+TEST_F(Experiment, ARunWithoutASurfaceHasNoShareOfIt) {
+  write_text(root_ / "table.md", kTable);
+  sample::write_output(root_ / "work" / "deep" / "out", 1);
+  EXPECT_EQ(read().json["runs"][0]["summary"]["measured_share"], 0.5);
+  fs::remove(root_ / "work" / "deep" / "out" / "000000" / "mesh.ply");
+  EXPECT_FALSE(read().json["runs"][0]["summary"].contains("measured_share"));
+}
+
 TEST_F(Experiment, ItsPageHoldsDrawingsAsDataOnly) {
   write_text(root_ / "table.md", kTable);
   write_text(root_ / "plot.svg", kDrawing);

@@ -250,7 +250,8 @@ ordered_json ResultReader::summary() {
   };
   const json* report = files_.report();
   take(report, {"points"});
-  take(report, {"surface", "measured_share"});
+  // Without a surface (--no-mesh) the report states a share of nothing.
+  if (is_file(files_.entry().folder / "mesh.ply")) take(report, {"surface", "measured_share"});
   take(report, {"crossing_disagreement", "median_px"});
   if (report != nullptr && report->is_object() && report->contains("warnings"))
     summary["warnings"] = (*report)["warnings"].size();
