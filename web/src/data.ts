@@ -69,6 +69,7 @@ export interface RunJson {
 }
 
 export interface ExperimentJson {
+  folder: string; // its name
   name?: string;
   title?: string;
   text?: string;

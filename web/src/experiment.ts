@@ -129,7 +129,7 @@ async function pictureOf(source: Source, entry: PictureJson, lightbox: Lightbox)
   }
 }
 
-function runTable(runs: RunJson[], title: string): HTMLElement | null {
+function runTable(runs: RunJson[], within: string): HTMLElement | null {
   if (!runs.length) return null;
   const columns: [string, (run: RunJson) => string][] = [
     ['points', ({summary}) => format(summary?.points)],
@@ -150,7 +150,7 @@ function runTable(runs: RunJson[], title: string): HTMLElement | null {
         h('th', {scope: 'row', class: 'words'}, run.folder), h('td', {class: 'words'}, kinds[run.kind]),
         ...shown.map(([, text]) => h('td', {}, text(run))),
         h('td', {class: 'words'}, h('code', {}, run.report
-          ? `${run.folder}/report.html` : `pencilscan report ${title}/${run.folder}`)))))));
+          ? `${run.folder}/report.html` : `pencilscan report ${within}/${run.folder}`)))))));
 }
 
 function missing(data: ExperimentJson): HTMLElement | null {
@@ -164,7 +164,7 @@ function missing(data: ExperimentJson): HTMLElement | null {
 }
 
 export function showExperiment(app: App): void {
-  const {experiment, title, results} = app.source.index;
+  const {experiment, results} = app.source.index;
   byId('experiment-section').hidden = byId('experiment-link').hidden = !experiment;
   if (!experiment) return;
   byId('runs-link').hidden = results.length === 0;
@@ -186,7 +186,7 @@ export function showExperiment(app: App): void {
   const strips = h('div', {class: 'strips'});
   root.append(h('div', {class: 'tables-and-pictures'},
     h('div', {class: 'tables'}, ...all.filter((t) => t.tagName !== 'DETAILS')), own), strips);
-  const runs = runTable(experiment.runs, experiment.name ?? title);
+  const runs = runTable(experiment.runs, experiment.folder);
   if (runs) root.append(runs);
   root.append(...folded);
   const {commands, commands_total: total = 0} = experiment;

@@ -170,7 +170,7 @@ std::optional<ExperimentFolder> find_experiment(const fs::path& root) {
 
 ExperimentPage read_experiment(const ExperimentFolder& folder, const ExperimentDetail& detail) {
   ExperimentPage page;
-  page.json = ordered_json::object();
+  page.json = {{"folder", folder_name(folder.root)}};
   ordered_json missing = ordered_json::array();
   const Note note = [&](const std::string& what, const std::string& why) {
     std::string reason = why;

@@ -38,8 +38,8 @@ struct ExperimentDetail {
 
 /// An experiment as the page shows it.
 struct ExperimentPage {
-  nlohmann::ordered_json json;        ///< title, text, setting, tables, pictures, runs, commands,
-                                      ///< missing (docs/report.md)
+  nlohmann::ordered_json json;  ///< folder, title, text, setting, tables, pictures, runs, commands,
+                                ///< missing (docs/report.md)
   std::vector<std::string> pictures;  ///< bytes; "part" of an entry of json["pictures"] counts them
 };
 

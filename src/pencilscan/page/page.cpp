@@ -276,12 +276,7 @@ ordered_json PageData::index(const std::string& mode, std::vector<ordered_json> 
                         {"mode", mode},
                         {"program", options_.program},
                         {"title", options_.title}};
-  if (options_.title.empty())
-    index["title"] = fs::absolute(folder_.root).lexically_normal().filename().string();
-  if (index["title"] == "") {
-    index["title"] =
-        fs::absolute(folder_.root).lexically_normal().parent_path().filename().string();
-  }
+  if (options_.title.empty()) index["title"] = folder_name(folder_.root);
   index["rigs"] = rig_jsons_;
   index["results"] = std::move(entries);
   index["experiment"] = experiment;

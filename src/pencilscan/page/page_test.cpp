@@ -305,6 +305,8 @@ TEST_F(Folder, OfAScanNothingIsMissingButTheDevices) {
 TEST_F(Folder, AnEmptyFolderGivesAPage) {
   const auto index = index_of(report());
   EXPECT_TRUE(index["results"].empty());
+  EXPECT_EQ(index["title"], root_.filename().string());
+  EXPECT_EQ(folder_name(root_ / ""), root_.filename().string());
   EXPECT_THROW(static_cast<void>(find_results(root_ / "none")), InputError);
 }
 

@@ -32,8 +32,7 @@ ResultEntry entry_for(const fs::path& folder, const fs::path& root, const Result
   ResultEntry entry;
   entry.folder = folder;
   const fs::path above = folder.parent_path();
-  entry.name = folder == root ? fs::absolute(root).lexically_normal().filename().string()
-                              : folder.filename().string();
+  entry.name = folder == root ? folder_name(root) : folder.filename().string();
   if (folder != root && above != root) entry.run = fs::relative(above, root).string();
   entry.rig = !sources.rig.empty()
                   ? sources.rig
@@ -65,6 +64,11 @@ bool holds_result(const fs::path& folder) {
   if (is_file(folder / "points.ply") || is_file(folder / "mesh_measured.ply")) return true;
   return is_file(folder / "report.json") &&
          (is_file(folder / "timing.json") || is_file(folder / "mesh.ply"));
+}
+
+std::string folder_name(const fs::path& folder) {
+  const fs::path whole = fs::absolute(folder).lexically_normal();
+  return (whole.has_filename() ? whole : whole.parent_path()).filename().string();
 }
 
 std::vector<fs::path> folders_in(const fs::path& folder) {

@@ -40,6 +40,8 @@ struct ResultFolder {
 
 /// True for a folder that itself holds the result of a frame or a scan.
 [[nodiscard]] bool holds_result(const std::filesystem::path& folder);
+/// Its own name, also of "." and "a/b/".
+[[nodiscard]] std::string folder_name(const std::filesystem::path& folder);
 /// The folders directly in a folder, ordered by name; no links.
 [[nodiscard]] std::vector<std::filesystem::path> folders_in(const std::filesystem::path& folder);
 
