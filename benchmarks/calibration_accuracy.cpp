@@ -12,6 +12,7 @@
 
 #include "pencilscan/calibration/structure.h"
 #include "pencilscan/core/random.h"
+#include "pencilscan/geometry/least_squares.h"
 
 namespace {
 
@@ -56,7 +57,7 @@ void compare(const Rig& truth, const Rig& found) {
     a.col(i) = points[static_cast<std::size_t>(i)];
     b.col(i) = measured[static_cast<std::size_t>(i)];
   }
-  const Eigen::Matrix4d S = Eigen::umeyama(a, b, true);
+  const Eigen::Matrix4d S = fit_similarity(a, b, true);
   std::vector<double> errors;
   for (Eigen::Index i = 0; i < n; ++i) {
     const Vec3 moved = (S * a.col(i).homogeneous()).head<3>();

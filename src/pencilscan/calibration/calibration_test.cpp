@@ -9,6 +9,7 @@
 #include "pencilscan/calibration/reprojection.h"
 #include "pencilscan/calibration/structure.h"
 #include "pencilscan/core/random.h"
+#include "pencilscan/geometry/least_squares.h"
 
 namespace pencilscan {
 namespace {
@@ -130,7 +131,7 @@ double projection_error(const Rig& truth, const Rig& found) {
       track.views.push_back({d, *calibrated_device(truth, d).project(a.col(i)), 1});
     b.col(i) = triangulate(problem, track, 0.01).value_or(Vec3::Constant(1e6));
   }
-  const Eigen::Matrix4d S = Eigen::umeyama(a, b, true);
+  const Eigen::Matrix4d S = fit_similarity(a, b, true);
   std::vector<double> errors;
   for (Eigen::Index i = 0; i < kPoints; ++i) {
     const Vec3 moved = (S * a.col(i).homogeneous()).head<3>();

@@ -1,6 +1,5 @@
 #include "pencilscan/calibration/local_map.h"
 
-#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
@@ -8,12 +7,10 @@
 #include <vector>
 
 #include "pencilscan/core/median.h"
+#include "pencilscan/geometry/least_squares.h"
 
 namespace pencilscan {
 namespace {
-
-using Vec6 = Eigen::Matrix<double, 6, 1>;
-using Mat6 = Eigen::Matrix<double, 6, 6>;
 
 struct Crossing {
   double a = 0, b = 0;  ///< camera px from the centre
@@ -91,7 +88,7 @@ std::optional<AxisFit> fit_axis(const std::vector<Crossing>& crossings, double e
       right += weights[i] * crossings[i].value * f;
     }
     normal.diagonal().array() += 1e-9;
-    fit.coefficients = normal.ldlt().solve(right);
+    fit.coefficients = solve_symmetric(normal, right);
     std::vector<double> residuals(crossings.size());
     for (std::size_t i = 0; i < crossings.size(); ++i)
       residuals[i] = std::abs(crossings[i].value -
@@ -110,7 +107,7 @@ std::optional<AxisFit> fit_axis(const std::vector<Crossing>& crossings, double e
   if (count == 0 || scale > options.worst_rms_px || weight_sum < options.least_inliers * count)
     return std::nullopt;
   const double freedom = std::max(weight_sum - 6, 1.0);
-  const Vec6 influence = normal.ldlt().solve(Vec6::Unit(0));
+  const Vec6 influence = solve_symmetric(normal, Vec6::Unit(0));
   const double variance = influence[0];
   const double gradient = std::hypot(fit.coefficients[1], fit.coefficients[2]);
   // Few crossings say little about their own scatter: part of the expected one goes in.

@@ -9,6 +9,7 @@
 
 #include "pencilscan/calibration/structure.h"
 #include "pencilscan/core/median.h"
+#include "pencilscan/geometry/least_squares.h"
 
 namespace pencilscan {
 namespace {
@@ -116,7 +117,7 @@ bool fix_frame(const CalibrationInput& input, BundleProblem& problem) {
       a.col(static_cast<Eigen::Index>(i)) = from[i];
       b.col(static_cast<Eigen::Index>(i)) = to[i];
     }
-    const Eigen::Matrix4d similarity = Eigen::umeyama(a, b, !scaled);
+    const Eigen::Matrix4d similarity = fit_similarity(a, b, !scaled);
     const double s = similarity.block<3, 3>(0, 0).col(0).norm();
     move_solution(s, {similarity.block<3, 3>(0, 0) / s, similarity.block<3, 1>(0, 3)}, problem);
     scaled = scaled || input.rig.unit_known;

@@ -2,7 +2,6 @@
 
 #include <ceres/rotation.h>
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -12,6 +11,7 @@
 #include <opencv2/core/eigen.hpp>
 
 #include "pencilscan/core/median.h"
+#include "pencilscan/geometry/least_squares.h"
 
 namespace pencilscan {
 namespace {
@@ -264,7 +264,7 @@ std::optional<Vec3> triangulate(const BundleProblem& problem, const Track& track
   for (std::size_t i = 1; i < rays.size(); ++i)
     widest = std::max(widest, rays[0].second.cross(rays[i].second).norm());
   if (widest < std::sin(least_angle_rad)) return std::nullopt;
-  const Vec3 point = normal.ldlt().solve(right);
+  const Vec3 point = solve_symmetric(normal, right);
   for (const auto& [center, direction] : rays)
     if (!(direction.dot(point - center) > 0)) return std::nullopt;
   return point;

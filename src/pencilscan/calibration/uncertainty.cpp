@@ -1,6 +1,5 @@
 #include "pencilscan/calibration/uncertainty.h"
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -8,6 +7,7 @@
 #include "pencilscan/calibration/structure.h"
 #include "pencilscan/core/median.h"
 #include "pencilscan/core/random.h"
+#include "pencilscan/geometry/least_squares.h"
 
 namespace pencilscan {
 namespace {
@@ -182,16 +182,15 @@ Covariance invert(const NormalEquations& normal, const BundleProblem& problem, c
       H(i, j) = normal.H()(result.at[static_cast<std::size_t>(i)],
                            result.at[static_cast<std::size_t>(j)]) *
                 unit[i] * unit[j];
-  const Eigen::MatrixXd Q =
-      Eigen::HouseholderQR<Eigen::MatrixXd>(G).householderQ() * Eigen::MatrixXd::Identity(n, 7);
+  const Eigen::MatrixXd Q = orthonormal_basis(G);
   const Eigen::MatrixXd P = Eigen::MatrixXd::Identity(n, n) - Q * Q.transpose();
   const double weight = H.diagonal().mean();
   const Eigen::MatrixXd within = P * H * P + weight * Q * Q.transpose();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(within);
-  Eigen::VectorXd values = eigen.eigenvalues();
+  const SymmetricEigen eigen = symmetric_eigen(within);
+  Eigen::VectorXd values = eigen.values;
   const double least = 1e-14 * values.maxCoeff();
   for (double& v : values) v = 1 / std::max(v, least);
-  const Eigen::MatrixXd root = P * eigen.eigenvectors() * values.cwiseSqrt().asDiagonal();
+  const Eigen::MatrixXd root = P * eigen.vectors * values.cwiseSqrt().asDiagonal();
   result.root = unit.asDiagonal() * root;
   result.matrix = result.root * result.root.transpose();
   return result;
@@ -266,7 +265,7 @@ void measure_volume(const BundleProblem& problem, const Covariance& covariance, 
     }
     if (found.size() < 4) continue;
     const auto n = static_cast<Eigen::Index>(found.size());
-    const Eigen::Matrix4d S = Eigen::umeyama(a.leftCols(n), b.leftCols(n), true);
+    const Eigen::Matrix4d S = fit_similarity(a.leftCols(n), b.leftCols(n), true);
     for (Eigen::Index i = 0; i < n; ++i) {
       const Vec3 error = (S * a.col(i).homogeneous()).head<3>() - b.col(i);
       squares[found[static_cast<std::size_t>(i)]] += error.squaredNorm();

@@ -1,8 +1,9 @@
 #include "pencilscan/depth/seeds.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+
+#include "pencilscan/geometry/least_squares.h"
 
 namespace pencilscan {
 namespace {
@@ -43,7 +44,7 @@ std::optional<Quadric> robust_plane(std::vector<Offset>& points, double mm_per_h
     const double ridge = 1 / (steep * steep);
     A(1, 1) += ridge;
     A(2, 2) += ridge;
-    c = A.ldlt().solve(b);
+    c = solve_symmetric(A, b);
   }
   if (!c.allFinite() || !(c[0] > 0)) return std::nullopt;
   if (std::hypot(c[1], c[2]) > kSteepest * steep) return std::nullopt;

@@ -10,6 +10,7 @@
 #include "pencilscan/core/median.h"
 #include "pencilscan/evaluation/statistics.h"
 #include "pencilscan/evaluation/surface_figures.h"
+#include "pencilscan/geometry/least_squares.h"
 
 namespace pencilscan {
 namespace {
@@ -115,7 +116,7 @@ Similarity point_step(const std::vector<Match>& matches, AlignmentKind kind) {
     from.col(static_cast<Eigen::Index>(i)) = kept[i]->moved;
     to.col(static_cast<Eigen::Index>(i)) = kept[i]->target;
   }
-  const Eigen::Matrix4d t = Eigen::umeyama(from, to, kind == AlignmentKind::kSimilarity);
+  const Eigen::Matrix4d t = fit_similarity(from, to, kind == AlignmentKind::kSimilarity);
   Similarity s;
   s.scale = kind == AlignmentKind::kSimilarity ? t.col(0).head<3>().norm() : 1.0;
   if (!(s.scale > 0) || !t.allFinite()) return {};

@@ -8,6 +8,8 @@ namespace pencilscan {
 using Vec2 = Eigen::Vector2d;
 using Vec3 = Eigen::Vector3d;
 using Mat3 = Eigen::Matrix3d;
+using Vec6 = Eigen::Matrix<double, 6, 1>;
+using Mat6 = Eigen::Matrix<double, 6, 6>;
 
 /// x_in_b = rotation * x_in_a + translation, for a value named b_from_a.
 struct RigidTransform {

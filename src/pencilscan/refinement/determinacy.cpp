@@ -1,9 +1,9 @@
 #include "pencilscan/refinement/determinacy.h"
 
-#include <Eigen/Dense>
 #include <cmath>
 
 #include "pencilscan/core/parallel.h"
+#include "pencilscan/geometry/least_squares.h"
 
 namespace pencilscan {
 
@@ -34,7 +34,7 @@ double line_error_px(const Rig& rig, std::span<const CrossingTrack> tracks,
   const Eigen::MatrixXd inner = gauge.transpose() * weighted;
   const Eigen::MatrixXd projection =
       Eigen::MatrixXd::Identity(covariance.rows(), covariance.cols()) -
-      gauge * inner.ldlt().solve(weighted.transpose());
+      gauge * solve_symmetric(inner, weighted.transpose());
   const Eigen::MatrixXd shape = projection * covariance * projection.transpose();
   const RigCorrection none(device_count(rig));
   std::vector<double> sums(tracks.size(), 0);

@@ -2,7 +2,6 @@
 
 #include <ceres/ceres.h>
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -12,6 +11,7 @@
 
 #include "pencilscan/core/median.h"
 #include "pencilscan/core/parallel.h"
+#include "pencilscan/geometry/least_squares.h"
 #include "pencilscan/refinement/determinacy.h"
 #include "pencilscan/refinement/track_residual.h"
 
@@ -301,10 +301,10 @@ RefineRigResult refine_rig(const Rig& calibrated, std::span<const CrossingTrack>
   const auto size = 6 * static_cast<Eigen::Index>(devices);
   const Eigen::VectorXd unit = scales.all();
   const Eigen::VectorXd precision = unit.cwiseAbs2().cwiseInverse();
-  const Eigen::MatrixXd seen = information(residuals, definite, scales, scale, options, parameters);
-  const Eigen::MatrixXd posterior = (seen + Eigen::MatrixXd::Identity(size, size))
-                                        .ldlt()
-                                        .solve(Eigen::MatrixXd::Identity(size, size));
+  const Eigen::MatrixXd identity = Eigen::MatrixXd::Identity(size, size);
+  const Eigen::MatrixXd seen =
+      identity + information(residuals, definite, scales, scale, options, parameters);
+  const Eigen::MatrixXd posterior = solve_symmetric(seen, identity);
   const Eigen::MatrixXd prior = unit.cwiseAbs2().asDiagonal();
   report.expected_error_px = line_error_px(refined, definite, prior, precision);
   report.remaining_error_px = line_error_px(

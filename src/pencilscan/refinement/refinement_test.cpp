@@ -1,9 +1,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <Eigen/SVD>
 #include <cmath>
 
+#include "pencilscan/geometry/least_squares.h"
 #include "pencilscan/refinement/determinacy.h"
 #include "pencilscan/refinement/refine_rig.h"
 #include "pencilscan/refinement/ring_scene.h"
@@ -104,7 +104,7 @@ std::pair<int, double> unseen_directions(const RingScene& scene) {
     }
     sum += row.transpose() * row;
   }
-  const Eigen::VectorXd singular = sum.jacobiSvd().singularValues();
+  const Eigen::VectorXd singular = symmetric_eigen(sum).values.reverse();
   const int unseen = static_cast<int>((singular.array() < 1e-10 * singular[0]).count());
   const Eigen::MatrixXd gauge = gauge_directions(scene.rig, Vec3(5, -3, 8));
   double seen = 0;
@@ -137,7 +137,7 @@ double shape_error_mm(const RingScene& scene, const Rig& rig,
     measured.col(t) = residual.evaluate(of_track(residual, none), false)->point;
     truth.col(t) = scene.truth[i];
   }
-  const Eigen::Matrix4d motion = Eigen::umeyama(measured, truth);
+  const Eigen::Matrix4d motion = fit_similarity(measured, truth, true);
   const Eigen::Matrix3Xd moved =
       (motion.topLeftCorner<3, 3>() * measured).colwise() + motion.topRightCorner<3, 1>();
   return std::sqrt((moved - truth).squaredNorm() / static_cast<double>(measured.cols()));

@@ -1,8 +1,10 @@
 #include "pencilscan/refinement/track_residual.h"
 
-#include <Eigen/Dense>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+
+#include "pencilscan/geometry/least_squares.h"
 
 namespace pencilscan {
 
@@ -60,7 +62,7 @@ std::optional<TrackResidual::Value> TrackResidual::evaluate(std::span<const Pose
   for (int k = 0; k < kMaxIterations; ++k) {
     if (!linearize()) return std::nullopt;
     const Mat3 normal = by_point.transpose() * by_point;
-    const Vec3 step = normal.ldlt().solve(-(by_point.transpose() * value.residual));
+    const Vec3 step = solve_symmetric(normal, -(by_point.transpose() * value.residual));
     if (!step.allFinite()) return std::nullopt;
     value.point += step;
     if (step.norm() < kStepMm) break;
@@ -78,7 +80,7 @@ std::optional<TrackResidual::Value> TrackResidual::evaluate(std::span<const Pose
     row += o.rows;
   }
   const Mat3 normal = by_point.transpose() * by_point;
-  value.jacobian -= by_point * normal.ldlt().solve(by_point.transpose() * value.jacobian);
+  value.jacobian -= by_point * (normal.inverse() * (by_point.transpose() * value.jacobian));
   return value;
 }
 

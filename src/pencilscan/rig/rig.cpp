@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "pencilscan/geometry/least_squares.h"
+
 namespace pencilscan {
 namespace {
 
@@ -72,7 +74,7 @@ Vec3 nearest_to_axes(const std::vector<const Device*>& devices) {
   if (eigen.eigenvalues()(0) < kParallelAxes * static_cast<double>(devices.size())) {
     return guessed_center(devices);
   }
-  const Vec3 center = normal.ldlt().solve(right);
+  const Vec3 center = solve_symmetric(normal, right);
   const auto in_front = std::count_if(devices.begin(), devices.end(), [&](const Device* device) {
     return (device->device_from_world * center).z() > 0;
   });

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "pencilscan/core/chunks.h"
+#include "pencilscan/geometry/least_squares.h"
 
 namespace pencilscan {
 namespace {
@@ -57,8 +58,7 @@ bool fit_quadric(std::span<const SurfaceSample> samples, const PointGrid& grid, 
   const Vec3 n = sample.normal;
   const Vec3 e1 = n.unitOrthogonal();
   const Vec3 e2 = n.cross(e1);
-  using Vec6 = Eigen::Matrix<double, 6, 1>;
-  Eigen::Matrix<double, 6, 6> A = Eigen::Matrix<double, 6, 6>::Zero();
+  Mat6 A = Mat6::Zero();
   Vec6 b = Vec6::Zero();
   double sum_h2 = 0;
   double sum = 0;
@@ -84,7 +84,7 @@ bool fit_quadric(std::span<const SurfaceSample> samples, const PointGrid& grid, 
   if (count < 8) return false;
   // A weak pull of the curvature to zero decides where a single curve leaves it open.
   for (int k = 1; k < 6; ++k) A(k, k) += (k < 3 ? 1e-6 : 3e-3) * sum;
-  const Vec6 c = A.ldlt().solve(b);
+  const Vec6 c = solve_symmetric(A, b);
   if (!c.allFinite()) return false;
   const double residual2 = std::max(0.0, sum_h2 - 2 * c.dot(b) + c.dot(A * c)) / sum;
   sample.residual = radius * std::sqrt(residual2);
