@@ -91,8 +91,9 @@ enum class Inference { kMessages, kClusters };
 
 struct JointOptions {
   Inference inference = Inference::kMessages;
-  int piece_length = 24;             ///< points labelled as one; >= 4
-  int max_labels = 24;               ///< kept per piece before messages are passed; >= 2
+  int piece_length = 24;  ///< points labelled as one; >= 4
+  int max_labels = 24;    ///< kept per piece before messages are passed; >= 2; more where
+                          ///< many patterns share a colour or nothing crosses
   double projection_sigma_px = 0.3;  ///< error of a plane, projector px; > 0
   double crossing_outliers = 0.05;   ///< share of crossings that are none
   double max_color_cost = 4;         ///< log-likelihood ratio that a piece's colour can give

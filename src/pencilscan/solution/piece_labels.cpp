@@ -154,17 +154,28 @@ std::vector<std::vector<float>> along_curves(const LabelledPieces& pieces,
   return forward;
 }
 
+std::size_t kept_labels(const std::vector<PieceLabel>& labels, bool lacks_crossings,
+                        const JointOptions& options) {
+  const auto most = static_cast<std::size_t>(options.max_labels);
+  if (lacks_crossings) return 6 * most;  // nothing tells them apart yet
+  // The more patterns share a colour, the more of their lines meet at some depth by chance.
+  constexpr std::size_t kFewPatterns = 3;
+  std::size_t patterns = 0;
+  for (std::size_t k = 0; k < labels.size(); ++k)
+    patterns += k == 0 || !(labels[k].pattern == labels[k - 1].pattern);
+  return patterns <= kFewPatterns ? most : (1 + patterns - kFewPatterns) * most;
+}
+
 void keep_supported(LabelledPieces& pieces, const JointOptions& options) {
   auto scores = crossing_support(pieces, options);
   for (std::size_t p = 0; p < scores.size(); ++p) {
     for (std::size_t k = 0; k < scores[p].size(); ++k) scores[p][k] += pieces.labels[p][k].cost;
   }
   scores = along_curves(pieces, scores, options);
-  // Without crossings nothing tells them apart yet.
-  const auto max_labels =
-      static_cast<std::size_t>(options.max_labels) * (lacks_crossings(pieces.graph) ? 6U : 1U);
+  const bool lacks = lacks_crossings(pieces.graph);
   for (std::size_t p = 0; p < pieces.labels.size(); ++p) {
     auto& labels = pieces.labels[p];
+    const std::size_t max_labels = kept_labels(labels, lacks, options);
     std::vector<std::size_t> order(labels.size());
     for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
     const std::size_t count = std::min(labels.size(), max_labels);

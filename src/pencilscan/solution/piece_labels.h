@@ -32,7 +32,7 @@ using PieceBeliefs = std::vector<std::vector<float>>;
 
 /// All lines of the piece's family whose depth lies in the volume, with the cost of the piece's
 /// colours and of the slant that the line would give the surface; then those that its crossings
-/// support best, at most options.max_labels.
+/// support best (options.max_labels).
 [[nodiscard]] LabelledPieces possible_labels(const Rig& rig,
                                              const std::vector<ColorFamily>& families,
                                              const GridGraph& graph, const JointOptions& options);
