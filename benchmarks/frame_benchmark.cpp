@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "pencilscan/core/memory.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/core/stopwatch.h"
 #include "pencilscan/io/image.h"
@@ -90,6 +91,7 @@ void run(const Rig& rig, const Frame& frame, int threads, int runs, bool with_sh
 
 int main(int argc, char** argv) {
   using namespace pencilscan;
+  keep_freed_memory();
   std::string rig_path;
   std::string frame_folder;
   int threads = 2;

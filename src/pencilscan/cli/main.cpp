@@ -6,6 +6,7 @@
 
 #include "pencilscan/cli/command.h"
 #include "pencilscan/core/error.h"
+#include "pencilscan/core/memory.h"
 
 namespace pencilscan::cli {
 namespace {
@@ -48,6 +49,7 @@ int run(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   using namespace pencilscan;
+  keep_freed_memory();
   // A write beyond the file size limit shall fail like a full disk instead of ending the program.
   std::signal(SIGXFSZ, SIG_IGN);
   try {

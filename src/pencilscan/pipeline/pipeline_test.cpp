@@ -122,6 +122,28 @@ TEST_F(PipelineTest, JointAndMultiviewLabelTheBallAndLinearWorksWithOneCamera) {
   EXPECT_LT(label_figures(one_truth, linear.points, linear_verdicts).wrong.value(), 0.5);
 }
 
+TEST_F(PipelineTest, LinesWithoutACodeAreToldApartWhereFourProjectorsShareAColour) {
+  Rig rig = *rig_;
+  for (const auto& [eye, axis] : {std::pair(Vec3(450, -225, 45), Axis::kColumn),
+                                  std::pair(Vec3(386, 140, -277), Axis::kRow)}) {
+    Projector projector = rig.projectors.front();
+    projector.name = "proj" + std::to_string(rig.projectors.size());
+    projector.device_from_world = look_at(eye, Vec3::Zero());
+    projector.patterns.front().axis = axis;
+    rig.projectors.push_back(projector);
+  }
+  for (Projector& projector : rig.projectors) {
+    projector.patterns.front().colors = {"white"};
+    projector.patterns.front().alphabet = 1;
+    projector.patterns.front().sequence = {0};
+  }
+  const PointResult result = measure_points(rig, render_frame(rig, ball()), {});
+  ASSERT_GT(result.points.size(), 5000U);
+  const TruthScene truth(ball(), rig);
+  const auto verdicts = judge_points(truth, result.points);
+  EXPECT_LT(label_figures(truth, result.points, verdicts).wrong.value(), 0.01);
+}
+
 TEST_F(PipelineTest, SingleProjectorLabelsTheGridOfOneProjector) {
   Rig rig = *rig_;
   rig.cameras.resize(1);

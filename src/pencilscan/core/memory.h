@@ -1,0 +1,9 @@
+#pragma once
+
+namespace pencilscan {
+
+/// Makes the process keep freed memory for its next images instead of returning it to the system,
+/// which would clear every page again. For programs, at their start; glibc only, else nothing.
+void keep_freed_memory();
+
+}  // namespace pencilscan
