@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "pencilscan/calibration/board_start.h"
 #include "pencilscan/calibration/priors.h"
 #include "pencilscan/calibration/structure.h"
 #include "pencilscan/core/median.h"
@@ -65,7 +66,9 @@ class Calibration {
  public:
   Calibration(const CalibrationInput& input, const CalibrateOptions& options,
               const Progress& progress)
-      : input_(input), options_(options), progress_(progress) {}
+      : input_(input), options_(options), progress_(progress), rig_(input.rig) {
+    known_ = focal_lengths_from_boards(input, rig_);
+  }
 
   CalibrationResult run() {
     split_tracks();
@@ -105,9 +108,7 @@ class Calibration {
 
   /// Devices with inner parameters as guessed or given, no poses unless given for all.
   [[nodiscard]] std::vector<BundleDevice> start(const FocalGuess& guess) const {
-    std::vector<char> known;
-    for (const GivenCalibration& k : input_.known) known.push_back(k.K ? 1 : 0);
-    const Rig rig = rig_with_guess(input_.rig, guess, known);
+    const Rig rig = rig_with_guess(rig_, guess, known_);
     const bool posed = std::all_of(input_.known.begin(), input_.known.end(),
                                    [](const GivenCalibration& k) { return k.pose; });
     std::vector<BundleDevice> devices;
@@ -121,9 +122,7 @@ class Calibration {
   }
 
   [[nodiscard]] std::vector<FocalGuess> guesses() const {
-    std::vector<char> known;
-    for (const GivenCalibration& k : input_.known) known.push_back(k.K ? 1 : 0);
-    auto all = guess_focal_lengths(input_.rig, result_.pairs, known);
+    auto all = guess_focal_lengths(rig_, result_.pairs, known_);
     // Neighbours on the grid lead to the same place: each guess differs from the better ones.
     std::vector<FocalGuess> chosen;
     for (const FocalGuess& guess : all) {
@@ -142,7 +141,7 @@ class Calibration {
   bool find_structure() {
     const auto tried = guesses();
     std::vector<BundleProblem> problems(tried.size(), result_.problem);
-    std::vector<double> costs(tried.size());
+    std::vector<double> costs(tried.size(), 0);
     say("finding a first structure", 0);
     parallel_for(tried.size(), [&](std::size_t i) {
       problems[i].devices = start(tried[i]);
@@ -157,9 +156,31 @@ class Calibration {
       best = i;
       most = placed;
     }
+    if (!input_.board_views.empty()) {
+      auto [problem, cost] = structure_on_boards();
+      // On planes correspondences alone fit many rigs equally well: the boards' counts.
+      const bool is_alone = best == tried.size();
+      if (std::isfinite(cost) && present_devices(problem) >= most &&
+          (is_alone || cost <= 1.5 * costs[best] + 0.5)) {
+        result_.problem = std::move(problem);
+        return true;
+      }
+    }
     if (best == tried.size()) return false;
     result_.problem = std::move(problems[best]);
+    static_cast<void>(attach_boards(input_, result_.problem));
     return true;
+  }
+
+  /// A structure that boards place, and its cost; infinite where they do not join two devices.
+  [[nodiscard]] std::pair<BundleProblem, double> structure_on_boards() const {
+    constexpr FocalGuess kUsual{1.5, 1.5, 0, 0};
+    BundleProblem problem = result_.problem;
+    problem.devices = start(kUsual);
+    place_by_boards(input_, known_, problem);
+    if (present_devices(problem) < 2) return {problem, std::numeric_limits<double>::infinity()};
+    const double cost = build_structure(problem, kFocal | bit(kCy));
+    return {std::move(problem), cost};
   }
 
   void stage(unsigned free_inner, std::size_t tracks, int iterations) {
@@ -172,6 +193,7 @@ class Calibration {
     bundle.max_tracks = tracks;
     bundle.max_iterations = iterations;
     bundle.function_tolerance = tracks == 0 ? 1e-8 : 1e-6;
+    weigh_corners(problem);
     adjust(problem, bundle);
     result_.free_inner = free_inner;
     result_.extra_sigma_px = bundle.extra_sigma_px;
@@ -179,6 +201,7 @@ class Calibration {
 
   void drop() {
     BundleProblem& problem = result_.problem;
+    drop_corners(problem, options_.outlier_deviations);
     const double scale = error_scale(problem);
     result_.views_dropped +=
         drop_outliers(problem, std::max(options_.outlier_deviations * scale, 0.3));
@@ -280,6 +303,7 @@ class Calibration {
       r.median_px = lower_quantile(errors[d], 0.5);
       r.p95_px = lower_quantile(errors[d], 0.95);
     }
+    result_.board_rms_px = board_rms_px(problem);
     measure_held_out();
   }
 
@@ -312,6 +336,8 @@ class Calibration {
   const CalibrationInput& input_;
   const CalibrateOptions& options_;
   const Progress& progress_;
+  Rig rig_;                  ///< with focal lengths that boards give
+  std::vector<char> known_;  ///< per device: K is given, or from boards
   CalibrationResult result_;
 };
 

@@ -54,6 +54,7 @@ struct CalibrationResult {
   std::vector<char> inner_held;  ///< per device: given inner parameters fit the data and were kept
   unsigned free_inner = 0;
   double extra_sigma_px = 0;  ///< scatter beyond the views' own deviations
+  double board_rms_px = 0;    ///< of the corners of boards; 0 without
   double rms_px = 0;          ///< over all views of used tracks but the hubs, which are exact
   double held_out_rms_px = 0;
   std::size_t views = 0;
@@ -62,9 +63,9 @@ struct CalibrationResult {
   bool solved = false;
 };
 
-/// From correspondences to a rig: guesses of focal lengths, structure for the best few of them,
-/// bundle adjustment in stages (focal lengths; principal points; aspect and k1; the other terms),
-/// outliers dropped between them.
+/// From correspondences, and corners of boards if any, to a rig: guesses of focal lengths,
+/// structure for the best few of them, bundle adjustment in stages (focal lengths; principal
+/// points; aspect and k1; the other terms), outliers dropped between them.
 [[nodiscard]] CalibrationResult calibrate(const CalibrationInput& input,
                                           const CalibrateOptions& options = {},
                                           const Progress& progress = {});

@@ -108,7 +108,7 @@ bool fix_frame(const CalibrationInput& input, BundleProblem& problem) {
     from.push_back(center_of(problem.devices[d]));
     to.push_back(calibrated_device(input.rig, d).center());
   }
-  bool scaled = !input.board_views.empty();
+  bool scaled = !problem.board_views.empty();
   double scale = 1;
   if (from.size() >= 3) {
     Eigen::Matrix3Xd a(3, from.size());

@@ -121,7 +121,11 @@ nlohmann::ordered_json calibration_json(const CalibrationReport& report) {
   json["tracks"] = std::count(result.problem.used.begin(), result.problem.used.end(), 1);
   json["views"] = result.views;
   json["views_dropped"] = result.views_dropped;
+  if (!result.problem.board_views.empty())
+    json["board"] = {{"corners", result.problem.board_views.size()},
+                     {"rms_px", result.board_rms_px}};
   json["extra_sigma_px"] = result.extra_sigma_px;
+  json["shared_variance"] = report.uncertainty.shared_variance;
   json["volume"] = {{"radius", report.uncertainty.volume_radius},
                     {"point_sigma_median", report.uncertainty.volume_median},
                     {"point_sigma_p95", report.uncertainty.volume_p95}};

@@ -18,12 +18,6 @@ namespace {
 
 constexpr double kEarlySigmaPx = 2;  ///< lenses and focal lengths are not known yet
 
-const TrackView* view_in(const Track& track, std::size_t device) {
-  for (const TrackView& view : track.views)
-    if (view.device == device) return &view;
-  return nullptr;
-}
-
 std::vector<cv::Point2d> normalized(const BundleDevice& device, const std::vector<Vec2>& pixels) {
   std::vector<cv::Point2d> result;
   for (const Vec2& p : pixels) {

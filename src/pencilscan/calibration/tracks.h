@@ -26,6 +26,13 @@ struct Track {
   std::size_t capture = 0;       ///< object pose; pieces of one capture do not move
 };
 
+/// A device's view of a track; null when it has none.
+[[nodiscard]] inline const TrackView* view_in(const Track& track, std::size_t device) {
+  for (const TrackView& view : track.views)
+    if (view.device == device) return &view;
+  return nullptr;
+}
+
 [[nodiscard]] inline std::size_t device_total(const Rig& rig) {
   return rig.cameras.size() + rig.projectors.size();
 }

@@ -1,8 +1,12 @@
 #include "pencilscan/calibration/uncertainty.h"
 
+#include <ceres/rotation.h>
+
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numeric>
+#include <tuple>
 
 #include "pencilscan/calibration/structure.h"
 #include "pencilscan/core/median.h"
@@ -36,6 +40,7 @@ class NormalEquations {
     for (const BundleDevice& device : problem.devices) rotations_.push_back(rotation_of(device));
     for (std::size_t t = 0; t < problem.tracks.size(); ++t)
       if (problem.used[t] != 0) add_track(t);
+    add_boards();
     add_priors(free_inner);
   }
 
@@ -56,6 +61,24 @@ class NormalEquations {
     Eigen::Matrix<double, 2, 3> point_part;
   };
 
+  /// Weighted derivatives of a view of a point.
+  [[nodiscard]] ViewRow row_of(const ViewLinearization& view, std::size_t device, const Vec3& point,
+                               bool has_loss) const {
+    // Derivatives by the point in the device's frame give those by the pose.
+    const Mat3& R = rotations_[device];
+    const Eigen::Matrix<double, 2, 3> by_local = view.point * R.transpose();
+    const double weight =
+        has_loss ? 1 / (1 + view.residual.squaredNorm() / (loss_scale_ * loss_scale_)) : 1;
+    ViewRow row;
+    row.device = static_cast<Eigen::Index>(device);
+    row.device_part.leftCols<3>() = -by_local * cross_matrix(R * point);
+    row.device_part.middleCols<3>(3) = by_local;
+    row.device_part.rightCols<kIntrinsics>() = view.inner;
+    row.device_part *= std::sqrt(weight);
+    row.point_part = std::sqrt(weight) * view.point;
+    return row;
+  }
+
   void add_track(std::size_t t) {
     std::vector<ViewRow> rows;
     const auto& views = problem_.tracks[t].views;
@@ -65,22 +88,10 @@ class NormalEquations {
       if (!device.present || !view_error(device, problem_.points[t], views[i])) continue;
       const ViewLinearization view =
           linearize(device, problem_.points[t], views[i], i == 0 ? 0 : extra_);
-      // Derivatives by the point in the device's frame give those by the pose.
-      const Mat3& R = rotations_[views[i].device];
-      const Eigen::Matrix<double, 2, 3> by_local = view.point * R.transpose();
-      const double weight =
-          i == 0 ? 1 : 1 / (1 + view.residual.squaredNorm() / (loss_scale_ * loss_scale_));
       if (i > 0)
         for (Eigen::Index k = 0; k < 2; ++k)
           residuals_.push_back(std::abs(view.residual[k]) * std::sqrt(2 * n / (2 * n - 1)));
-      ViewRow row;
-      row.device = static_cast<Eigen::Index>(views[i].device);
-      row.device_part.leftCols<3>() = -by_local * cross_matrix(R * problem_.points[t]);
-      row.device_part.middleCols<3>(3) = by_local;
-      row.device_part.rightCols<kIntrinsics>() = view.inner;
-      row.device_part *= std::sqrt(weight);
-      row.point_part = std::sqrt(weight) * view.point;
-      rows.push_back(row);
+      rows.push_back(row_of(view, views[i].device, problem_.points[t], i > 0));
     }
     if (rows.size() < 2) return;
     Mat3 V = Mat3::Zero();
@@ -96,6 +107,40 @@ class NormalEquations {
         H_.block<kBlock, kBlock>(kBlock * a.device, kBlock * b.device) -=
             WaV * (b.point_part.transpose() * b.device_part);
     }
+  }
+
+  /// The poses of boards are eliminated as points are.
+  void add_boards() {
+    using DeviceByBoard = Eigen::Matrix<double, kBlock, 6>;
+    struct Sum {
+      Mat6 board = Mat6::Zero();
+      std::map<Eigen::Index, DeviceByBoard> by_device;
+    };
+    std::map<std::size_t, Sum> sums;
+    for (const BoardView& seen : problem_.board_views) {
+      const BundleDevice& device = problem_.devices[seen.view.device];
+      const auto& pose = problem_.board_poses[seen.board];
+      Mat3 R;
+      ceres::AngleAxisToRotationMatrix(pose.data(), R.data());
+      const Vec3 arm = R * Vec3(seen.position_mm.x(), seen.position_mm.y(), 0);
+      const Vec3 point = arm + Vec3(pose[3], pose[4], pose[5]);
+      if (!device.present || !view_error(device, point, seen.view)) continue;
+      const ViewRow row =
+          row_of(linearize(device, point, seen.view, extra_), seen.view.device, point, true);
+      Eigen::Matrix<double, 2, 6> by_board;
+      by_board << -row.point_part * cross_matrix(arm), row.point_part;
+      Sum& sum = sums[seen.board];
+      sum.board += by_board.transpose() * by_board;
+      const auto [at, is_new] = sum.by_device.try_emplace(row.device, DeviceByBoard::Zero());
+      at->second += row.device_part.transpose() * by_board;
+      H_.block<kBlock, kBlock>(kBlock * row.device, kBlock * row.device) +=
+          row.device_part.transpose() * row.device_part;
+    }
+    for (const auto& [board, sum] : sums)
+      for (const auto& [a, Wa] : sum.by_device)
+        for (const auto& [b, Wb] : sum.by_device)
+          H_.block<kBlock, kBlock>(kBlock * a, kBlock * b) -=
+              Wa * solve_symmetric(Eigen::MatrixXd(sum.board), Wb.transpose());
   }
 
   void add_priors(unsigned free_inner) {
@@ -136,7 +181,8 @@ class NormalEquations {
   std::vector<double> residuals_;
 };
 
-/// How poses change under the seven similarities of the world about `middle`: turn, shift, scale.
+/// How poses change under the similarities of the world about `middle`: turn, shift, scale. A board
+/// fixes the scale.
 Eigen::MatrixXd gauge(const BundleProblem& problem, const Vec3& middle) {
   const auto count = static_cast<Eigen::Index>(problem.devices.size());
   Eigen::MatrixXd G = Eigen::MatrixXd::Zero(kBlock * count, 7);
@@ -151,7 +197,39 @@ Eigen::MatrixXd gauge(const BundleProblem& problem, const Vec3& middle) {
     const Vec3 t(device.pose[3], device.pose[4], device.pose[5]);
     G.block<3, 1>(kBlock * d + 3, 6) = t + R * middle;
   }
+  if (!problem.board_views.empty()) G.conservativeResize(Eigen::NoChange, 6);
   return G;
+}
+
+/// By how much more the errors vary from one part of the images to the next than independent ones
+/// would: the mean squared mean of a cell's errors, over that of as many independent errors. Lenses
+/// unlike the model, bent boards and light from elsewhere make neighbours err alike, and many alike
+/// errors weigh as one. At least 1.
+double shared_variance(const BundleProblem& problem) {
+  constexpr int kCells = 8;  // along an image's width
+  constexpr double kFewest = 5;
+  struct Cell {
+    Vec2 sum = Vec2::Zero();
+    double squares = 0;
+    double count = 0;
+  };
+  std::map<std::tuple<std::size_t, int, int>, Cell> cells;
+  for_each_residual(problem, [&](std::size_t, const TrackView& view, const Vec2& error) {
+    const double size = (2 * problem.devices[view.device].prior[kCx] + 1) / kCells;
+    Cell& cell = cells[{view.device, static_cast<int>(view.pixel.x() / size),
+                        static_cast<int>(view.pixel.y() / size)}];
+    cell.sum += error;
+    cell.squares += error.squaredNorm();
+    cell.count += 1;
+  });
+  double of_means = 0;
+  double expected = 0;
+  for (const auto& [key, cell] : cells) {
+    if (cell.count < kFewest) continue;
+    of_means += cell.sum.squaredNorm() / cell.count;
+    expected += cell.squares / cell.count;
+  }
+  return expected > 0 ? std::max(1.0, of_means / expected) : 1;
 }
 
 struct Covariance {
@@ -170,7 +248,7 @@ Covariance invert(const NormalEquations& normal, const BundleProblem& problem, c
   Eigen::VectorXd unit(n);
   Eigen::MatrixXd H(n, n);
   const Eigen::MatrixXd full_gauge = gauge(problem, middle);
-  Eigen::MatrixXd G(n, 7);
+  Eigen::MatrixXd G(n, full_gauge.cols());
   for (Eigen::Index i = 0; i < n; ++i) {
     const Eigen::Index at = result.at[static_cast<std::size_t>(i)];
     const Eigen::Index kind = at % kBlock;
@@ -303,7 +381,8 @@ Uncertainty uncertainty(const BundleProblem& problem, unsigned free_inner, doubl
     if (device.present) distance = std::max(distance, (center_of(device) - middle).norm());
 
   const NormalEquations normal(problem, free_inner, loss_scale, extra_sigma_px);
-  result.variance_factor = std::max(normal.variance_factor(), 0.05);
+  result.shared_variance = shared_variance(problem);
+  result.variance_factor = std::max(normal.variance_factor(), 0.05) * result.shared_variance;
   const Covariance covariance = invert(normal, problem, middle, distance);
   const double factor = std::sqrt(result.variance_factor);
   for (std::size_t i = 0; i < covariance.at.size(); ++i) {

@@ -19,6 +19,8 @@ struct DeviceUncertainty {
 struct Uncertainty {
   std::vector<DeviceUncertainty> devices;
   double variance_factor = 1;  ///< of the whitened residuals; sd are multiplied by its root
+  /// The part of it that comes from neighbours in an image that err alike; 1: they do not.
+  double shared_variance = 1;
   /// Errors of points of the working volume, from the rig's own errors alone, after the similarity
   /// that fits best (poses of the whole rig and its scale mean nothing): root mean square per point
   /// over random rigs, then median and 95th percentile over points; rig units.

@@ -68,7 +68,7 @@ class Judge {
     const double limit =
         result_.pairs.size() == 1 ? options_.planar_share_one_pair : options_.planar_share;
     if (all == 0 || planar / all < limit) return;
-    const bool helped = !input_.board_views.empty();
+    const bool helped = !result_.problem.board_views.empty();
     add(helped ? Grade::kDoubtful : Grade::kUnusable,
         "planar scene: one plane explains " + percent(planar / all) +
             " of the correspondences, and every rig sees a plane alike",
@@ -78,7 +78,7 @@ class Judge {
 
   /// One fundamental matrix has seven degrees of freedom: the pose takes five.
   void judge_knowledge() {
-    if (result_.placed.size() > 2 || !input_.board_views.empty()) return;
+    if (result_.placed.size() > 2 || !result_.problem.board_views.empty()) return;
     if (input_.known[0].K || input_.known[1].K) return;
     add(Grade::kDoubtful,
         "one camera and one projector without a known K: two views fix two inner parameters, all "
@@ -208,6 +208,9 @@ class Judge {
   }
 
   void judge_scale() {
+    if (!input_.board_views.empty() && result_.problem.board_views.empty())
+      add(Grade::kDoubtful, "the board was seen, but not placed: too few correspondences lie on it",
+          "let a projector light the board while a camera sees all of it");
     if (!result_.rig.unit_known)
       add(Grade::kGood, "the scale is not known: the rig's unit is \"unknown\"",
           "give --known-distance, or a --board");

@@ -3,6 +3,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "pencilscan/calibration/board.h"
 #include "pencilscan/calibration/calibration_report.h"
 #include "pencilscan/calibration/gray_decode.h"
 #include "pencilscan/calibration/tracks.h"
@@ -23,6 +24,7 @@ struct CalibrateCommand {
   std::string devices;
   std::string out;
   std::vector<std::string> known_distance;
+  std::string board;
   std::size_t max_tracks = GrayTrackOptions{}.max_tracks;
   bool overwrite = false;
 };
@@ -51,11 +53,15 @@ std::optional<KnownDistance> known_distance(const CalibrateCommand& command, con
   return distance;
 }
 
-/// Decodes one pair and adds its correspondences, unless the codes make no sense.
+/// Decodes one pair and adds its correspondences, unless the codes make no sense; looks for the
+/// board where all of the panel is lit.
 DecodeSummary decode_pair(const CapturePair& pair, std::size_t capture, const Rig& rig,
-                          TrackBuilder& tracks, std::vector<Finding>& findings) {
+                          TrackBuilder& tracks, BoardFinder* boards,
+                          std::vector<Finding>& findings) {
   const Projector& projector = rig.projectors[pair.projector];
-  const DecodedView view = decode_gray_stack(read_gray_stack(pair, rig));
+  const GrayStack stack = read_gray_stack(pair, rig);
+  if (boards != nullptr) boards->look(capture, pair.camera, stack.white);
+  const DecodedView view = decode_gray_stack(stack);
   DecodeSummary summary{capture, pair.projector, pair.camera, view.counts, view.valid_share(), 0,
                         {}};
   summary.wrong_order = explain_wrong_order(
@@ -100,6 +106,7 @@ nlohmann::ordered_json figures_of(const CalibrationResult& result, const Uncerta
       figures["reasons"].push_back(verdict.findings[i].what);
   figures["rms_px"] = result.rms_px;
   figures["held_out_rms_px"] = result.held_out_rms_px;
+  if (!result.problem.board_views.empty()) figures["board_rms_px"] = result.board_rms_px;
   figures["views"] = result.views;
   figures["views_dropped"] = result.views_dropped;
   figures["point_sigma"] = uncertainty.volume_median;
@@ -118,6 +125,9 @@ void run_calibrate(const CalibrateCommand& command) {
   input.known = devices.given;
   input.distance = known_distance(command, input.rig);
 
+  std::optional<BoardFinder> boards;
+  if (!command.board.empty()) boards.emplace(chessboard_from_text(command.board, "--board"));
+
   const Progress progress = stderr_progress();
   GrayTrackOptions track_options;
   track_options.max_tracks = command.max_tracks;
@@ -132,10 +142,19 @@ void run_calibrate(const CalibrateCommand& command) {
       progress("decoding", (static_cast<double>(k) +
                             static_cast<double>(i) / static_cast<double>(captures[k].size())) /
                                static_cast<double>(captures.size()));
-      decoded.push_back(decode_pair(captures[k][i], k, input.rig, tracks, findings));
+      decoded.push_back(
+          decode_pair(captures[k][i], k, input.rig, tracks, boards ? &*boards : nullptr, findings));
     }
   }
   input.tracks = tracks.tracks();
+  if (boards) {
+    input.board_views = boards->views();
+    input.boards = command.captures.size();
+    if (boards->found() == 0)
+      findings.push_back({Grade::kDoubtful,
+                          "the board " + command.board + " is in no picture of any camera",
+                          "count its inner corners, and let a camera see all of it lit"});
+  }
 
   CalibrateOptions options;
   const CalibrationResult result = calibrate(input, options, progress);
@@ -183,6 +202,9 @@ void add_calibrate_command(CLI::App& app) {
       ->add_option("--known-distance", options->known_distance,
                    "Two devices and the distance of their centres in mm: cam0 cam1 850")
       ->expected(3);
+  command->add_option("--board", options->board,
+                      "A chessboard in the captures, inner corners and mm of a square: "
+                      "chessboard:9x7:75");
   command->add_option("--max-tracks", options->max_tracks, "Surface points to use at most")
       ->check(CLI::Range(std::size_t{200}, std::size_t{1000000}))
       ->capture_default_str();

@@ -1,0 +1,33 @@
+#pragma once
+
+#include "pencilscan/calibration/calibrate.h"
+
+namespace pencilscan {
+
+/// Focal lengths of cameras whose K is not given, from the boards they see (principal point in the
+/// middle, square pixels; Z. Zhang, "A flexible new technique for camera calibration", 2000), into
+/// the rig. Returns, per device, whether its K is given or was found here.
+[[nodiscard]] std::vector<char> focal_lengths_from_boards(const CalibrationInput& input, Rig& rig);
+
+/// Poses from boards alone, in mm: boards and cameras follow from each other, then projectors from
+/// their correspondences on the boards (the homography of the plane gives pose and, where K is not
+/// given, focal length and lens shift). `problem.devices` have inner parameters, no poses; those
+/// found become present. For planar scenes, where fundamental matrices say nothing.
+void place_by_boards(const CalibrationInput& input, const std::vector<char>& known,
+                     BundleProblem& problem);
+
+/// Poses of the boards in a structure whose scale means nothing; the structure gets the boards'
+/// millimetres, from the depth of correspondences on them. Returns false, with no board in the
+/// problem, where no board has enough of them.
+[[nodiscard]] bool attach_boards(const CalibrationInput& input, BundleProblem& problem);
+
+/// Gives corners the deviation that their scatter shows, three times as large: boards are never
+/// quite flat, and neighbouring corners err alike.
+void weigh_corners(BundleProblem& problem);
+/// Drops the corners beyond `deviations` times their robust scatter, half a pixel at least.
+void drop_corners(BundleProblem& problem, double deviations);
+
+/// Root mean square reprojection error of the corners, px; 0 without boards.
+[[nodiscard]] double board_rms_px(const BundleProblem& problem);
+
+}  // namespace pencilscan

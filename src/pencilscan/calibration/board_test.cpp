@@ -1,0 +1,172 @@
+#include "pencilscan/calibration/board.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+#include "pencilscan/calibration/board_start.h"
+#include "pencilscan/calibration/verdict.h"
+#include "pencilscan/core/error.h"
+#include "pencilscan/core/random.h"
+#include "pencilscan/rig/sample_devices.h"
+
+namespace pencilscan {
+namespace {
+
+constexpr Chessboard kBoard{9, 7, 30};
+
+TEST(Board, TextSaysCornersAndMillimetres) {
+  const Chessboard board = chessboard_from_text("chessboard:9x7:75.5", "--board");
+  EXPECT_EQ(board.columns, 9);
+  EXPECT_EQ(board.rows, 7);
+  EXPECT_EQ(board.square_mm, 75.5);
+  for (const char* wrong :
+       {"", "chessboard", "chessboard:9x7", "chessboard:9x7:0", "chessboard:2x7:5",
+        "chessboard:9x7:nan", "chessboard:9x7:75mm", "charuco:9x7:75"})
+    EXPECT_THROW(static_cast<void>(chessboard_from_text(wrong, "--board")), InputError) << wrong;
+}
+
+/// A board with a white margin, `cell` pixels to a square; inner corners at ((i + 2) cell - 0.5).
+cv::Mat flat_board(int cell) {
+  cv::Mat image((kBoard.rows + 3) * cell, (kBoard.columns + 3) * cell, CV_32F, cv::Scalar(0.8));
+  for (int i = 0; i <= kBoard.columns; ++i)
+    for (int j = 0; j <= kBoard.rows; ++j)
+      if ((i + j) % 2 == 0) image(cv::Rect((i + 1) * cell, (j + 1) * cell, cell, cell)) = 0.1;
+  return image;
+}
+
+TEST(Board, CornersAreFoundToATenthOfAPixelUnderPerspective) {
+  constexpr int kCell = 40;
+  const cv::Matx33d view(0.9, 0.2, 60, -0.1, 0.8, 90, 2e-4, 3e-4, 1);
+  cv::Mat image;
+  cv::warpPerspective(flat_board(kCell), image, view, {640, 480}, cv::INTER_AREA);
+  cv::GaussianBlur(image, image, {}, 0.8);
+  const std::vector<Vec2> corners = find_chessboard(0.4 * image, kBoard);
+  ASSERT_EQ(corners.size(), 63U);
+  double sum = 0;
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    const cv::Vec3d x = view * cv::Vec3d((static_cast<double>(i % 9) + 2) * kCell - 0.5,
+                                         (static_cast<double>(i / 9) + 2) * kCell - 0.5, 1);
+    const Vec2 truth(x[0] / x[2], x[1] / x[2]);
+    // From either end: the board is the same upside down.
+    sum += std::min((corners[i] - truth).norm(), (corners[62 - i] - truth).norm());
+  }
+  EXPECT_LT(sum / 63, 0.1);
+  EXPECT_TRUE(find_chessboard(cv::Mat(480, 640, CV_32F, cv::Scalar(0.5)), kBoard).empty());
+}
+
+/// A camera and a projector before a tilted board that fills both.
+class OnBoard : public testing::Test {
+ protected:
+  OnBoard() {
+    truth_.cameras = {sample::device_at<Camera>({900, -250, 120}, "cam0", 1280, 960, 1500)};
+    truth_.projectors = {sample::device_at<Projector>({800, 300, -80}, "proj0", 1024, 768, 1300)};
+    truth_.projectors[0].K(1, 2) = 620;  // lens shift
+  }
+
+  /// World from board: the board's middle lies in the origin.
+  static RigidTransform placing(double tilt_y, double tilt_z) {
+    Mat3 R;
+    R << 0, 0, 1, 1, 0, 0, 0, 1, 0;
+    R = Eigen::AngleAxisd(tilt_z, Vec3::UnitZ()) * Eigen::AngleAxisd(tilt_y, Vec3::UnitY()) * R;
+    const Vec3 middle(4 * kBoard.square_mm, 3 * kBoard.square_mm, 0);
+    return {R, -(R * middle)};
+  }
+
+  /// Adds a capture: corners in all cameras, tracks on the board's plane.
+  void add_capture(const RigidTransform& world_from_board) {
+    const std::size_t capture = input_.boards++;
+    for (std::size_t c = 0; c < truth_.cameras.size(); ++c)
+      for (int i = 0; i < kBoard.columns * kBoard.rows; ++i) {
+        // The second camera numbers the corners from the other end.
+        const int k = c == 0 ? i : kBoard.columns * kBoard.rows - 1 - i;
+        const Vec2 at = kBoard.square_mm * Vec2(k % kBoard.columns, k / kBoard.columns);
+        const Vec2 shown = kBoard.square_mm * Vec2(i % kBoard.columns, i / kBoard.columns);
+        const Vec3 x = world_from_board * Vec3(at.x(), at.y(), 0);
+        input_.board_views.push_back(
+            {capture, shown, {c, *truth_.cameras[c].project(x) + noise(0.1), 0.1}});
+      }
+    for (int i = 0; i < 250; ++i)
+      add_track(world_from_board * Vec3(random_.uniform(0, 240), random_.uniform(0, 180), 0),
+                capture);
+  }
+
+  void add_track(const Vec3& x, std::size_t capture) {
+    Track track;
+    track.capture = capture;
+    const auto hub = truth_.projectors[0].project(x);
+    if (!hub || !truth_.projectors[0].contains(*hub)) return;
+    track.views.push_back({truth_.cameras.size(), *hub, 0.02});
+    for (std::size_t c = 0; c < truth_.cameras.size(); ++c) {
+      const auto pixel = truth_.cameras[c].project(x);
+      if (pixel && truth_.cameras[c].contains(*pixel))
+        track.views.push_back({c, *pixel + noise(0.1), 0.1});
+    }
+    if (track.views.size() > 1) input_.tracks.push_back(track);
+  }
+
+  CalibrationResult calibrated() {
+    input_.rig = truth_;
+    input_.known.assign(device_total(truth_), {});
+    for (std::size_t d = 0; d < input_.known.size(); ++d) {
+      Device& device = calibrated_device(input_.rig, d);
+      device.K = Mat3::Identity();
+      device.device_from_world = {};
+    }
+    return calibrate(input_);
+  }
+
+  Vec2 noise(double sigma) { return {random_.normal(0, sigma), random_.normal(0, sigma)}; }
+
+  [[nodiscard]] static double distance(const Rig& rig) {
+    return (rig.cameras[0].center() - rig.projectors[0].center()).norm();
+  }
+
+  Rig truth_;
+  CalibrationInput input_;
+  Random random_{5};
+};
+
+TEST_F(OnBoard, OnePoseGivesTheCameraAndNeverAGoodRig) {
+  add_capture(placing(0.5, -0.5));
+  const CalibrationResult result = calibrated();
+  ASSERT_TRUE(result.solved);
+  EXPECT_TRUE(result.rig.unit_known);
+  EXPECT_LT(result.rms_px, 0.2);         // of 0.1 px noise in each coordinate
+  EXPECT_LT(result.board_rms_px, 0.25);  // the same, less what the pose takes up
+  const Uncertainty sigma = uncertainty(result.problem, result.free_inner,
+                                        BundleOptions{}.loss_scale, result.extra_sigma_px);
+  EXPECT_LT(std::abs(result.rig.cameras[0].K(0, 0) - truth_.cameras[0].K(0, 0)),
+            3 * sigma.devices[0].inner[kFx]);
+  EXPECT_NE(judge(input_, result, sigma, {}).grade, Grade::kGood);
+}
+
+TEST_F(OnBoard, FivePosesGiveFocalLengthsAndScale) {
+  for (const auto& [y, z] : {std::pair(0.5, 0.3), std::pair(-0.4, 0.4), std::pair(0.2, -0.6),
+                             std::pair(-0.5, -0.3), std::pair(0.0, 0.1)})
+    add_capture(placing(y, z));
+  const CalibrationResult result = calibrated();
+  ASSERT_TRUE(result.solved);
+  EXPECT_NEAR(result.rig.cameras[0].K(0, 0), 1500, 6);
+  EXPECT_NEAR(result.rig.projectors[0].K(0, 0), 1300, 8);
+  EXPECT_NEAR(result.rig.projectors[0].K(1, 2), 620, 15);
+  EXPECT_NEAR(distance(result.rig) / distance(truth_), 1, 0.02);  // hangs on the focal lengths
+}
+
+TEST_F(OnBoard, ABoardInASceneWithDepthGivesItsScaleFromEitherEnd) {
+  truth_.cameras.push_back(sample::device_at<Camera>({850, 80, 350}, "cam1", 1280, 960, 1600));
+  add_capture(placing(0.4, 0.2));
+  for (int i = 0; i < 800; ++i)
+    add_track(
+        Vec3(random_.uniform(-150, 150), random_.uniform(-150, 150), random_.uniform(-120, 120)),
+        0);
+  const CalibrationResult result = calibrated();
+  ASSERT_TRUE(result.solved);
+  EXPECT_TRUE(result.rig.unit_known);
+  EXPECT_LT(result.board_rms_px, 0.25);
+  EXPECT_NEAR(distance(result.rig) / distance(truth_), 1, 0.02);  // hangs on the focal lengths
+}
+
+}  // namespace
+}  // namespace pencilscan
