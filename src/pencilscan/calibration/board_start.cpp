@@ -1,7 +1,5 @@
 #include "pencilscan/calibration/board_start.h"
 
-#include <ceres/rotation.h>
-
 #include <Eigen/Geometry>
 #include <Eigen/SVD>
 #include <algorithm>
@@ -14,6 +12,7 @@
 #include <opencv2/imgproc.hpp>
 #include <optional>
 
+#include "pencilscan/calibration/board_corners.h"
 #include "pencilscan/calibration/priors.h"
 #include "pencilscan/calibration/structure.h"
 #include "pencilscan/core/median.h"
@@ -41,18 +40,6 @@ std::vector<Sighting> sightings_of(const std::vector<BoardView>& views) {
   return sightings;
 }
 
-RigidTransform pose_of(const std::array<double, 6>& pose) {
-  RigidTransform transform;
-  ceres::AngleAxisToRotationMatrix(pose.data(), transform.rotation.data());
-  transform.translation = Vec3(pose[3], pose[4], pose[5]);
-  return transform;
-}
-
-void set_board_pose(const RigidTransform& world_from_board, std::array<double, 6>& pose) {
-  ceres::RotationMatrixToAngleAxis(world_from_board.rotation.data(), pose.data());
-  std::copy_n(world_from_board.translation.data(), 3, pose.begin() + 3);
-}
-
 std::optional<RigidTransform> camera_from_board(const BundleProblem& problem, const Sighting& s) {
   std::vector<cv::Point3d> points;
   std::vector<cv::Point2d> rays;
@@ -78,34 +65,12 @@ std::optional<RigidTransform> camera_from_board(const BundleProblem& problem, co
   return pose;
 }
 
-constexpr double kBehind = 1e3;  ///< px, error of what a device cannot see
-
-/// From where the device sees a corner to where it should, px.
-Vec2 corner_error(const BundleProblem& problem, const BoardView& v) {
-  const RigidTransform world_from_board = pose_of(problem.board_poses[v.board]);
-  return view_error(problem.devices[v.view.device],
-                    world_from_board * Vec3(v.position_mm.x(), v.position_mm.y(), 0), v.view)
-      .value_or(Vec2(kBehind, 0));
-}
-
 /// Sum of the squared errors of a sighting's corners.
 double misses(const BundleProblem& problem, const Sighting& s) {
   double sum = 0;
   for (const std::size_t i : s.views)
     sum += corner_error(problem, problem.board_views[i]).squaredNorm();
   return sum;
-}
-
-/// Robust deviation of one coordinate of the corners, px.
-double corner_scatter(const BundleProblem& problem) {
-  std::vector<double> errors;
-  for (const BoardView& v : problem.board_views) {
-    if (!problem.devices[v.view.device].present) continue;
-    const Vec2 error = corner_error(problem, v);
-    errors.push_back(std::abs(error.x()));
-    errors.push_back(std::abs(error.y()));
-  }
-  return errors.empty() ? 0 : kDeviationPerMedian * upper_median(std::move(errors));
 }
 
 /// Numbers the corners from the other end.
@@ -164,7 +129,7 @@ std::map<std::size_t, PlanePoints> plane_points(const BundleProblem& problem,
   for (const Sighting& s : sightings) {
     if (!problem.devices[s.device].present) continue;
     const BoardOutline outline(problem.board_views, s);
-    const RigidTransform world_from_board = pose_of(problem.board_poses[s.board]);
+    const RigidTransform world_from_board = transform_from(problem.board_poses[s.board]);
     const RigidTransform board_from_world = world_from_board.inverse();
     for (const Track& track : problem.tracks) {
       if (track.capture != s.board) continue;
@@ -261,7 +226,7 @@ void place_from_plane(const CalibrationInput& input, const std::vector<Sighting>
     device.prior[kFx] = device.inner[kFx];
   }
   const RigidTransform pose =
-      pose_from_homography(of_most, device) * pose_of(problem.board_poses[board]).inverse();
+      pose_from_homography(of_most, device) * transform_from(problem.board_poses[board]).inverse();
   set_pose(device, pose.rotation, pose.translation);
   device.present = true;
 }
@@ -324,11 +289,11 @@ void place_by_boards(const CalibrationInput& input, const std::vector<char>& kno
       const auto pose = camera_from_board(problem, s);
       if (!pose) continue;
       if (device.present) {
-        const RigidTransform camera_from_world = pose_of(device.pose);
-        set_board_pose(camera_from_world.inverse() * *pose, problem.board_poses[s.board]);
+        const RigidTransform camera_from_world = transform_from(device.pose);
+        problem.board_poses[s.board] = pose_from(camera_from_world.inverse() * *pose);
         has_pose[s.board] = 1;
       } else {
-        const RigidTransform p = *pose * pose_of(problem.board_poses[s.board]).inverse();
+        const RigidTransform p = *pose * transform_from(problem.board_poses[s.board]).inverse();
         set_pose(device, p.rotation, p.translation);
         device.present = true;
       }
@@ -341,7 +306,7 @@ void place_by_boards(const CalibrationInput& input, const std::vector<char>& kno
     place_from_plane(input, placed, d, known[d] != 0, problem);
 }
 
-bool attach_boards(const CalibrationInput& input, BundleProblem& problem) {
+void attach_boards(const CalibrationInput& input, BundleProblem& problem) {
   constexpr std::size_t kFewest = 8;
   problem.board_views = input.board_views;
   problem.board_poses.assign(input.boards, {});
@@ -358,7 +323,7 @@ bool attach_boards(const CalibrationInput& input, BundleProblem& problem) {
     const auto pose = camera_from_board(problem, s);
     if (!pose) continue;
     const BoardOutline outline(problem.board_views, s);
-    const RigidTransform camera_from_world = pose_of(device.pose);
+    const RigidTransform camera_from_world = transform_from(device.pose);
     Seen& added = seen.emplace_back(Seen{s, *pose});
     for (std::size_t t = 0; t < problem.tracks.size(); ++t) {
       if (problem.used[t] == 0 || problem.tracks[t].capture != s.board) continue;
@@ -372,13 +337,9 @@ bool attach_boards(const CalibrationInput& input, BundleProblem& problem) {
     }
   }
   problem.board_views.clear();
-  const auto none = [&] {
-    problem.board_poses.clear();
-    return false;
-  };
-  if (scales.size() < kFewest) return none();
+  if (scales.size() < kFewest) return problem.board_poses.clear();
   const double scale = upper_median(std::move(scales));
-  if (!std::isfinite(scale) || !(scale > 0)) return none();
+  if (!std::isfinite(scale) || !(scale > 0)) return problem.board_poses.clear();
   move_solution(scale, {}, problem);
   // The view with most of the correspondences places its board; other cameras follow.
   std::stable_sort(seen.begin(), seen.end(),
@@ -391,37 +352,11 @@ bool attach_boards(const CalibrationInput& input, BundleProblem& problem) {
       continue;
     }
     const BundleDevice& device = problem.devices[s.sighting.device];
-    const RigidTransform camera_from_world = pose_of(device.pose);
-    set_board_pose(camera_from_world.inverse() * s.pose, problem.board_poses[s.sighting.board]);
+    const RigidTransform camera_from_world = transform_from(device.pose);
+    problem.board_poses[s.sighting.board] = pose_from(camera_from_world.inverse() * s.pose);
     has_pose[s.sighting.board] = 1;
   }
   std::erase_if(problem.board_views, [&](const BoardView& v) { return has_pose[v.board] == 0; });
-  return true;
-}
-
-void weigh_corners(BundleProblem& problem) {
-  constexpr double kLeastSigmaPx = 0.1;
-  constexpr double kShared = 3;
-  const double sigma = kShared * std::max(kLeastSigmaPx, corner_scatter(problem));
-  for (BoardView& v : problem.board_views) v.view.sigma_px = sigma;
-}
-
-void drop_corners(BundleProblem& problem, double deviations) {
-  constexpr double kLeastLimitPx = 0.5;
-  const double limit = std::max(kLeastLimitPx, deviations * corner_scatter(problem));
-  std::erase_if(problem.board_views,
-                [&](const BoardView& v) { return corner_error(problem, v).norm() > limit; });
-}
-
-double board_rms_px(const BundleProblem& problem) {
-  double sum = 0;
-  std::size_t corners = 0;
-  for (const Sighting& s : sightings_of(problem.board_views)) {
-    if (!problem.devices[s.device].present) continue;
-    sum += misses(problem, s);
-    corners += s.views.size();
-  }
-  return corners > 0 ? std::sqrt(sum / static_cast<double>(corners)) : 0;
 }
 
 }  // namespace pencilscan

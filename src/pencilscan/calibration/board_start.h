@@ -17,17 +17,8 @@ void place_by_boards(const CalibrationInput& input, const std::vector<char>& kno
                      BundleProblem& problem);
 
 /// Poses of the boards in a structure whose scale means nothing; the structure gets the boards'
-/// millimetres, from the depth of correspondences on them. Returns false, with no board in the
-/// problem, where no board has enough of them.
-[[nodiscard]] bool attach_boards(const CalibrationInput& input, BundleProblem& problem);
-
-/// Gives corners the deviation that their scatter shows, three times as large: boards are never
-/// quite flat, and neighbouring corners err alike.
-void weigh_corners(BundleProblem& problem);
-/// Drops the corners beyond `deviations` times their robust scatter, half a pixel at least.
-void drop_corners(BundleProblem& problem, double deviations);
-
-/// Root mean square reprojection error of the corners, px; 0 without boards.
-[[nodiscard]] double board_rms_px(const BundleProblem& problem);
+/// millimetres, from the depth of correspondences on them. The problem has no board
+/// afterwards where none has enough of them.
+void attach_boards(const CalibrationInput& input, BundleProblem& problem);
 
 }  // namespace pencilscan

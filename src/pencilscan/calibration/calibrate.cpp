@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "pencilscan/calibration/board_corners.h"
 #include "pencilscan/calibration/board_start.h"
 #include "pencilscan/calibration/priors.h"
 #include "pencilscan/calibration/structure.h"
@@ -141,7 +142,7 @@ class Calibration {
   bool find_structure() {
     const auto tried = guesses();
     std::vector<BundleProblem> problems(tried.size(), result_.problem);
-    std::vector<double> costs(tried.size(), 0);
+    std::vector<double> costs(tried.size());
     say("finding a first structure", 0);
     parallel_for(tried.size(), [&](std::size_t i) {
       problems[i].devices = start(tried[i]);
@@ -168,7 +169,7 @@ class Calibration {
     }
     if (best == tried.size()) return false;
     result_.problem = std::move(problems[best]);
-    static_cast<void>(attach_boards(input_, result_.problem));
+    attach_boards(input_, result_.problem);
     return true;
   }
 

@@ -1,7 +1,5 @@
 #include "pencilscan/calibration/priors.h"
 
-#include <ceres/rotation.h>
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -91,12 +89,8 @@ void move_solution(double scale, const RigidTransform& new_from_old, BundleProbl
   }
   for (Vec3& point : problem.points) point = moved(point);
   for (auto& pose : problem.board_poses) {
-    Mat3 rotation;
-    ceres::AngleAxisToRotationMatrix(pose.data(), rotation.data());
-    rotation = new_from_old.rotation * rotation;
-    ceres::RotationMatrixToAngleAxis(rotation.data(), pose.data());
-    const Vec3 at = moved(Vec3(pose[3], pose[4], pose[5]));
-    std::copy_n(at.data(), 3, pose.begin() + 3);
+    const RigidTransform old = transform_from(pose);
+    pose = pose_from({new_from_old.rotation * old.rotation, moved(old.translation)});
   }
 }
 

@@ -218,11 +218,21 @@ void grow_from_present(BundleProblem& problem, const std::vector<std::size_t>& t
 
 }  // namespace
 
-Mat3 rotation_of(const BundleDevice& device) {
-  Mat3 R;
-  ceres::AngleAxisToRotationMatrix(device.pose.data(), R.data());
-  return R;
+RigidTransform transform_from(const std::array<double, 6>& pose) {
+  RigidTransform transform;
+  ceres::AngleAxisToRotationMatrix(pose.data(), transform.rotation.data());
+  transform.translation = Vec3(pose[3], pose[4], pose[5]);
+  return transform;
 }
+
+std::array<double, 6> pose_from(const RigidTransform& transform) {
+  std::array<double, 6> pose{};
+  ceres::RotationMatrixToAngleAxis(transform.rotation.data(), pose.data());
+  std::copy_n(transform.translation.data(), 3, pose.begin() + 3);
+  return pose;
+}
+
+Mat3 rotation_of(const BundleDevice& device) { return transform_from(device.pose).rotation; }
 
 Vec3 center_of(const BundleDevice& device) {
   return -rotation_of(device).transpose() * Vec3(device.pose[3], device.pose[4], device.pose[5]);

@@ -28,6 +28,9 @@ void triangulate_all(BundleProblem& problem, double least_angle_rad);
 
 /// Direction (z = 1) of a pixel in the device's frame.
 [[nodiscard]] Vec3 device_ray(const BundleDevice& device, const Vec2& pixel);
+/// Poses as the adjustment holds them (angle-axis, then translation), and back.
+[[nodiscard]] RigidTransform transform_from(const std::array<double, 6>& pose);
+[[nodiscard]] std::array<double, 6> pose_from(const RigidTransform& transform);
 [[nodiscard]] Mat3 rotation_of(const BundleDevice& device);
 [[nodiscard]] Vec3 center_of(const BundleDevice& device);
 

@@ -1,13 +1,12 @@
 #include "pencilscan/calibration/uncertainty.h"
 
-#include <ceres/rotation.h>
-
 #include <algorithm>
 #include <cmath>
 #include <map>
 #include <numeric>
 #include <tuple>
 
+#include "pencilscan/calibration/board_corners.h"
 #include "pencilscan/calibration/structure.h"
 #include "pencilscan/core/median.h"
 #include "pencilscan/core/random.h"
@@ -119,11 +118,8 @@ class NormalEquations {
     std::map<std::size_t, Sum> sums;
     for (const BoardView& seen : problem_.board_views) {
       const BundleDevice& device = problem_.devices[seen.view.device];
-      const auto& pose = problem_.board_poses[seen.board];
-      Mat3 R;
-      ceres::AngleAxisToRotationMatrix(pose.data(), R.data());
-      const Vec3 arm = R * Vec3(seen.position_mm.x(), seen.position_mm.y(), 0);
-      const Vec3 point = arm + Vec3(pose[3], pose[4], pose[5]);
+      const Vec3 point = corner_point(problem_, seen);
+      const Vec3 arm = point - transform_from(problem_.board_poses[seen.board]).translation;
       if (!device.present || !view_error(device, point, seen.view)) continue;
       const ViewRow row =
           row_of(linearize(device, point, seen.view, extra_), seen.view.device, point, true);
