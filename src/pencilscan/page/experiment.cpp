@@ -27,19 +27,6 @@ constexpr int kDepth = 4;  ///< of folders below the experiment's
 
 const char* const kPictureFolders[] = {"figures", "images", "pictures", "plots"};
 
-/// Regular files directly in a folder, ordered by name; no links.
-std::vector<fs::path> files_in(const fs::path& folder) {
-  std::vector<fs::path> files;
-  std::error_code error;
-  for (fs::directory_iterator it(folder, fs::directory_options::skip_permission_denied, error), end;
-       !error && it != end; it.increment(error)) {
-    std::error_code ignored;
-    if (!it->is_symlink(ignored) && it->is_regular_file(ignored)) files.push_back(it->path());
-  }
-  std::sort(files.begin(), files.end());
-  return files;
-}
-
 void find_runs(const fs::path& folder, int depth, std::vector<fs::path>& runs) {
   for (const fs::path& inner : folders_in(folder)) {
     if (runs.size() >= kMostRuns) return;

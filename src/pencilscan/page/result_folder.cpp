@@ -57,6 +57,20 @@ bool looks_like_frame(const fs::path& folder) {
          std::all_of(name.begin(), name.end(), [](char c) { return c >= '0' && c <= '9'; });
 }
 
+/// What is wanted of the entries directly in a folder, ordered by name; no links.
+template <class IsWanted>
+std::vector<fs::path> entries_in(const fs::path& folder, IsWanted is_wanted) {
+  std::vector<fs::path> entries;
+  std::error_code error;
+  for (fs::directory_iterator it(folder, fs::directory_options::skip_permission_denied, error), end;
+       !error && it != end; it.increment(error)) {
+    std::error_code ignored;
+    if (!it->is_symlink(ignored) && is_wanted(*it)) entries.push_back(it->path());
+  }
+  std::sort(entries.begin(), entries.end());
+  return entries;
+}
+
 }  // namespace
 
 /// A frame's folder has points or the report of a frame; `truth/` has a mesh only.
@@ -72,15 +86,17 @@ std::string folder_name(const fs::path& folder) {
 }
 
 std::vector<fs::path> folders_in(const fs::path& folder) {
-  std::vector<fs::path> folders;
-  std::error_code error;
-  for (fs::directory_iterator it(folder, fs::directory_options::skip_permission_denied, error), end;
-       !error && it != end; it.increment(error)) {
+  return entries_in(folder, [](const fs::directory_entry& entry) {
     std::error_code ignored;
-    if (it->is_directory(ignored) && !it->is_symlink(ignored)) folders.push_back(it->path());
-  }
-  std::sort(folders.begin(), folders.end());
-  return folders;
+    return entry.is_directory(ignored);
+  });
+}
+
+std::vector<fs::path> files_in(const fs::path& folder) {
+  return entries_in(folder, [](const fs::directory_entry& entry) {
+    std::error_code ignored;
+    return entry.is_regular_file(ignored);
+  });
 }
 
 ResultFolder find_results(const fs::path& root, const ResultSources& sources) {

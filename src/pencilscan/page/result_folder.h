@@ -44,5 +44,7 @@ struct ResultFolder {
 [[nodiscard]] std::string folder_name(const std::filesystem::path& folder);
 /// The folders directly in a folder, ordered by name; no links.
 [[nodiscard]] std::vector<std::filesystem::path> folders_in(const std::filesystem::path& folder);
+/// The regular files directly in a folder, ordered by name; no links.
+[[nodiscard]] std::vector<std::filesystem::path> files_in(const std::filesystem::path& folder);
 
 }  // namespace pencilscan
