@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "pencilscan/cli/command.h"
+#include "pencilscan/cli/rig_files.h"
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/io/file.h"
@@ -204,12 +205,13 @@ void add_check(CLI::App& group) {
 }  // namespace
 
 void add_rig_command(CLI::App& app) {
-  CLI::App* group = app.add_subcommand("rig", "Make and check rigs");
+  CLI::App* group = app.add_subcommand("rig", "Make, check, draw, import and export rigs");
   group->require_subcommand(1);
   group->footer(
       "Example:\n  pencilscan rig ring --out rig.json && pencilscan rig check --rig rig.json");
   add_ring(*group);
   add_check(*group);
+  add_rig_files(*group);
 }
 
 }  // namespace pencilscan::cli

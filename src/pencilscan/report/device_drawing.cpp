@@ -12,24 +12,6 @@
 namespace pencilscan {
 namespace {
 
-/// Mean of a projector's pattern colours, made strong enough to be seen on a light ground.
-Color light_color(const Projector& projector) {
-  Rgb sum{};
-  for (const LinePattern& pattern : projector.patterns) {
-    for (int i = 0; i < pattern.period(); ++i) {
-      const Rgb c = pattern.color(i);
-      for (std::size_t k = 0; k < 3; ++k) sum[k] += c[k] / pattern.period();
-    }
-  }
-  const double peak = std::max({sum[0], sum[1], sum[2]});
-  if (peak <= 0) return {110, 110, 110};
-  Color color;
-  for (std::size_t k = 0; k < 3; ++k) {
-    color[static_cast<int>(k)] = static_cast<uchar>(30 + 200 * sum[k] / peak);
-  }
-  return color;
-}
-
 struct Frustum {
   cv::Point apex;
   std::array<cv::Point, 4> corners;
@@ -76,6 +58,23 @@ void draw_frustum(const Frustum& frustum, const Color& color, bool filled, cv::M
 }
 
 }  // namespace
+
+Color light_color(const Projector& projector) {
+  Rgb sum{};
+  for (const LinePattern& pattern : projector.patterns) {
+    for (int i = 0; i < pattern.period(); ++i) {
+      const Rgb c = pattern.color(i);
+      for (std::size_t k = 0; k < 3; ++k) sum[k] += c[k] / pattern.period();
+    }
+  }
+  const double peak = std::max({sum[0], sum[1], sum[2]});
+  if (peak <= 0) return {110, 110, 110};
+  Color color;
+  for (std::size_t k = 0; k < 3; ++k) {
+    color[static_cast<int>(k)] = static_cast<uchar>(30 + 200 * sum[k] / peak);
+  }
+  return color;
+}
 
 void draw_devices(const Rig& rig, const Device& view, double size_mm, double depth_mm,
                   bool in_front, cv::Mat& picture) {

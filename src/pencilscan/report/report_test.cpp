@@ -6,8 +6,10 @@
 #include <opencv2/core.hpp>
 
 #include "pencilscan/io/image.h"
+#include "pencilscan/report/device_drawing.h"
 #include "pencilscan/report/overlay.h"
 #include "pencilscan/report/pictures.h"
+#include "pencilscan/report/rig_picture.h"
 #include "pencilscan/report/shaded_view.h"
 
 namespace pencilscan {
@@ -166,6 +168,32 @@ TEST(Pictures, FrameGivesOnePngPerPicture) {
     EXPECT_GT(high - low, 0.2) << name;
   }
   std::filesystem::remove_all(folder);
+}
+
+TEST(RigPicture, DevicesAndVolumeStandToScaleInBothViews) {
+  Rig rig;
+  rig.cameras.emplace_back();
+  static_cast<Device&>(rig.cameras[0]) = make_view({Vec3::Zero(), 100}, Vec3(1, 0, 0), 64, 48);
+  rig.cameras[0].device_from_world = look_at({1000, 0, 200}, Vec3::Zero());
+  rig.cameras[0].name = "cam0";
+  rig.projectors.emplace_back();
+  static_cast<Device&>(rig.projectors[0]) = rig.cameras[0];
+  rig.projectors[0].device_from_world = look_at({-1000, 0, -200}, Vec3::Zero());
+  rig.projectors[0].name = "proj0";
+  rig.volume = Sphere{Vec3::Zero(), 100};
+  constexpr int kSide = 500;
+  const cv::Mat picture = draw_rig(rig, kSide);
+  ASSERT_EQ(picture.size(), cv::Size(2 * kSide, kSide));
+  // 2000 mm fill four fifths of a view.
+  const auto at = [&](int view, double x, double up) {
+    return picture.at<Color>(static_cast<int>(kSide / 2.0 - 0.2 * up),
+                             static_cast<int>(view * kSide + kSide / 2.0 + 0.2 * x));
+  };
+  EXPECT_LT(color_distance(at(0, 1000, 0), {40, 44, 52}), 20);
+  EXPECT_LT(color_distance(at(1, 1000, 200), {40, 44, 52}), 20);
+  EXPECT_LT(color_distance(at(0, -1000, 0), light_color(rig.projectors[0])), 20);
+  EXPECT_LT(color_distance(at(1, -1000, -200), light_color(rig.projectors[0])), 20);
+  EXPECT_GT(color_distance(at(0, 0, 80), at(0, 0, 400)), 15);  // the volume
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 
 #include "pencilscan/io/file.h"
 #include "pencilscan/pattern/de_bruijn.h"
+#include "pencilscan/rig/devices_file.h"
 #include "pencilscan/rig/json_field.h"
 #include "pencilscan/rig/rig.h"
 
@@ -254,15 +255,18 @@ Json to_json(const Mat3& m) {
   return rows;
 }
 
-Json device_to_json(const Device& device) {
+/// What is given of a device.
+Json device_to_json(const Device& device, const GivenCalibration& given) {
   Json json;
   json["name"] = device.name;
   json["width"] = device.width;
   json["height"] = device.height;
-  json["K"] = to_json(device.K);
-  json["distortion"] = device.distortion;
-  json["R"] = to_json(device.device_from_world.rotation);
-  json["t"] = to_json(device.device_from_world.translation);
+  if (given.K) json["K"] = to_json(device.K);
+  if (given.distortion) json["distortion"] = device.distortion;
+  if (given.pose) {
+    json["R"] = to_json(device.device_from_world.rotation);
+    json["t"] = to_json(device.device_from_world.translation);
+  }
   return json;
 }
 
@@ -282,8 +286,8 @@ Json pattern_to_json(const LinePattern& pattern) {
   return json;
 }
 
-Json camera_to_json(const Camera& camera) {
-  Json json = device_to_json(camera);
+Json camera_to_json(const Camera& camera, const GivenCalibration& given) {
+  Json json = device_to_json(camera, given);
   if (!camera.color_matrix_by_projector.empty()) {
     Json matrices = Json::object();
     for (const auto& [name, matrix] : camera.color_matrix_by_projector) {
@@ -298,8 +302,8 @@ Json camera_to_json(const Camera& camera) {
   return json;
 }
 
-Json projector_to_json(const Projector& projector) {
-  Json json = device_to_json(projector);
+Json projector_to_json(const Projector& projector, const GivenCalibration& given) {
+  Json json = device_to_json(projector, given);
   if (projector.patterns.size() == 1) {
     json["pattern"] = pattern_to_json(projector.patterns.front());
   } else if (!projector.patterns.empty()) {
@@ -373,20 +377,27 @@ UncalibratedRig read_devices(const std::filesystem::path& path) {
   return result;
 }
 
-void write_rig(const Rig& rig, const std::filesystem::path& path) {
+void write_devices(const UncalibratedRig& devices, const std::filesystem::path& path) {
+  const Rig& rig = devices.rig;
+  auto given = devices.given.begin();
   Json json;
   json["format"] = "rig/1";
   json["unit"] = rig.unit_known ? "mm" : "unknown";
   json["cameras"] = Json::array();
-  for (const Camera& camera : rig.cameras) json["cameras"].push_back(camera_to_json(camera));
+  for (const Camera& camera : rig.cameras)
+    json["cameras"].push_back(camera_to_json(camera, *given++));
   json["projectors"] = Json::array();
-  for (const Projector& projector : rig.projectors) {
-    json["projectors"].push_back(projector_to_json(projector));
-  }
+  for (const Projector& projector : rig.projectors)
+    json["projectors"].push_back(projector_to_json(projector, *given++));
   if (rig.volume) {
     json["volume"] = {{"center", to_json(rig.volume->center)}, {"radius", rig.volume->radius}};
   }
   write_text(path, pretty(json) + "\n");
+}
+
+void write_rig(const Rig& rig, const std::filesystem::path& path) {
+  constexpr GivenCalibration kAll{true, true, true};
+  write_devices({rig, std::vector(rig.cameras.size() + rig.projectors.size(), kAll)}, path);
 }
 
 }  // namespace pencilscan

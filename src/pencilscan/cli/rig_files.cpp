@@ -1,0 +1,296 @@
+#include "pencilscan/cli/rig_files.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "pencilscan/core/error.h"
+#include "pencilscan/exchange/colmap_model.h"
+#include "pencilscan/exchange/opencv_file.h"
+#include "pencilscan/io/file.h"
+#include "pencilscan/io/image.h"
+#include "pencilscan/report/rig_picture.h"
+#include "pencilscan/rig/devices_file.h"
+
+namespace pencilscan::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::vector<std::string> split(const std::string& text, char at) {
+  std::vector<std::string> parts;
+  std::istringstream stream(text);
+  for (std::string part; std::getline(stream, part, at);) parts.push_back(part);
+  return parts;
+}
+
+// ---- pencilscan rig import ----------------------------------------------------------------------
+
+struct ImportCommand {
+  CommonOptions common;
+  std::vector<std::string> opencv;
+  std::string colmap;
+  std::string base;
+  std::string out;
+  std::string unit;
+  std::vector<std::string> projectors;
+  std::vector<std::string> sizes;
+  std::vector<std::string> known_distance;
+};
+
+/// [NAME[,NAME]=]FILE.
+void read_opencv_argument(const std::string& text, ExchangedRig& rig) {
+  const auto equals = text.find('=');
+  const bool is_named = equals != std::string::npos && text.find('/') > equals;
+  if (!is_named) return read_opencv(text, {}, rig);
+  read_opencv(text.substr(equals + 1), split(text.substr(0, equals), ','), rig);
+}
+
+/// NAME=WIDTHxHEIGHT for devices whose file lacks it.
+void set_sizes(const std::vector<std::string>& sizes, ExchangedRig& rig) {
+  for (const std::string& text : sizes) {
+    const auto equals = text.rfind('=');
+    int width = 0;
+    int height = 0;
+    int used = 0;
+    const std::string value = equals == std::string::npos ? "" : text.substr(equals + 1);
+    if (std::sscanf(value.c_str(), "%dx%d%n", &width, &height, &used) != 2 ||
+        static_cast<std::size_t>(used) != value.size() || width < 1 || height < 1)
+      throw InputError("command line", "--size", text, "must be NAME=WIDTHxHEIGHT in px");
+    bool is_there = false;
+    for (ExchangedDevice& d : rig.devices) {
+      if (d.device.name != text.substr(0, equals)) continue;
+      is_there = true;
+      if (d.device.width > 0) continue;
+      d.device.width = width;
+      d.device.height = height;
+    }
+    if (!is_there)
+      throw InputError("command line", "--size", text, "there is no device of this name");
+  }
+}
+
+/// Those named so, and those whose name begins like one.
+void mark_projectors(const std::vector<std::string>& names, ExchangedRig& rig) {
+  for (const std::string& name : names)
+    if (std::none_of(rig.devices.begin(), rig.devices.end(),
+                     [&](const ExchangedDevice& d) { return d.device.name == name; }))
+      throw InputError("command line", "--projector", name, "must be a device of the files");
+  for (ExchangedDevice& d : rig.devices)
+    d.is_projector = d.is_projector || d.device.name.starts_with("proj") ||
+                     std::find(names.begin(), names.end(), d.device.name) != names.end();
+}
+
+ExchangeOptions exchange_options(const ImportCommand& command) {
+  ExchangeOptions options;
+  // Reconstructions from pictures have no scale of their own.
+  const std::string unit =
+      command.unit.empty() ? (command.colmap.empty() ? "mm" : "unknown") : command.unit;
+  options.unit_known = unit != "unknown";
+  if (unit == "cm") options.mm_per_unit = 10;
+  if (unit == "m") options.mm_per_unit = 1000;
+  return options;
+}
+
+void apply_known_distance(const std::vector<std::string>& words, UncalibratedRig& rig) {
+  if (words.empty()) return;
+  std::size_t used = 0;
+  double mm = 0;
+  try {
+    mm = std::stod(words[2], &used);
+  } catch (const std::exception&) {
+    used = 0;
+  }
+  if (used != words[2].size() || !std::isfinite(mm) || !(mm > 0))
+    throw InputError("command line", "--known-distance", words[2], "must be a distance > 0 in mm");
+  scale_rig(words[0], words[1], mm, rig);
+}
+
+/// What is still missing, for people.
+std::string missing_values(const UncalibratedRig& rig) {
+  std::string text;
+  std::size_t d = 0;
+  const auto look = [&](const Device& device) {
+    const GivenCalibration& given = rig.given[d++];
+    std::string lacks;
+    if (!given.K) lacks += " K";
+    if (!given.distortion) lacks += " distortion";
+    if (!given.pose) lacks += " R t";
+    if (!lacks.empty()) text += (text.empty() ? "" : "; ") + device.name + " lacks" + lacks;
+  };
+  for (const Camera& camera : rig.rig.cameras) look(camera);
+  for (const Projector& projector : rig.rig.projectors) look(projector);
+  return text;
+}
+
+void run_import(const ImportCommand& command) {
+  if (command.opencv.empty() == command.colmap.empty())
+    throw InputError("command line", "--opencv, --colmap", "", "exactly one of them is needed");
+  ExchangedRig files;
+  for (const std::string& file : command.opencv) read_opencv_argument(file, files);
+  if (!command.colmap.empty()) files = read_colmap(command.colmap);
+  set_sizes(command.sizes, files);
+  mark_projectors(command.projectors, files);
+  UncalibratedRig base;
+  if (!command.base.empty()) base = read_devices(command.base);
+  UncalibratedRig rig = join_rig(std::move(files), base, exchange_options(command));
+  if (rig.rig.cameras.empty() || rig.rig.projectors.empty())
+    throw InputError("command line", "--projector", rig.rig.cameras.empty() ? "no camera" : "none",
+                     "a rig has a camera and a projector: name the projectors among the files, or "
+                     "give the other devices with --base");
+  apply_known_distance(command.known_distance, rig);
+  write_devices(rig, command.out);
+  const std::string missing = missing_values(rig);
+  if (!missing.empty())
+    std::cerr << "note: " << missing << ": the file is for calibrate --devices, no rig yet\n";
+  print_figures(command.common, {{"rig", command.out},
+                                 {"cameras", rig.rig.cameras.size()},
+                                 {"projectors", rig.rig.projectors.size()},
+                                 {"unit", rig.rig.unit_known ? "mm" : "unknown"},
+                                 {"complete", missing.empty()}});
+}
+
+void add_import(CLI::App& group) {
+  auto options = std::make_shared<ImportCommand>();
+  CLI::App* command =
+      group.add_subcommand("import", "Make a rig from files of OpenCV or a COLMAP model");
+  command->add_option("--opencv", options->opencv,
+                      "[NAME[,NAME]=]FILE: YAML or XML of one device, or of a stereo calibration "
+                      "(two names); repeat it for more files");
+  command->add_option("--colmap", options->colmap, "Folder of a COLMAP text model");
+  command->add_option("--out", options->out, "The rig file to write (rig.json)")->required();
+  command->add_option(
+      "--base", options->base,
+      "A rig.json whose devices of the same name take the calibration over and keep "
+      "patterns and colours");
+  command->add_option("--projector", options->projectors,
+                      "A device that is a projector; those named proj... are anyway");
+  command->add_option("--size", options->sizes,
+                      "NAME=WIDTHxHEIGHT where the file lacks it, as cam0=1280x960");
+  command
+      ->add_option("--unit", options->unit, "Of the files' lengths; default mm, for COLMAP unknown")
+      ->check(CLI::IsMember({"mm", "cm", "m", "unknown"}));
+  command
+      ->add_option("--known-distance", options->known_distance,
+                   "Two devices and the distance of their centres in mm: cam0 cam1 850")
+      ->expected(3);
+  add_common_options(*command, options->common,
+                     "pencilscan rig import --opencv cam0,proj0=stereo.yml --size cam0=1280x960 "
+                     "--size proj0=1280x800 --out rig.json");
+  command->callback([options] { run_import(*options); });
+}
+
+// ---- pencilscan rig export ----------------------------------------------------------------------
+
+struct ExportCommand {
+  CommonOptions common;
+  std::string rig_path;
+  std::string opencv;
+  std::string colmap;
+  std::string points;
+  std::vector<std::string> stereo;
+  bool is_xml = false;
+};
+
+const Device& device_named(const Rig& rig, const std::string& name) {
+  for (const Camera& camera : rig.cameras)
+    if (camera.name == name) return camera;
+  for (const Projector& projector : rig.projectors)
+    if (projector.name == name) return projector;
+  throw InputError("command line", "--stereo", name, "must be the name of a device");
+}
+
+void export_opencv(const ExportCommand& command, const Rig& rig) {
+  const OpencvSyntax syntax = command.is_xml ? OpencvSyntax::kXml : OpencvSyntax::kYaml;
+  const char* ending = command.is_xml ? ".xml" : ".yml";
+  std::vector<std::pair<std::string, std::string>> files;
+  if (command.stereo.empty()) {
+    for (const Camera& camera : rig.cameras)
+      files.emplace_back(camera.name + ending, opencv_text(camera, syntax));
+    for (const Projector& projector : rig.projectors)
+      files.emplace_back(projector.name + ending, opencv_text(projector, syntax));
+  } else {
+    files.emplace_back(command.stereo[0] + "-" + command.stereo[1] + ending,
+                       opencv_stereo_text(device_named(rig, command.stereo[0]),
+                                          device_named(rig, command.stereo[1]), syntax));
+  }
+  for (const auto& [name, text] : files) write_text(fs::path(command.opencv) / name, text);
+}
+
+void run_export(const ExportCommand& command) {
+  const Rig rig = read_rig(command.rig_path);
+  if (command.opencv.empty() == command.colmap.empty())
+    throw InputError("command line", "--opencv, --colmap", "", "exactly one of them is needed");
+  if (!command.opencv.empty()) {
+    export_opencv(command, rig);
+  } else {
+    std::vector<MeasuredPoint> points;
+    if (!command.points.empty()) points = read_points(command.points);
+    write_colmap(rig, points, command.colmap);
+  }
+  print_figures(command.common,
+                {{"folder", command.opencv.empty() ? command.colmap : command.opencv},
+                 {"devices", rig.cameras.size() + rig.projectors.size()}});
+}
+
+void add_export(CLI::App& group) {
+  auto options = std::make_shared<ExportCommand>();
+  CLI::App* command =
+      group.add_subcommand("export", "Write a rig for programs that use OpenCV, or for COLMAP");
+  command->add_option("--rig", options->rig_path, "The rig (rig.json)")->required();
+  CLI::Option* opencv = command->add_option(
+      "--opencv", options->opencv, "Folder for one file per device, as cv::FileStorage writes it");
+  command->add_flag("--xml", options->is_xml, "XML instead of YAML")->needs(opencv);
+  command
+      ->add_option("--stereo", options->stereo,
+                   "Two devices: one file with K1, D1, K2, D2, R, T instead")
+      ->expected(2)
+      ->needs(opencv);
+  CLI::Option* colmap =
+      command->add_option("--colmap", options->colmap, "Folder for a COLMAP text model");
+  command->add_option("--points", options->points, "points.ply measured with this rig, for COLMAP")
+      ->needs(colmap);
+  add_common_options(*command, options->common,
+                     "pencilscan rig export --rig rig.json --colmap model");
+  command->callback([options] { run_export(*options); });
+}
+
+// ---- pencilscan rig picture ---------------------------------------------------------------------
+
+struct PictureCommand {
+  CommonOptions common;
+  std::string rig_path;
+  std::string out;
+  int side_px = 900;
+};
+
+void run_picture(const PictureCommand& command) {
+  write_image(command.out, draw_rig(read_rig(command.rig_path), command.side_px));
+  print_figures(command.common, {{"picture", command.out}});
+}
+
+void add_picture(CLI::App& group) {
+  auto options = std::make_shared<PictureCommand>();
+  CLI::App* command =
+      group.add_subcommand("picture", "Draw the rig to scale, from above and from the side");
+  command->add_option("--rig", options->rig_path, "The rig (rig.json)")->required();
+  command->add_option("--out", options->out, "The picture to write (rig.png)")->required();
+  command->add_option("--side-px", options->side_px, "Side of each of the two views")
+      ->check(CLI::Range(300, 5000))
+      ->capture_default_str();
+  add_common_options(*command, options->common,
+                     "pencilscan rig picture --rig rig.json --out rig.png");
+  command->callback([options] { run_picture(*options); });
+}
+
+}  // namespace
+
+void add_rig_files(CLI::App& group) {
+  add_import(group);
+  add_export(group);
+  add_picture(group);
+}
+
+}  // namespace pencilscan::cli
