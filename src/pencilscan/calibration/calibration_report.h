@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "pencilscan/calibration/loop_closure.h"
 #include "pencilscan/calibration/verdict.h"
 
 namespace pencilscan {
@@ -25,6 +26,7 @@ struct CalibrationReport {
   const Uncertainty& uncertainty;
   const Verdict& verdict;
   const std::vector<DecodeSummary>& decoded;
+  const LoopClosure& loop;
 };
 
 /// visit(view, error) for up to `most` views of a device, evenly chosen.

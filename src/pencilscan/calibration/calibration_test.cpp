@@ -7,6 +7,7 @@
 #include "pencilscan/calibration/calibrate.h"
 #include "pencilscan/calibration/calibration_report.h"
 #include "pencilscan/calibration/reprojection.h"
+#include "pencilscan/calibration/sample_tracks.h"
 #include "pencilscan/calibration/structure.h"
 #include "pencilscan/core/random.h"
 #include "pencilscan/geometry/least_squares.h"
@@ -15,102 +16,7 @@ namespace pencilscan {
 namespace {
 
 using ::testing::HasSubstr;
-
-/// A ring of cameras and projectors in turn, 30 degrees apart, that look at the middle.
-Rig ring(int cameras, int projectors) {
-  Rig rig;
-  const int total = cameras + projectors;
-  for (int i = 0; i < total; ++i) {
-    const bool is_camera = i % 2 == 0 && i / 2 < cameras;
-    Device device;
-    const double azimuth = i * M_PI / 6;
-    const double elevation = is_camera ? 0.26 : (i % 4 == 1 ? 0.14 : 0.59);
-    const double distance = 1000 + 60.0 * (i % 3);
-    const Vec3 eye(distance * std::cos(azimuth) * std::cos(elevation),
-                   distance * std::sin(azimuth) * std::cos(elevation),
-                   distance * std::sin(elevation));
-    device.device_from_world = look_at(eye, Vec3(10.0 * (i % 2), 15.0 * (i % 3), 0));
-    device.width = 1280;
-    device.height = is_camera ? 960 : 1024;
-    const double focal = (is_camera ? 2250 : 2400) + 20 * (i % 4);
-    device.K << focal, 0, 645 - 3 * (i % 4), 0, focal, is_camera ? 470 : 700, 0, 0, 1;
-    device.distortion = {is_camera ? -0.1 : -0.05, is_camera ? 0.1 : 0, 0, 0, 0};
-    if (is_camera) {
-      device.name = "cam" + std::to_string(rig.cameras.size());
-      rig.cameras.emplace_back();
-      static_cast<Device&>(rig.cameras.back()) = device;
-    } else {
-      device.name = "proj" + std::to_string(rig.projectors.size());
-      rig.projectors.emplace_back();
-      static_cast<Device&>(rig.projectors.back()) = device;
-    }
-  }
-  return rig;
-}
-
-struct TrackScene {
-  int count = 900;
-  double noise_px = 0.05;
-  double outliers = 0;  ///< share of views anywhere in the image
-  bool planar = false;
-  double radius = 165;
-  std::uint64_t seed = 3;
-};
-
-/// Tracks of points in the volume with normals; a device sees what faces it.
-std::vector<Track> tracks_of(const Rig& rig, const TrackScene& scene) {
-  Random random(scene.seed);
-  std::vector<Track> tracks;
-  const auto cameras = rig.cameras.size();
-  while (tracks.size() < static_cast<std::size_t>(scene.count)) {
-    const Vec3 normal = Vec3(random.normal(), random.normal(), 0.3 * random.normal()).normalized();
-    Vec3 point = scene.radius * std::cbrt(random.uniform()) * normal;
-    if (scene.planar) point = Vec3(0, random.uniform(-150, 150), random.uniform(-150, 150));
-    std::vector<TrackView> views;
-    for (std::size_t d = 0; d < device_total(rig); ++d) {
-      const Device& device = calibrated_device(rig, d);
-      const Vec3 to_device = (device.center() - point).normalized();
-      if (to_device.dot(scene.planar ? Vec3(Vec3::UnitX()) : normal) < 0.3) continue;
-      const auto pixel = device.project(point);
-      if (pixel && device.contains(*pixel)) views.push_back({d, *pixel, scene.noise_px});
-    }
-    // One hub, the others of the other kind.
-    const bool camera_hub = random.below(2) == 0;
-    Track track;
-    for (const TrackView& view : views)
-      if ((view.device < cameras) == camera_hub && track.views.empty()) track.views = {view};
-    if (track.views.empty()) continue;
-    track.views[0].sigma_px = 0.02;
-    for (TrackView view : views) {
-      if ((view.device < cameras) == camera_hub) continue;
-      view.pixel += Vec2(random.normal(0, scene.noise_px), random.normal(0, scene.noise_px));
-      if (random.uniform() < scene.outliers)
-        view.pixel = Vec2(random.uniform(0, 1279), random.uniform(0, 959));
-      track.views.push_back(view);
-    }
-    if (track.views.size() > 1) tracks.push_back(track);
-  }
-  return tracks;
-}
-
-CalibrationInput input_of(const Rig& truth, std::vector<Track> tracks, bool cameras_known) {
-  CalibrationInput input;
-  input.rig = truth;
-  input.known.resize(device_total(truth));
-  for (std::size_t d = 0; d < input.known.size(); ++d) {
-    Device& device = calibrated_device(input.rig, d);
-    const bool known = cameras_known && d < truth.cameras.size();
-    input.known[d].K = input.known[d].distortion = known;
-    device.device_from_world = {};
-    if (known) continue;
-    device.K = Mat3::Identity();
-    device.distortion = {};
-  }
-  input.tracks = std::move(tracks);
-  input.distance = KnownDistance{
-      0, 1, (truth.cameras[0].center() - calibrated_device(truth, 1).center()).norm()};
-  return input;
-}
+using namespace sample;
 
 /// Distances of projections of points in the volume, median, px. Free of gauge: the similarity that
 /// takes the points to where the found rig measures them comes first.
@@ -280,6 +186,47 @@ TEST(Uncertainty, CoversTheErrorsOfTheResult) {
   EXPECT_LT(sigma.volume_median, 0.2);  // mm: 0.05 px is 0.025 mm in this volume
 }
 
+/// Six and six devices that look inwards, as found without error.
+CalibrationResult exact_ring(const std::vector<Track>& tracks, const Rig& truth) {
+  CalibrationResult result;
+  result.solved = true;
+  result.rig = truth;
+  for (std::size_t d = 0; d < device_total(truth); ++d) {
+    result.problem.devices.push_back(bundle_device(calibrated_device(truth, d)));
+    result.problem.devices.back().present = true;
+  }
+  result.problem.tracks = tracks;
+  triangulate_all(result.problem, 0.02);
+  return result;
+}
+
+TEST(LoopClosure, RingClosesUnlessADeviceStandsElsewhereForOneOfItsNeighbours) {
+  const Rig truth = ring(6, 6);
+  std::vector<Track> tracks = tracks_of(truth, {.count = 3000, .noise_px = 0.02});
+  const LoopClosure loop = close_loop(exact_ring(tracks, truth));
+  ASSERT_EQ(loop.devices.size(), 12U);
+  EXPECT_EQ(loop.devices.front(), 0U);
+  EXPECT_LT(loop.gap_px, 0.5);
+  EXPECT_NEAR(loop.scale, 1, 2e-3);
+  EXPECT_FALSE(judge_loop(exact_ring(tracks, truth), loop).has_value());
+  // What proj0 and cam1 see of each other, seen by a camera turned by 1 / 300.
+  for (Track& track : tracks)
+    for (TrackView& view : track.views)
+      if (view.device == 1 && view_in(track, 6) != nullptr) view.pixel.x() += 7.5;
+  const CalibrationResult turned = exact_ring(tracks, truth);
+  const LoopClosure open = close_loop(turned);
+  ASSERT_FALSE(open.devices.empty());
+  EXPECT_GT(open.gap_px, 3);
+  ASSERT_TRUE(judge_loop(turned, open).has_value());
+  EXPECT_THAT(judge_loop(turned, open)->what, HasSubstr("does not close"));
+}
+
+TEST(LoopClosure, AnArcHasNone) {
+  const Rig truth = ring(2, 2);
+  const auto loop = close_loop(exact_ring(tracks_of(truth, {.count = 500}), truth));
+  EXPECT_TRUE(loop.devices.empty());
+}
+
 TEST(CalibrationReport, IsOnePageAndValidJson) {
   const Rig truth = ring(2, 2);
   const CalibrationInput input = input_of(truth, tracks_of(truth, {.count = 400}), true);
@@ -287,12 +234,14 @@ TEST(CalibrationReport, IsOnePageAndValidJson) {
   const Uncertainty sigma =
       uncertainty(result.problem, result.free_inner, 2, result.extra_sigma_px);
   const Verdict verdict = judge(input, result, sigma, {});
-  const CalibrationReport report{input, result, sigma, verdict, {}};
+  const LoopClosure loop = close_loop(result);
+  const CalibrationReport report{input, result, sigma, verdict, {}, loop};
   const std::string html = calibration_html(report);
   EXPECT_THAT(html, HasSubstr("<svg"));
   EXPECT_EQ(html.find("http"), std::string::npos);  // nothing from elsewhere
   const auto json = calibration_json(report);
   EXPECT_EQ(json["devices"].size(), 4U);
+  EXPECT_FALSE(json["loop"]["closed_ring"].get<bool>());
   EXPECT_EQ(json["verdict"], to_string(verdict.grade));
   // Places for the 3-D picture: a point is where a device saw it.
   EXPECT_GT(json["points"].size(), 100U);

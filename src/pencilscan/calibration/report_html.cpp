@@ -143,6 +143,26 @@ std::string overlap_plot(const CalibrationReport& report) {
   return svg + "</svg>";
 }
 
+std::string loop_part(const CalibrationReport& report) {
+  const LoopClosure& loop = report.loop;
+  if (loop.devices.empty())
+    return "<p>The devices are no closed ring of neighbours that share correspondences, so there "
+           "is no way round to come back on.</p>";
+  std::string names;
+  for (const std::size_t d : loop.devices)
+    names += escaped(calibrated_device(report.input.rig, d).name) + ", ";
+  const std::string& first = calibrated_device(report.input.rig, loop.devices.front()).name;
+  return "<p>Once round the ring (" + names + "and back to " + escaped(first) +
+         "), each step by the correspondences of its own two devices alone: points of the volume "
+         "come back " +
+         number(loop.gap, 2) + (report.result.rig.unit_known ? " mm" : " units") + " off, " +
+         number(loop.gap_px, 2) + " px in " + escaped(first) + "; turned by " +
+         number(loop.rotation_rad * 180 / std::numbers::pi, 2) + "&deg;, lengths by " +
+         number(100 * (loop.scale - 1), 2) +
+         " %. The adjustment of the whole rig spreads such gaps evenly; a large one says that "
+         "steps contradict each other.</p>";
+}
+
 std::string parameters_part(const CalibrationReport& report) {
   std::string html = "<div class='wide'><table><tr>" + head("device");
   for (const char* name : kIntrinsicNames) html += head(name);
@@ -217,7 +237,7 @@ std::string calibration_html(const CalibrationReport& report) {
     html +=
         "</div><h2>The rig from above, and who sees what</h2><p>Lines: correspondences of a "
         "camera and a projector; red: many of them contradict each other.</p>" +
-        overlap_plot(report) + "<h2>Parameters</h2>" + parameters_part(report);
+        overlap_plot(report) + loop_part(report) + "<h2>Parameters</h2>" + parameters_part(report);
   }
   html += "<h2>Pairs</h2>" + pairs_part(report) + "<h2>Decoding, in pixels</h2>" +
           decoding_part(report);

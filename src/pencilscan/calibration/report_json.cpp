@@ -104,6 +104,19 @@ Json decoding_json(const CalibrationReport& report) {
   return decoding;
 }
 
+Json loop_json(const CalibrationReport& report) {
+  const LoopClosure& loop = report.loop;
+  Json json{{"closed_ring", !loop.devices.empty()}};
+  if (loop.devices.empty()) return json;
+  for (const std::size_t d : loop.devices)
+    json["devices"].push_back(calibrated_device(report.input.rig, d).name);
+  json["rotation_deg"] = loop.rotation_rad * 180 / std::numbers::pi;
+  json["scale"] = loop.scale;
+  json["gap"] = loop.gap;
+  json["gap_px"] = loop.gap_px;
+  return json;
+}
+
 }  // namespace
 
 nlohmann::ordered_json calibration_json(const CalibrationReport& report) {
@@ -129,6 +142,7 @@ nlohmann::ordered_json calibration_json(const CalibrationReport& report) {
   json["volume"] = {{"radius", report.uncertainty.volume_radius},
                     {"point_sigma_median", report.uncertainty.volume_median},
                     {"point_sigma_p95", report.uncertainty.volume_p95}};
+  json["loop"] = loop_json(report);
   json["devices"] = Json::array();
   for (std::size_t d = 0; d < result.placed.size(); ++d)
     json["devices"].push_back(device_json(report, d));

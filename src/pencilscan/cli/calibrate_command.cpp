@@ -126,7 +126,7 @@ void run_calibrate(const CalibrateCommand& command) {
   input.distance = known_distance(command, input.rig);
 
   std::optional<BoardFinder> boards;
-  if (!command.board.empty()) boards.emplace(chessboard_from_text(command.board, "--board"));
+  if (!command.board.empty()) boards.emplace(board_from_text(command.board, "--board"));
 
   const Progress progress = stderr_progress();
   GrayTrackOptions track_options;
@@ -165,9 +165,11 @@ void run_calibrate(const CalibrateCommand& command) {
     sigma = uncertainty(result.problem, result.free_inner, BundleOptions{}.loss_scale,
                         result.extra_sigma_px, command.common.seed);
   }
+  const LoopClosure loop = close_loop(result);
+  if (const auto finding = judge_loop(result, loop)) findings.push_back(*finding);
   const Verdict verdict = judge(input, result, sigma, std::move(findings));
   progress("judging", 1);
-  const CalibrationReport report{input, result, sigma, verdict, decoded};
+  const CalibrationReport report{input, result, sigma, verdict, decoded, loop};
   const fs::path folder = fs::path(command.out).parent_path();
   write_json(folder / "calibration.json", calibration_json(report));
   write_text(folder / "calibration.html", calibration_html(report));
@@ -202,9 +204,10 @@ void add_calibrate_command(CLI::App& app) {
       ->add_option("--known-distance", options->known_distance,
                    "Two devices and the distance of their centres in mm: cam0 cam1 850")
       ->expected(3);
-  command->add_option("--board", options->board,
-                      "A chessboard in the captures, inner corners and mm of a square: "
-                      "chessboard:9x7:75");
+  command->add_option(
+      "--board", options->board,
+      "A board in the captures: chessboard:9x7:75, inner corners and mm of a square, "
+      "or charuco:10x8:75:56:DICT_5X5_100, squares, mm of a square and of a marker");
   command->add_option("--max-tracks", options->max_tracks, "Surface points to use at most")
       ->check(CLI::Range(std::size_t{200}, std::size_t{1000000}))
       ->capture_default_str();
