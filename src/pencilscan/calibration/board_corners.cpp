@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "pencilscan/calibration/structure.h"
 #include "pencilscan/core/median.h"
@@ -57,6 +58,13 @@ double board_rms_px(const BundleProblem& problem) {
     ++corners;
   }
   return corners > 0 ? std::sqrt(sum / static_cast<double>(corners)) : 0;
+}
+
+bool boards_join_devices(const std::vector<BoardView>& views) {
+  std::map<std::size_t, std::size_t> seen_by;
+  return std::any_of(views.begin(), views.end(), [&](const BoardView& v) {
+    return seen_by.try_emplace(v.board, v.view.device).first->second != v.view.device;
+  });
 }
 
 }  // namespace pencilscan

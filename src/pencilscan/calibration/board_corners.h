@@ -16,6 +16,10 @@ void weigh_corners(BundleProblem& problem);
 /// Drops the corners beyond `deviations` times their robust scatter, half a pixel at least.
 void drop_corners(BundleProblem& problem, double deviations);
 
+/// Some board is seen by two devices or more: then it is a part of the rig, and its size gives the
+/// scale.
+[[nodiscard]] bool boards_join_devices(const std::vector<BoardView>& views);
+
 /// Root mean square reprojection error of the corners, px; 0 without boards.
 [[nodiscard]] double board_rms_px(const BundleProblem& problem);
 

@@ -359,4 +359,34 @@ void attach_boards(const CalibrationInput& input, BundleProblem& problem) {
   std::erase_if(problem.board_views, [&](const BoardView& v) { return has_pose[v.board] == 0; });
 }
 
+void rescale_to_boards(BundleProblem& problem) {
+  constexpr std::size_t kFewest = 8;
+  if (problem.board_views.empty() || boards_join_devices(problem.board_views)) return;
+  std::map<std::size_t, std::pair<std::size_t, RigidTransform>> in_camera;  // of boards, as found
+  std::vector<double> scales;
+  for (const Sighting& s : sightings_of(problem.board_views)) {
+    const BundleDevice& device = problem.devices[s.device];
+    if (!device.present) continue;
+    const RigidTransform camera_from_world = transform_from(device.pose);
+    const RigidTransform pose = camera_from_world * transform_from(problem.board_poses[s.board]);
+    in_camera[s.board] = {s.device, pose};
+    const BoardOutline outline(problem.board_views, s);
+    const Vec3 normal = pose.rotation.col(2);
+    for (std::size_t t = 0; t < problem.tracks.size(); ++t) {
+      if (problem.used[t] == 0 || problem.tracks[t].capture != s.board) continue;
+      const TrackView* view = view_in(problem.tracks[t], s.device);
+      if (view == nullptr || !outline.contains(view->pixel)) continue;
+      scales.push_back(normal.dot(pose.translation) / normal.dot(device_ray(device, view->pixel)) /
+                       (camera_from_world * problem.points[t]).z());
+    }
+  }
+  if (scales.size() < kFewest) return;
+  const double scale = upper_median(std::move(scales));
+  if (!std::isfinite(scale) || !(scale > 0)) return;
+  move_solution(scale, {}, problem);
+  for (const auto& [board, seen] : in_camera)
+    problem.board_poses[board] =
+        pose_from(transform_from(problem.devices[seen.first].pose).inverse() * seen.second);
+}
+
 }  // namespace pencilscan

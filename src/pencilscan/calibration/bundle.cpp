@@ -6,6 +6,7 @@
 #include <cmath>
 #include <memory>
 
+#include "pencilscan/calibration/board_corners.h"
 #include "pencilscan/calibration/reprojection.h"
 #include "pencilscan/core/check.h"
 
@@ -99,7 +100,7 @@ class ProblemBuilder {
       ordering_->AddElementToGroup(device.pose.data(), 1);
       ordering_->AddElementToGroup(device.inner.data(), 1);
     }
-    if (options_.free_poses && from_.board_views.empty()) hold_scale(first);
+    if (options_.free_poses && !boards_join_devices(from_.board_views)) hold_scale(first);
   }
 
   /// Keeps the translation component that scaling the scene about the first device changes most.

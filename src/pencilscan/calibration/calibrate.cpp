@@ -8,6 +8,7 @@
 #include "pencilscan/calibration/board_start.h"
 #include "pencilscan/calibration/priors.h"
 #include "pencilscan/calibration/structure.h"
+#include "pencilscan/calibration/uncertainty.h"
 #include "pencilscan/core/median.h"
 #include "pencilscan/core/parallel.h"
 
@@ -193,7 +194,7 @@ class Calibration {
     bundle.extra_sigma_px = std::sqrt(std::max(0.0, scale * scale - own * own));
     bundle.max_tracks = tracks;
     bundle.max_iterations = iterations;
-    bundle.function_tolerance = tracks == 0 ? 1e-8 : 1e-6;
+    bundle.function_tolerance = tracks == 0 ? 1e-11 : 1e-6;
     weigh_corners(problem);
     adjust(problem, bundle);
     result_.free_inner = free_inner;
@@ -221,12 +222,37 @@ class Calibration {
     }
   }
 
+  /// Per device: its given focal lengths are those that the data find, as far as these know them.
+  /// The scatter alone would not tell: in a ring a common error of all hides in the poses.
+  [[nodiscard]] std::vector<char> given_agrees() const {
+    constexpr double kDeviations = 4;
+    std::vector<char> agrees(input_.known.size(), 0);
+    if (std::none_of(input_.known.begin(), input_.known.end(),
+                     [](const GivenCalibration& k) { return k.K; }))
+      return agrees;
+    const Uncertainty sigma =
+        uncertainty(result_.problem, kAll, BundleOptions{}.loss_scale, result_.extra_sigma_px);
+    for (std::size_t d = 0; d < agrees.size(); ++d) {
+      const BundleDevice& found = result_.problem.devices[d];
+      if (!input_.known[d].K) continue;
+      const Mat3& K = calibrated_device(input_.rig, d).K;
+      const auto is_near = [&](Intrinsic i, double given) {
+        const double slack = std::max(kDeviations * sigma.devices[d].inner[i],
+                                      options_.given_focal_tolerance * given);
+        return !found.present || std::abs(found.inner[i] - given) <= slack;
+      };
+      agrees[d] = is_near(kFx, K(0, 0)) && is_near(kFy, K(1, 1)) ? 1 : 0;
+    }
+    return agrees;
+  }
+
   /// Values that were given and explain the data as well as free ones do are a calibration and are
   /// kept; others were only rough.
   void keep_given_values() {
     result_.inner_held.assign(input_.known.size(), 0);
     const std::size_t cameras = input_.rig.cameras.size();
     triangulate_all(result_.problem, kLeastAngle);
+    const std::vector<char> agrees = given_agrees();
     const double free_scale = error_scale(result_.problem);
     for (const int attempt : {0, 1, 2}) {  // all given ones, the cameras' alone, the projectors'
       BundleProblem trial = result_.problem;
@@ -241,7 +267,10 @@ class Calibration {
           if (i < kK1 || input_.known[d].distortion) trial.devices[d].inner[i] = exact.inner[i];
         hold_given(input_.known[d], trial.devices[d]);
       }
-      if (std::none_of(held.begin(), held.end(), [](char h) { return h != 0; })) continue;
+      bool is_plausible = std::any_of(held.begin(), held.end(), [](char h) { return h != 0; });
+      for (std::size_t d = 0; d < held.size(); ++d)
+        is_plausible = is_plausible && (held[d] == 0 || agrees[d] != 0);
+      if (!is_plausible) continue;
       std::swap(trial, result_.problem);
       const double extra = result_.extra_sigma_px;
       // Twice: the weights of the first round are those of errors not yet adapted to.
@@ -264,7 +293,7 @@ class Calibration {
       say("adjusting all correspondences", 0.6 + 0.2 * round);
       triangulate_all(result_.problem, kLeastAngle);
       drop();
-      stage(kAll, 0, round == 0 ? 30 : 50);
+      stage(kAll, 0, round == 0 ? 30 : 200);
     }
   }
 
@@ -275,6 +304,7 @@ class Calibration {
     result_.residuals.resize(device_total(input_.rig));
     result_.inner_held.resize(device_total(input_.rig), 0);
     if (!solved) return std::move(result_);
+    rescale_to_boards(result_.problem);
     result_.rig.unit_known = fix_frame(input_, result_.problem);
     for (std::size_t d = 0; d < result_.placed.size(); ++d) {
       result_.placed[d] = result_.problem.devices[d].present ? 1 : 0;

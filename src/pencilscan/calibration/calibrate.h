@@ -35,6 +35,8 @@ struct CalibrateOptions {
   std::size_t stage_tracks = 3000;   ///< of all stages but the last
   double given_tolerance = 1.1;  ///< given values are kept if the scatter grows by less than this
   double given_slack_px = 0.01;  ///< factor, and by this much more
+  /// And if given focal lengths are within this share of free ones, or within four deviations.
+  double given_focal_tolerance = 0.005;
 };
 
 /// Reprojection errors of one device's views, hubs left out, of used tracks.

@@ -121,6 +121,21 @@ TEST(Calibrate, KnownCamerasAreKeptAndGiveAPreciseRig) {
   EXPECT_LT(projection_error(truth, result.rig), 0.15);
 }
 
+TEST(Calibrate, FocalLengthsThatAreFivePercentOffAreOnlyAStart) {
+  const Rig truth = ring(3, 3);
+  CalibrationInput input = input_of(truth, tracks_of(truth, {.count = 2000}), true);
+  for (Camera& camera : input.rig.cameras) {
+    camera.K(0, 0) *= 1.05;
+    camera.K(1, 1) *= 1.05;
+  }
+  const auto result = calibrate(input, kQuick);
+  ASSERT_TRUE(result.solved);
+  for (std::size_t d = 0; d < 3; ++d) {
+    EXPECT_EQ(result.inner_held[d], 0);
+    EXPECT_NEAR(result.rig.cameras[d].K(0, 0) / truth.cameras[d].K(0, 0), 1, 0.025);
+  }
+}
+
 TEST(Verdict, PlanarSceneIsUnusable) {
   const Rig truth = ring(1, 1);
   const CalibrationInput input =

@@ -138,7 +138,7 @@ nlohmann::ordered_json calibration_json(const CalibrationReport& report) {
     json["board"] = {{"corners", result.problem.board_views.size()},
                      {"rms_px", result.board_rms_px}};
   json["extra_sigma_px"] = result.extra_sigma_px;
-  json["shared_variance"] = report.uncertainty.shared_variance;
+  json["shared_error_px"] = report.uncertainty.shared_px;
   json["volume"] = {{"radius", report.uncertainty.volume_radius},
                     {"point_sigma_median", report.uncertainty.volume_median},
                     {"point_sigma_p95", report.uncertainty.volume_p95}};

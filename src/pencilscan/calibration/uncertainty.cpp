@@ -7,6 +7,7 @@
 #include <tuple>
 
 #include "pencilscan/calibration/board_corners.h"
+#include "pencilscan/calibration/reduced_equations.h"
 #include "pencilscan/calibration/structure.h"
 #include "pencilscan/core/median.h"
 #include "pencilscan/core/random.h"
@@ -15,170 +16,11 @@
 namespace pencilscan {
 namespace {
 
-constexpr Eigen::Index kPose = 6;
-constexpr Eigen::Index kBlock = kPose + kIntrinsics;
+constexpr Eigen::Index kPose = ReducedEquations::kPose;
+constexpr Eigen::Index kBlock = ReducedEquations::kBlock;
 
-using Block = Eigen::Matrix<double, 2, kBlock>;
-
-Mat3 cross_matrix(const Vec3& v) {
-  Mat3 m;
-  m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
-  return m;
-}
-
-/// Normal equations of all devices, 15 numbers each: a small rotation in the device's frame
-/// (x -> x + r x (R X)), a shift t, and the inner parameters.
-class NormalEquations {
- public:
-  NormalEquations(const BundleProblem& problem, unsigned free_inner, double loss_scale,
-                  double extra_sigma_px)
-      : problem_(problem),
-        loss_scale_(loss_scale),
-        extra_(extra_sigma_px),
-        H_(Eigen::MatrixXd::Zero(kBlock * count(), kBlock * count())) {
-    for (const BundleDevice& device : problem.devices) rotations_.push_back(rotation_of(device));
-    for (std::size_t t = 0; t < problem.tracks.size(); ++t)
-      if (problem.used[t] != 0) add_track(t);
-    add_boards();
-    add_priors(free_inner);
-  }
-
-  [[nodiscard]] Eigen::Index count() const {
-    return static_cast<Eigen::Index>(problem_.devices.size());
-  }
-  [[nodiscard]] const Eigen::MatrixXd& H() const { return H_; }
-  [[nodiscard]] bool is_free(Eigen::Index i) const { return free_[static_cast<std::size_t>(i)]; }
-  [[nodiscard]] double variance_factor() const {
-    const double scale = kDeviationPerMedian * lower_quantile(residuals_, 0.5);
-    return scale * scale;
-  }
-
- private:
-  struct ViewRow {
-    Eigen::Index device;
-    Block device_part;
-    Eigen::Matrix<double, 2, 3> point_part;
-  };
-
-  /// Weighted derivatives of a view of a point.
-  [[nodiscard]] ViewRow row_of(const ViewLinearization& view, std::size_t device, const Vec3& point,
-                               bool has_loss) const {
-    // Derivatives by the point in the device's frame give those by the pose.
-    const Mat3& R = rotations_[device];
-    const Eigen::Matrix<double, 2, 3> by_local = view.point * R.transpose();
-    const double weight =
-        has_loss ? 1 / (1 + view.residual.squaredNorm() / (loss_scale_ * loss_scale_)) : 1;
-    ViewRow row;
-    row.device = static_cast<Eigen::Index>(device);
-    row.device_part.leftCols<3>() = -by_local * cross_matrix(R * point);
-    row.device_part.middleCols<3>(3) = by_local;
-    row.device_part.rightCols<kIntrinsics>() = view.inner;
-    row.device_part *= std::sqrt(weight);
-    row.point_part = std::sqrt(weight) * view.point;
-    return row;
-  }
-
-  void add_track(std::size_t t) {
-    std::vector<ViewRow> rows;
-    const auto& views = problem_.tracks[t].views;
-    const double n = static_cast<double>(views.size()) - 1;
-    for (std::size_t i = 0; i < views.size(); ++i) {
-      const BundleDevice& device = problem_.devices[views[i].device];
-      if (!device.present || !view_error(device, problem_.points[t], views[i])) continue;
-      const ViewLinearization view =
-          linearize(device, problem_.points[t], views[i], i == 0 ? 0 : extra_);
-      if (i > 0)
-        for (Eigen::Index k = 0; k < 2; ++k)
-          residuals_.push_back(std::abs(view.residual[k]) * std::sqrt(2 * n / (2 * n - 1)));
-      rows.push_back(row_of(view, views[i].device, problem_.points[t], i > 0));
-    }
-    if (rows.size() < 2) return;
-    Mat3 V = Mat3::Zero();
-    for (const ViewRow& row : rows) V += row.point_part.transpose() * row.point_part;
-    const Mat3 V_inverse = V.inverse();
-    if (!V_inverse.allFinite()) return;
-    for (const ViewRow& a : rows) {
-      const Eigen::Matrix<double, kBlock, 3> Wa = a.device_part.transpose() * a.point_part;
-      H_.block<kBlock, kBlock>(kBlock * a.device, kBlock * a.device) +=
-          a.device_part.transpose() * a.device_part;
-      const Eigen::Matrix<double, kBlock, 3> WaV = Wa * V_inverse;
-      for (const ViewRow& b : rows)
-        H_.block<kBlock, kBlock>(kBlock * a.device, kBlock * b.device) -=
-            WaV * (b.point_part.transpose() * b.device_part);
-    }
-  }
-
-  /// The poses of boards are eliminated as points are.
-  void add_boards() {
-    using DeviceByBoard = Eigen::Matrix<double, kBlock, 6>;
-    struct Sum {
-      Mat6 board = Mat6::Zero();
-      std::map<Eigen::Index, DeviceByBoard> by_device;
-    };
-    std::map<std::size_t, Sum> sums;
-    for (const BoardView& seen : problem_.board_views) {
-      const BundleDevice& device = problem_.devices[seen.view.device];
-      const Vec3 point = corner_point(problem_, seen);
-      const Vec3 arm = point - transform_from(problem_.board_poses[seen.board]).translation;
-      if (!device.present || !view_error(device, point, seen.view)) continue;
-      const ViewRow row =
-          row_of(linearize(device, point, seen.view, extra_), seen.view.device, point, true);
-      Eigen::Matrix<double, 2, 6> by_board;
-      by_board << -row.point_part * cross_matrix(arm), row.point_part;
-      Sum& sum = sums[seen.board];
-      sum.board += by_board.transpose() * by_board;
-      const auto [at, is_new] = sum.by_device.try_emplace(row.device, DeviceByBoard::Zero());
-      at->second += row.device_part.transpose() * by_board;
-      H_.block<kBlock, kBlock>(kBlock * row.device, kBlock * row.device) +=
-          row.device_part.transpose() * row.device_part;
-    }
-    for (const auto& [board, sum] : sums)
-      for (const auto& [a, Wa] : sum.by_device)
-        for (const auto& [b, Wb] : sum.by_device)
-          H_.block<kBlock, kBlock>(kBlock * a, kBlock * b) -=
-              Wa * solve_symmetric(Eigen::MatrixXd(sum.board), Wb.transpose());
-  }
-
-  void add_priors(unsigned free_inner) {
-    free_.assign(static_cast<std::size_t>(H_.rows()), false);
-    for (Eigen::Index d = 0; d < count(); ++d) {
-      const BundleDevice& device = problem_.devices[static_cast<std::size_t>(d)];
-      if (!device.present) continue;
-      for (Eigen::Index i = 0; i < kPose; ++i)
-        free_[static_cast<std::size_t>(kBlock * d + i)] = true;
-      for (std::size_t i = 0; i < kIntrinsics; ++i) {
-        const Eigen::Index at = kBlock * d + kPose + static_cast<Eigen::Index>(i);
-        const double sigma = device.prior_sigma[i];
-        if (sigma == 0 || (free_inner >> i & 1U) == 0) continue;
-        free_[static_cast<std::size_t>(at)] = true;
-        if (!std::isfinite(sigma)) continue;
-        if (i != kFy) {
-          H_(at, at) += 1 / (sigma * sigma);
-          continue;
-        }
-        // On fy / fx.
-        const double fx = device.inner[kFx];
-        const Eigen::Index fx_at = kBlock * d + kPose + kFx;
-        Eigen::Vector2d row(-device.inner[kFy] / (fx * fx), 1 / fx);
-        row /= sigma;
-        for (const auto& [a, ia] : {std::pair(0, fx_at), std::pair(1, at)})
-          for (const auto& [b, ib] : {std::pair(0, fx_at), std::pair(1, at)})
-            H_(ia, ib) += row[a] * row[b];
-      }
-    }
-  }
-
-  const BundleProblem& problem_;
-  double loss_scale_;
-  double extra_;
-  Eigen::MatrixXd H_;
-  std::vector<Mat3> rotations_;
-  std::vector<bool> free_;
-  std::vector<double> residuals_;
-};
-
-/// How poses change under the similarities of the world about `middle`: turn, shift, scale. A board
-/// fixes the scale.
+/// How poses change under the similarities of the world about `middle`: turn, shift, and scale
+/// where no board gives it.
 Eigen::MatrixXd gauge(const BundleProblem& problem, const Vec3& middle) {
   const auto count = static_cast<Eigen::Index>(problem.devices.size());
   Eigen::MatrixXd G = Eigen::MatrixXd::Zero(kBlock * count, 7);
@@ -188,20 +30,20 @@ Eigen::MatrixXd gauge(const BundleProblem& problem, const Vec3& middle) {
     const Mat3 R = rotation_of(device);
     // X' = X + w x (X - m) + v + s (X - m); the device's frame turns and moves along.
     G.block<3, 3>(kBlock * d, 0) = -R;
-    G.block<3, 3>(kBlock * d + 3, 0) = R * cross_matrix(-middle);
+    for (Eigen::Index k = 0; k < 3; ++k)
+      G.block<3, 1>(kBlock * d + 3, k) = R * middle.cross(Vec3::Unit(k)) * -1;
     G.block<3, 3>(kBlock * d + 3, 3) = -R;
     const Vec3 t(device.pose[3], device.pose[4], device.pose[5]);
     G.block<3, 1>(kBlock * d + 3, 6) = t + R * middle;
   }
-  if (!problem.board_views.empty()) G.conservativeResize(Eigen::NoChange, 6);
+  if (boards_join_devices(problem.board_views)) G.conservativeResize(Eigen::NoChange, 6);
   return G;
 }
 
-/// By how much more the errors vary from one part of the images to the next than independent ones
-/// would: the mean squared mean of a cell's errors, over that of as many independent errors. Lenses
-/// unlike the model, bent boards and light from elsewhere make neighbours err alike, and many alike
-/// errors weigh as one. At least 1.
-double shared_variance(const BundleProblem& problem) {
+/// Error that neighbours in an image share, px: what the means of cells scatter beyond what as many
+/// independent errors would. Lenses unlike the model, texture and light from elsewhere make
+/// neighbours err alike. 0 where chance explains the means (to one standard error).
+double shared_error(const BundleProblem& problem) {
   constexpr int kCells = 8;  // along an image's width
   constexpr double kFewest = 5;
   struct Cell {
@@ -218,14 +60,22 @@ double shared_variance(const BundleProblem& problem) {
     cell.squares += error.squaredNorm();
     cell.count += 1;
   });
-  double of_means = 0;
-  double expected = 0;
+  double sum = 0;
+  double squares = 0;
+  double count = 0;
   for (const auto& [key, cell] : cells) {
     if (cell.count < kFewest) continue;
-    of_means += cell.sum.squaredNorm() / cell.count;
-    expected += cell.squares / cell.count;
+    const double of_mean = cell.sum.squaredNorm() / (cell.count * cell.count);
+    const double by_chance = cell.squares / (cell.count * cell.count);
+    const double shared = (of_mean - by_chance) / 2;
+    sum += shared;
+    squares += shared * shared;
+    count += 1;
   }
-  return expected > 0 ? std::max(1.0, of_means / expected) : 1;
+  if (count < 2) return 0;
+  const double mean = sum / count;
+  const double error = std::sqrt(std::max(0.0, squares / count - mean * mean) / count);
+  return std::sqrt(std::max(0.0, mean - error));
 }
 
 struct Covariance {
@@ -234,8 +84,9 @@ struct Covariance {
   Eigen::MatrixXd root;  ///< matrix = root * root'
 };
 
-Covariance invert(const NormalEquations& normal, const BundleProblem& problem, const Vec3& middle,
-                  double distance) {
+/// Of random errors, scaled by `variance_factor`, and of systematic ones.
+Covariance invert(const ReducedEquations& normal, const BundleProblem& problem, const Vec3& middle,
+                  double distance, double variance_factor, double shared_px) {
   Covariance result;
   for (Eigen::Index i = 0; i < normal.H().rows(); ++i)
     if (normal.is_free(i)) result.at.push_back(i);
@@ -265,17 +116,23 @@ Covariance invert(const NormalEquations& normal, const BundleProblem& problem, c
   const double least = 1e-14 * values.maxCoeff();
   for (double& v : values) v = 1 / std::max(v, least);
   const Eigen::MatrixXd root = P * eigen.vectors * values.cwiseSqrt().asDiagonal();
-  result.root = unit.asDiagonal() * root;
+  const Eigen::MatrixXd of_all = normal.systematic(shared_px);
+  Eigen::MatrixXd systematic(n, of_all.cols());
+  for (Eigen::Index i = 0; i < n; ++i)
+    systematic.row(i) = unit[i] * of_all.row(result.at[static_cast<std::size_t>(i)]);
+  result.root.resize(n, n + of_all.cols());
+  result.root << std::sqrt(variance_factor) * root, root * (root.transpose() * systematic);
+  result.root = unit.asDiagonal() * result.root;
   result.matrix = result.root * result.root.transpose();
   return result;
 }
 
 /// The problem's devices moved by one draw of the covariance.
 std::vector<BundleDevice> drawn_devices(const BundleProblem& problem, const Covariance& covariance,
-                                        double factor, Random& random) {
+                                        Random& random) {
   Eigen::VectorXd z(covariance.root.cols());
   for (double& v : z) v = random.normal();
-  const Eigen::VectorXd change = factor * (covariance.root * z);
+  const Eigen::VectorXd change = covariance.root * z;
   std::vector<BundleDevice> devices = problem.devices;
   std::vector<Eigen::Matrix<double, kBlock, 1>> changes(devices.size());
   for (auto& c : changes) c.setZero();
@@ -301,8 +158,8 @@ std::vector<BundleDevice> drawn_devices(const BundleProblem& problem, const Cova
 }
 
 /// Errors of points measured with drawn rigs.
-void measure_volume(const BundleProblem& problem, const Covariance& covariance, double factor,
-                    std::uint64_t seed, Uncertainty& result) {
+void measure_volume(const BundleProblem& problem, const Covariance& covariance, std::uint64_t seed,
+                    Uncertainty& result) {
   constexpr std::size_t kPoints = 200;
   constexpr int kDraws = 30;
   BundleProblem exact;
@@ -326,7 +183,7 @@ void measure_volume(const BundleProblem& problem, const Covariance& covariance, 
   Random random(seed);
   for (int draw = 0; draw < kDraws; ++draw) {
     BundleProblem moved = exact;
-    moved.devices = drawn_devices(problem, covariance, factor, random);
+    moved.devices = drawn_devices(problem, covariance, random);
     std::vector<std::size_t> found;
     Eigen::Matrix3Xd a(3, count);
     Eigen::Matrix3Xd b(3, count);
@@ -376,16 +233,16 @@ Uncertainty uncertainty(const BundleProblem& problem, unsigned free_inner, doubl
   for (const BundleDevice& device : problem.devices)
     if (device.present) distance = std::max(distance, (center_of(device) - middle).norm());
 
-  const NormalEquations normal(problem, free_inner, loss_scale, extra_sigma_px);
-  result.shared_variance = shared_variance(problem);
-  result.variance_factor = std::max(normal.variance_factor(), 0.05) * result.shared_variance;
-  const Covariance covariance = invert(normal, problem, middle, distance);
-  const double factor = std::sqrt(result.variance_factor);
+  const ReducedEquations normal(problem, free_inner, loss_scale, extra_sigma_px);
+  result.shared_px = shared_error(problem);
+  result.variance_factor = std::max(normal.variance_factor(), 0.05);
+  const Covariance covariance =
+      invert(normal, problem, middle, distance, result.variance_factor, result.shared_px);
   for (std::size_t i = 0; i < covariance.at.size(); ++i) {
     const auto row = static_cast<Eigen::Index>(i);
     const auto d = static_cast<std::size_t>(covariance.at[i] / kBlock);
     const auto kind = covariance.at[i] % kBlock;
-    const double sigma = factor * std::sqrt(covariance.matrix(row, row));
+    const double sigma = std::sqrt(covariance.matrix(row, row));
     DeviceUncertainty& device = result.devices[d];
     if (kind < 3) device.rotation_rad = std::hypot(device.rotation_rad, sigma / std::sqrt(3.0));
     if (kind >= 3 && kind < kPose) device.position[kind - 3] = sigma;
@@ -400,7 +257,7 @@ Uncertainty uncertainty(const BundleProblem& problem, unsigned free_inner, doubl
           i != kFy && result.devices[d].inner[i] > 0 && result.devices[d].inner[i] > 0.6 * prior;
     }
   }
-  measure_volume(problem, covariance, factor, seed, result);
+  measure_volume(problem, covariance, seed, result);
   return result;
 }
 

@@ -18,9 +18,8 @@ struct DeviceUncertainty {
 
 struct Uncertainty {
   std::vector<DeviceUncertainty> devices;
-  double variance_factor = 1;  ///< of the whitened residuals; sd are multiplied by its root
-  /// The part of it that comes from neighbours in an image that err alike; 1: they do not.
-  double shared_variance = 1;
+  double variance_factor = 1;  ///< of the whitened residuals; random sd are multiplied by its root
+  double shared_px = 0;        ///< error that neighbours in an image share
   /// Errors of points of the working volume, from the rig's own errors alone, after the similarity
   /// that fits best (poses of the whole rig and its scale mean nothing): root mean square per point
   /// over random rigs, then median and 95th percentile over points; rig units.
@@ -32,6 +31,8 @@ struct Uncertainty {
 /// Covariance from the Jacobian at the solution, points eliminated (Schur complement), in the free
 /// network gauge: of all similarities of the rig, the one with the least sum of variances
 /// (Triggs et al., "Bundle adjustment - a modern synthesis", 2000, section 9). Loss weights count.
+/// Systematic errors widen it: those that neighbours share, as far as the residuals show them, over
+/// a ninth of an image each; and where a board is used, its shape (reduced_equations.h).
 [[nodiscard]] Uncertainty uncertainty(const BundleProblem& problem, unsigned free_inner,
                                       double loss_scale, double extra_sigma_px,
                                       std::uint64_t seed = 1);
