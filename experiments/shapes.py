@@ -75,3 +75,29 @@ def hand(thickness):
         fingers[name] = (start, end, radius)
     rods = [capsule(a, b, r, 0.85 * r) for a, b, r in fingers.values()]
     return (*joined(palm + rods), fingers)
+
+
+def ball(center, radius, around=96):
+    """A sphere."""
+    vertices, triangles = capsule((0, 0, -1e-6 * radius), (0, 0, 1e-6 * radius), radius,
+                                  around=around, along=1, cap=around // 4)
+    return vertices + np.asarray(center), triangles
+
+
+def knot(radius, thickness, around=48, along=600):
+    """A trefoil tube: every view has depth steps within the object."""
+    t = np.linspace(0, 2 * math.pi, along, endpoint=False)
+    line = np.stack([np.sin(t) + 2 * np.sin(2 * t), np.cos(t) - 2 * np.cos(2 * t), -np.sin(3 * t)], 1)
+    line *= (radius - thickness / 2) / np.linalg.norm(line, axis=1).max()
+    tangent = np.roll(line, -1, 0) - np.roll(line, 1, 0)
+    tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
+    side = np.cross(tangent, line)
+    side /= np.linalg.norm(side, axis=1, keepdims=True)
+    other = np.cross(tangent, side)
+    a = np.linspace(0, 2 * math.pi, around, endpoint=False)[None, :, None]
+    vertices = line[:, None] + thickness / 2 * (np.cos(a) * side[:, None] + np.sin(a) * other[:, None])
+    i, j = np.meshgrid(np.arange(along), np.arange(around), indexing="ij")
+    p, q = i * around + j, i * around + (j + 1) % around
+    r, s = (i + 1) % along * around + j, (i + 1) % along * around + (j + 1) % around
+    triangles = np.concatenate([np.stack([p, q, r], -1), np.stack([q, s, r], -1)]).reshape(-1, 3)
+    return vertices.reshape(-1, 3), triangles

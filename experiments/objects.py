@@ -1,0 +1,120 @@
+#!/usr/bin/python3
+"""Other objects: what one frame gives of statues, thin, textured and shiny things.
+
+Six cameras, six projectors, 12 px pitch, medium noise, seed 1: the rig of `rig ring` as it is. Every
+object is rendered once and reconstructed as a user would; its points and its measured surface are
+judged by their truth. Horse and cat are of Debian's glmark2-data, the others are made from formulas.
+"""
+
+import subprocess
+
+import numpy as np
+
+import common
+import shapes
+
+MODELS = common.BUNNY.parent
+
+
+def model(name):
+    """A mesh of glmark2-data that is not an OBJ, by Assimp's converter."""
+    def write(path):
+        subprocess.run(["assimp", "export", str(MODELS / name), str(path)], check=True,
+                       capture_output=True)
+    return write
+
+
+def formula(make):
+    def write(path):
+        common.write_ply(path, *make())
+    return write
+
+
+def bunny(path):
+    path.symlink_to(common.BUNNY)
+
+
+# name: what it stands for, mesh file's ending, its maker, options of simulate, is it intricate or thin
+OBJECTS = {
+    "bunny": ("plain", "obj", bunny, ["--fit", "--up", "y"], False),
+    "texture": ("bunny, albedo 0.4 to 0.8", "obj", bunny,
+                ["--fit", "--up", "y", "--texture", "noise", "--contrast", 0.5], False),
+    "specular": ("bunny, shiny", "obj", bunny,
+                 ["--fit", "--up", "y", "--specular", 0.3, "--roughness", 0.05], False),
+    "cat": ("statue", "ply", model("cat.3ds"), ["--fit", "--up", "y"], False),
+    "balls": ("two balls, one before the other", "ply",
+              formula(lambda: shapes.joined([shapes.ball((60, -30, -20), 45),
+                                             shapes.ball((-40, 20, 20), 75)])), [], False),
+    "horse": ("statue with thin legs", "ply", model("horse.3ds"), ["--fit", "--up", "y"], True),
+    "hand": ("fingers of 10 to 15 mm", "ply", formula(lambda: shapes.hand(13)[:2]), [], True),
+    "knot": ("tube of 26 mm", "ply", formula(lambda: shapes.knot(125, 26)), [], True),
+}
+
+# Columns: key of evaluate, name in the table, factor, digits, bounds asked of bunny-like and of
+# intricate or thin objects.
+COLUMNS = [
+    ("label_error", "label error, %", 100, 2, 0.2, 0.5),
+    ("line_recall", "line recall", 1, 3, 0.95, 0.90),
+    ("line_recall_3_5px", "recall, 3-5 px", 1, 2, 0.70, 0.60),
+    ("distance_median_mm", "points: median, mm", 1, 3, 0.04, 0.05),
+    ("distance_p90_mm", "90 %, mm", 1, 2, 0.15, 0.2),
+    ("share_above_2mm", "> 2 mm, %", 100, 2, 0.1, 0.3),
+    ("sigma_below_1", "below sigma", 1, 2, 0.60, 0.60),
+    ("sigma_below_2", "2 sigma", 1, 2, 0.92, 0.92),
+    ("mesh_distance_median_mm", "surface: median, mm", 1, 3, 0.03, 0.05),
+    ("mesh_distance_p90_mm", "90 %, mm", 1, 3, 0.10, 0.20),
+    ("mesh_share_above_2mm", "> 2 mm, %", 100, 2, 0.05, 0.2),
+    ("completeness_1mm", "complete at 1 mm", 1, 3, 0.985, 0.96),
+]
+AT_LEAST = {"line_recall", "line_recall_3_5px", "sigma_below_1", "sigma_below_2", "completeness_1mm"}
+
+
+def measure(args, program, name):
+    _, ending, make, options, _ = OBJECTS[name]
+    work = args.out / "work" / name
+    work.mkdir(parents=True, exist_ok=True)
+    rig, mesh = work / "rig.json", work / f"{name}.{ending}"
+    mesh.unlink(missing_ok=True)
+    make(mesh)
+    program("rig", "ring", "--out", rig, *(common.SMALL_RING if args.small else []))
+    program("simulate", "--rig", rig, "--mesh", mesh, "--noise", "medium", "--seed", 1, "--out",
+            work / "scene", "--overwrite", *options)
+    program("reconstruct", "--rig", rig, "--frames", work / "scene/frames", "--out", work / "result",
+            "--overwrite", *([] if args.pictures else ["--no-pictures"]))
+    return program("evaluate", "--truth", work / "scene/truth/mesh.ply", "--rig", rig, "--result",
+                      work / "result/000000")
+
+
+def table(args, rows):
+    def cell(row, key, factor, digits, bounds):
+        value = row[key]
+        if value == "":
+            return "-"
+        bound = bounds[1 if OBJECTS[row["object"]][4] else 0]
+        missed = value * factor < bound if key in AT_LEAST else value * factor > bound
+        text = common.number(value * factor, digits)
+        return f"**{text}**" if missed else text
+
+    header = ["object", "", *[c[1] for c in COLUMNS]]
+    lines = [["asked", "", *[f"{'>=' if c[0] in AT_LEAST else '<='} {c[4]}" for c in COLUMNS]],
+             ["asked", "intricate or thin",
+              *[f"{'>=' if c[0] in AT_LEAST else '<='} {c[5]}" for c in COLUMNS]]]
+    for row in rows.rows:
+        lines.append([row["object"], OBJECTS[row["object"]][0],
+                      *[cell(row, key, factor, digits, bounds)
+                        for key, _, factor, digits, *bounds in COLUMNS]])
+    common.print_table(args.out / "table.md", "Eight objects, one frame each; bold: missed", header,
+                       lines)
+
+
+if __name__ == "__main__":
+    arguments = common.arguments("objects", __doc__, only=("", "hand"), pictures=(0, 0))
+    results = common.Rows(arguments.out / "results.csv", ["object"], [c[0] for c in COLUMNS],
+                          arguments.resume)
+    for chosen in arguments.only.split(",") if arguments.only else OBJECTS:
+        if results.has(object=chosen):
+            continue
+        figures = measure(arguments, common.Program(arguments), chosen)
+        results.add(object=chosen, **{c[0]: figures.get(c[0]) for c in COLUMNS})
+        common.progress(f"objects: {chosen}")
+    table(arguments, results)
