@@ -1,8 +1,21 @@
-"""Objects of the experiments, made from formulas: cube, hand, balls."""
+"""Objects of the experiments: read, or made from formulas."""
 
 import math
 
 import numpy as np
+
+
+def read_obj(path):
+    """Vertices and triangles of an OBJ."""
+    vertices, triangles = [], []
+    for line in open(path):
+        word = line.split()
+        if word[:1] == ["v"]:
+            vertices.append([float(w) for w in word[1:4]])
+        elif word[:1] == ["f"]:
+            corner = [int(w.split("/")[0]) - 1 for w in word[1:]]
+            triangles += [(corner[0], a, b) for a, b in zip(corner[1:], corner[2:])]
+    return np.array(vertices), np.array(triangles)
 
 
 def cube(edge, turn_deg=45):

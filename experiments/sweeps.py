@@ -9,6 +9,7 @@ measured by their points; the mesh is that of joint.
 import numpy as np
 
 import common
+import shapes
 
 METHODS = ["linear", "multiview", "joint"]
 FIGURES = ["label_error", "line_recall", "distance_median_mm", "completeness_1mm", "points"]
@@ -37,17 +38,10 @@ SWEEPS = {
 
 def bunny(radius):
     """The bunny upright, its farthest vertex `radius` mm from the middle of its box."""
-    vertices, triangles = [], []
-    for line in open(common.BUNNY):
-        word = line.split()
-        if word[:1] == ["v"]:
-            vertices.append([float(w) for w in word[1:4]])
-        elif word[:1] == ["f"]:
-            corner = [int(w.split("/")[0]) - 1 for w in word[1:]]
-            triangles += [(corner[0], a, b) for a, b in zip(corner[1:], corner[2:])]
-    vertices = np.array(vertices)[:, [0, 2, 1]] * [1, -1, 1]
+    vertices, triangles = shapes.read_obj(common.BUNNY)
+    vertices = vertices[:, [0, 2, 1]] * [1, -1, 1]
     vertices -= (vertices.min(0) + vertices.max(0)) / 2
-    return vertices * radius / np.linalg.norm(vertices, axis=1).max(), np.array(triangles)
+    return vertices * radius / np.linalg.norm(vertices, axis=1).max(), triangles
 
 
 def measure(args, program, rows, name, value):
