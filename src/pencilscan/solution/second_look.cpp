@@ -81,6 +81,7 @@ class CameraLook {
   [[nodiscard]] bool is_long_enough(const std::vector<char>& decided, int begin, int end) const;
   [[nodiscard]] std::vector<std::vector<char>> decided_points() const;
   [[nodiscard]] int family_of(PatternRef ref) const;
+  [[nodiscard]] float expected_width(const PredictedPoint& p) const;
   [[nodiscard]] LabeledRun run_of(int curve, int begin, int end, const LineName& name) const {
     return {
         curve, begin, end,
@@ -142,6 +143,14 @@ int CameraLook::family_of(PatternRef ref) const {
   return -1;
 }
 
+/// Width of the profile of a predicted line, px.
+float CameraLook::expected_width(const PredictedPoint& p) const {
+  const LinePattern& pattern = rig_.projectors[static_cast<std::size_t>(p.pattern.projector)]
+                                   .patterns[static_cast<std::size_t>(p.pattern.pattern)];
+  return line_profile_width(p.spacing_px *
+                            static_cast<float>(pattern.line_width_px / pattern.pitch_px));
+}
+
 /// Adds runs to what is labelled.
 void CameraLook::accept(std::vector<LabeledRun> news) {
   for (const LabeledRun& run : news) {
@@ -193,16 +202,20 @@ void CameraLook::predict() {
   for (const PredictedPoint& p : missing_) missing_places_.add(p.position, p);
 }
 
-/// visit(predicted, across_px) for the missing points beside a curve point, of its direction.
+/// visit(predicted, across_px) for the missing points beside a curve point, of its direction and
+/// not much thinner: a curve wider than its line is another one, or two.
 template <class Visit>
 void CameraLook::aligned_predictions(const CurvePoint& point, Visit visit) const {
   constexpr float kAround = 3;    // px
   constexpr float kAlong = 1.5F;  // px
   constexpr float kSameDirection = 0.9F;
+  constexpr float kWidest = 1.2F;
   missing_places_.around(point.position, kAround, [&](const PredictedPoint& p) {
     const Vector2f way = point.position - p.position;
     const float along = std::abs(way.x() * p.normal.y() - way.y() * p.normal.x());
-    if (along > kAlong || std::abs(p.normal.dot(point.normal)) < kSameDirection) return;
+    if (along > kAlong || std::abs(p.normal.dot(point.normal)) < kSameDirection ||
+        point.width_px > kWidest * expected_width(p))
+      return;
     visit(p, std::abs(way.dot(p.normal)));
   });
 }
@@ -324,17 +337,13 @@ bool CameraLook::fits(const CurvePoint& point, const LineName& name, int family)
 
 /// A curve where a line is predicted, as wide as it would be there.
 Curve CameraLook::guess_of(const LineChain& chain) const {
-  const PatternRef ref = chain.front().pattern;
-  const LinePattern& pattern = rig_.projectors[static_cast<std::size_t>(ref.projector)]
-                                   .patterns[static_cast<std::size_t>(ref.pattern)];
-  const auto width_of_spacing = static_cast<float>(pattern.line_width_px / pattern.pitch_px);
   Curve curve;
-  curve.family = family_of(ref);
+  curve.family = family_of(chain.front().pattern);
   for (const PredictedPoint& p : chain) {
     CurvePoint point;
     point.position = p.position;
     point.normal = p.normal;
-    point.width_px = line_profile_width(p.spacing_px * width_of_spacing);
+    point.width_px = expected_width(p);
     curve.points.push_back(point);
   }
   return curve;
