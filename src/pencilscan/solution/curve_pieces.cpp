@@ -59,4 +59,22 @@ PieceGraph cut_into_pieces(const Camera& camera, const GridGraph& graph, int len
   return result;
 }
 
+std::vector<char> crossed_pieces(const PieceGraph& graph) {
+  std::vector<char> crossed(graph.pieces.size(), 0);
+  for (const PieceCrossing& x : graph.crossings)
+    crossed[static_cast<std::size_t>(x.a)] = crossed[static_cast<std::size_t>(x.b)] = 1;
+  return crossed;
+}
+
+std::vector<char> pieces_of_crossed_curves(const PieceGraph& graph) {
+  std::vector<char> crossed = crossed_pieces(graph);
+  const auto& chain = graph.continuations;  // ordered along each curve
+  const auto join = [&](int from, int to) {
+    crossed[static_cast<std::size_t>(to)] |= crossed[static_cast<std::size_t>(from)];
+  };
+  for (std::size_t i = 0; i < chain.size(); ++i) join(chain[i].first, chain[i].second);
+  for (std::size_t i = chain.size(); i-- > 0;) join(chain[i].second, chain[i].first);
+  return crossed;
+}
+
 }  // namespace pencilscan

@@ -34,4 +34,9 @@ struct PieceGraph {
 /// Cuts the curves of one camera into pieces of at most `length` points.
 [[nodiscard]] PieceGraph cut_into_pieces(const Camera& camera, const GridGraph& graph, int length);
 
+/// Per piece, 1 where it crosses another.
+[[nodiscard]] std::vector<char> crossed_pieces(const PieceGraph& graph);
+/// Per piece, 1 where some piece of its curve crosses another.
+[[nodiscard]] std::vector<char> pieces_of_crossed_curves(const PieceGraph& graph);
+
 }  // namespace pencilscan

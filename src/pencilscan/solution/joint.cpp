@@ -175,10 +175,7 @@ float confidence_of(float margin) { return 1 / (1 + std::exp(0.13F - 0.52F * mar
 void write_decisions(const LabelledPieces& pieces, const std::vector<Decision>& decisions,
                      const JointOptions& options, std::vector<LabeledRun>& runs,
                      std::vector<LabeledRun>& tentative, std::vector<UndecidedRun>& undecided) {
-  std::vector<char> is_crossed(decisions.size(), 0);
-  for (const PieceCrossing& x : pieces.graph.crossings) {
-    is_crossed[static_cast<std::size_t>(x.a)] = is_crossed[static_cast<std::size_t>(x.b)] = 1;
-  }
+  const std::vector<char> is_crossed = crossed_pieces(pieces.graph);
   for (std::size_t p = 0; p < decisions.size(); ++p) {
     const CurvePiece& piece = pieces.graph.pieces[p];
     const auto leave = [&](UndecidedReason reason) {
@@ -219,7 +216,7 @@ Labeling solve_joint(const Rig& rig, const std::vector<ColorFamily>& families,
     surroundings[g].emplace(rig.cameras[static_cast<std::size_t>(graphs[g].camera)], graphs[g],
                             pieces[g]);
     energies[g] = pairwise_energy(pieces[g], options);
-    if (lacks_crossings(pieces[g].graph)) add_order(rig, graphs[g], pieces[g], energies[g]);
+    add_order(rig, graphs[g], pieces[g], energies[g]);
   });
   std::vector<std::vector<Decision>> decisions(graphs.size());
   std::vector<PieceBeliefs> beliefs(graphs.size());

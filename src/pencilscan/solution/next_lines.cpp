@@ -41,7 +41,9 @@ std::vector<NextPiece> next_pieces(const Camera& camera, const GridGraph& graph,
   }
   std::vector<NextPiece> result;
   std::set<std::pair<int, int>> seen;
+  const std::vector<char> is_crossed = crossed_pieces(pieces);
   for (std::size_t p = 0; p < pieces.pieces.size(); ++p) {
+    if (is_crossed[p] != 0) continue;
     const CurvePiece& piece = pieces.pieces[p];
     const Curve& curve = graph.curves[static_cast<std::size_t>(piece.curve)];
     const CurvePoint& middle =

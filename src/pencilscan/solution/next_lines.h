@@ -16,10 +16,11 @@ struct NextPiece {
 };
 
 /// True where so few curves cross that crossings cannot decide the lines: one projector alone. Its
-/// lines then follow from their order and the code, as in Zhang, Curless and Seitz 2002.
+/// lines then follow from their order and the code only, as in Zhang, Curless and Seitz 2002.
 [[nodiscard]] bool lacks_crossings(const PieceGraph& graph);
 
-/// The next piece on both sides of each, up to 48 px away, in its own direction.
+/// The next piece on both sides of each that nothing crosses, up to 48 px away, in its own
+/// direction.
 [[nodiscard]] std::vector<NextPiece> next_pieces(const Camera& camera, const GridGraph& graph,
                                                  const PieceGraph& pieces);
 

@@ -154,10 +154,10 @@ std::vector<std::vector<float>> along_curves(const LabelledPieces& pieces,
   return forward;
 }
 
-std::size_t kept_labels(const std::vector<PieceLabel>& labels, bool lacks_crossings,
+std::size_t kept_labels(const std::vector<PieceLabel>& labels, bool is_crossed,
                         const JointOptions& options) {
   const auto most = static_cast<std::size_t>(options.max_labels);
-  if (lacks_crossings) return 6 * most;  // nothing tells them apart yet
+  if (!is_crossed) return 6 * most;  // nothing tells them apart yet
   // The more patterns share a colour, the more of their lines meet at some depth by chance.
   constexpr std::size_t kFewPatterns = 3;
   std::size_t patterns = 0;
@@ -172,10 +172,11 @@ void keep_supported(LabelledPieces& pieces, const JointOptions& options) {
     for (std::size_t k = 0; k < scores[p].size(); ++k) scores[p][k] += pieces.labels[p][k].cost;
   }
   scores = along_curves(pieces, scores, options);
+  const std::vector<char> is_crossed = pieces_of_crossed_curves(pieces.graph);
   const bool lacks = lacks_crossings(pieces.graph);
   for (std::size_t p = 0; p < pieces.labels.size(); ++p) {
     auto& labels = pieces.labels[p];
-    const std::size_t max_labels = kept_labels(labels, lacks, options);
+    const std::size_t max_labels = kept_labels(labels, !lacks && is_crossed[p] != 0, options);
     std::vector<std::size_t> order(labels.size());
     for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
     const std::size_t count = std::min(labels.size(), max_labels);
