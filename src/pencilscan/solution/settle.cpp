@@ -26,17 +26,21 @@ Opinion opinion_of(const SurfacePatch& patch, const Camera& camera, const Eigen:
 }
 
 /// Standard deviation of a settled point, mm along the ray. Neither a point's noise nor a patch's
-/// knows bends within the patch, curve ends at depth steps or errors that neighbours share: the
-/// error grows more slowly than the propagated one, with the disagreement of the points around and
-/// where they lie to one side. Exponents and scale from the errors of rendered bunny, hand and two
-/// balls.
-double settled_sigma(double propagated, double footprint, const SurfacePatch& patch) {
-  constexpr double kScale = 0.64;
+/// knows what the quadratic cannot follow, curve ends at depth steps or errors that neighbours
+/// share. So the error grows more slowly than the propagated one (`propagated`), but also with the
+/// disagreement of the points around, where they lie to one side, with the patch's bend and where
+/// point and patch are `deviations` of their own apart. Exponents and scale by maximum likelihood
+/// from the errors of eight rendered objects (experiments/objects.py).
+double settled_sigma(double propagated, double deviations, const Camera& camera, double footprint,
+                     const SurfacePatch& patch) {
+  constexpr double kScale = 0.43;
   constexpr double kLeastSpread = 0.3;
-  constexpr double kOneSided = 2.5;
-  return kScale * footprint * std::pow(propagated / footprint, 2.0 / 3) *
-         std::max(kLeastSpread, static_cast<double>(patch.spread)) *
-         std::exp(kOneSided * static_cast<double>(patch.one_sidedness));
+  constexpr double kUsualBend = 0.6;  // footprints over the patch's scale
+  const double bend = static_cast<double>(patch.coefficients.tail<3>().norm()) * camera.K(0, 0);
+  return kScale * footprint * std::pow(propagated / footprint, 0.7) *
+         std::pow(std::max(kLeastSpread, static_cast<double>(patch.spread)), 0.55) *
+         std::exp(1.9 * static_cast<double>(patch.one_sidedness)) *
+         std::pow(1 + bend / kUsualBend, 0.25) * std::pow(1 + deviations * deviations, 0.35);
 }
 
 /// The point settled; nothing if it contradicts its surroundings.
@@ -47,7 +51,10 @@ std::optional<MeasuredPoint> settled(const MeasuredPoint& point, const LocalSurf
   const SurfacePatch* patch = surface.nearest(pixel);
   if (patch == nullptr) {
     if (point.confidence < static_cast<float>(options.min_alone_confidence)) return std::nullopt;
-    return point;
+    constexpr float kAlone = 1.8F;  // such points lie at depth steps
+    MeasuredPoint result = point;
+    result.sigma *= kAlone;
+    return result;
   }
   const Vec3 way = Vec3(point.x, point.y, point.z) - center;
   const double depth = way.dot(forward);
@@ -56,7 +63,8 @@ std::optional<MeasuredPoint> settled(const MeasuredPoint& point, const LocalSurf
   const double own2 = static_cast<double>(point.sigma) * point.sigma;
   const double others2 = others.sigma * others.sigma;
   const double apart = (others.depth - depth) * ray_length;
-  if (std::abs(apart) > options.max_deviations * std::sqrt(own2 + others2)) return std::nullopt;
+  const double deviations = std::abs(apart) / std::sqrt(own2 + others2);
+  if (deviations > options.max_deviations) return std::nullopt;
   const double own_share = others2 / (own2 + others2);
   // Inverse depth is what varies linearly over the image.
   const double w = 1 / others.depth + own_share * (1 / depth - 1 / others.depth);
@@ -66,7 +74,8 @@ std::optional<MeasuredPoint> settled(const MeasuredPoint& point, const LocalSurf
   result.y = static_cast<float>(x.y());
   result.z = static_cast<float>(x.z());
   result.sigma = static_cast<float>(
-      settled_sigma(std::sqrt(own_share * own2), others.depth / camera.K(0, 0), *patch));
+      settled_sigma(std::sqrt(own_share * own2), deviations, camera, others.depth / camera.K(0, 0),
+                    *patch));
   if (options.errors_are_shared) result.sigma = std::max(result.sigma, point.sigma);
   return result;
 }
