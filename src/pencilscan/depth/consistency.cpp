@@ -322,6 +322,50 @@ std::size_t drop_lone(const Comparison& comparison, std::span<DepthMap> maps) {
   return dropped;
 }
 
+/// Removes `nodes` of a map: other views, or their own lines, do not bear them out.
+std::size_t drop_nodes(std::span<const std::size_t> nodes, HoleReason reason, DepthMap& map) {
+  for (const std::size_t k : nodes) {
+    map.nodes[k].w = 0;
+    map.nodes[k].reason = reason;
+  }
+  return nodes.size();
+}
+
+/// Patches of one projector's lines that no other camera confirms: growth that slipped by a line
+/// looks the same there. They stay where labelled curves hold them and nothing speaks against them.
+std::size_t drop_unconfirmed_patches(DepthMap& map) {
+  constexpr double kLeastSeeded = 0.02;      // share of the nodes
+  constexpr double kLeastConfidence = 0.75;  // mean
+  const auto is_weak = [&](std::size_t i) {
+    const DepthNode& n = map.nodes[i];
+    return n.measured() && std::popcount(n.lit) <= 1 && n.support <= 0.01F;
+  };
+  std::size_t dropped = 0;
+  std::vector<char> seen(map.nodes.size(), 0);
+  std::vector<std::size_t> patch;
+  for (std::size_t i = 0; i < map.nodes.size(); ++i) {
+    if (seen[i] || !is_weak(i)) continue;
+    patch.assign(1, i);
+    seen[i] = 1;
+    double seeds = 0;
+    double confidence = 0;
+    for (std::size_t k = 0; k < patch.size(); ++k) {
+      seeds += map.nodes[patch[k]].seeded ? 1 : 0;
+      confidence += static_cast<double>(map.nodes[patch[k]].confidence);
+      for_each_neighbor(map, patch[k], 1, [&](std::size_t j) {
+        if (!seen[j] && is_weak(j)) {
+          patch.push_back(j);
+          seen[j] = 1;
+        }
+      });
+    }
+    const auto size = static_cast<double>(patch.size());
+    if (seeds >= kLeastSeeded * size && confidence >= kLeastConfidence * size) continue;
+    dropped += drop_nodes(patch, HoleReason::kOneProjector, map);
+  }
+  return dropped;
+}
+
 std::size_t drop_islands(const ConsistencyOptions& options, std::span<const char> supported,
                          const Comparison& comparison, std::size_t map_index, DepthMap& map) {
   std::size_t dropped = 0;
@@ -346,11 +390,7 @@ std::size_t drop_islands(const ConsistencyOptions& options, std::span<const char
     const bool slipped = seeds == 0 && supports == 0;
     const bool large = component.size() >= static_cast<std::size_t>(options.min_component);
     if (!slipped && (large || 2 * supports >= component.size())) continue;
-    dropped += component.size();
-    for (const std::size_t k : component) {
-      map.nodes[k].w = 0;
-      map.nodes[k].reason = HoleReason::kContradicted;
-    }
+    dropped += drop_nodes(component, HoleReason::kContradicted, map);
   }
   return dropped;
 }
@@ -418,6 +458,7 @@ ConsistencyReport check_consistency(const Rig& rig, std::span<const int> pattern
   report.sigma_scale = sigma_scale(links);
   scale_sigma(kUnseenErrors * std::clamp(report.sigma_scale, 1 / kUnseenErrors, 4.0), maps);
   report.unconfirmed = drop_lone(comparison, maps);
+  for (DepthMap& map : maps) report.unconfirmed += drop_unconfirmed_patches(map);
   for (std::size_t m = 0; m < maps.size(); ++m)
     report.islands += drop_islands(options, supported, comparison, m, maps[m]);
   return report;

@@ -334,5 +334,33 @@ TEST(Consistency, IslandsThatOnlyGrewAreRemoved) {
   }
 }
 
+TEST(Consistency, PatchesOfOneProjectorNeedACurveOrAnotherView) {
+  const BallScene& scene = ball_scene();
+  // One camera alone; a patch that continues the rest, but shows the lines of one projector only.
+  for (const bool seeded : {true, false}) {
+    std::vector<DepthMap> maps = {scene.measure().maps[0]};
+    std::vector<std::size_t> patch;
+    for (std::size_t i = 0; i < maps[0].nodes.size(); ++i) {
+      DepthNode& node = maps[0].nodes[i];
+      if (!node.measured()) continue;
+      const bool inside = (maps[0].pixel(i) - Vec2(125, 100)).norm() <= 20;
+      node.lit = inside ? 1 : 3;
+      if (!inside) continue;
+      node.seeded = seeded;
+      patch.push_back(i);
+    }
+    ASSERT_GT(patch.size(), 30u);
+    const std::vector<int> projectors = {0, 1};
+    static_cast<void>(check_consistency(scene.rig, projectors, maps));
+    std::size_t left = 0;
+    for (const std::size_t i : patch) left += maps[0].nodes[i].measured() ? 1 : 0;
+    if (seeded) {
+      EXPECT_GT(left, patch.size() * 9 / 10);
+    } else {
+      EXPECT_EQ(left, 0U);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace pencilscan

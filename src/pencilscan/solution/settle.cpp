@@ -73,9 +73,8 @@ std::optional<MeasuredPoint> settled(const MeasuredPoint& point, const LocalSurf
   result.x = static_cast<float>(x.x());
   result.y = static_cast<float>(x.y());
   result.z = static_cast<float>(x.z());
-  result.sigma = static_cast<float>(
-      settled_sigma(std::sqrt(own_share * own2), deviations, camera, others.depth / camera.K(0, 0),
-                    *patch));
+  result.sigma = static_cast<float>(settled_sigma(std::sqrt(own_share * own2), deviations, camera,
+                                                  others.depth / camera.K(0, 0), *patch));
   if (options.errors_are_shared) result.sigma = std::max(result.sigma, point.sigma);
   return result;
 }
