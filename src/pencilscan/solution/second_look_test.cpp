@@ -50,7 +50,7 @@ class LabeledScene : public testing::Test, protected TwoProjectorScene {
         const Eigen::Vector2f tangent = (next - before).normalized();
         curve.points[i].normal = {tangent.y(), -tangent.x()};
         curve.points[i].amplitude = 0.3F;
-        curve.points[i].width_px = 1.6F;
+        curve.points[i].width_px = 1.2F;
       }
     }
   }
@@ -147,6 +147,14 @@ TEST_F(LabeledScene, UndecidedCurveBetweenLinesStaysUndecided) {
   for (CurvePoint& p : graph_.curves[curve].points) p.position += 6.F * p.normal;
   const std::vector<std::vector<cv::Mat>> no_images(1);
   second_look(rig, families, no_images, {&graph_, 1}, labeling_);
+  EXPECT_EQ(label_of(curve), -1);
+}
+
+TEST_F(LabeledScene, CurveMuchWiderThanThePredictedLineGetsNoLabel) {
+  const std::size_t curve = middle_curve(0);
+  remove_label(curve);
+  for (CurvePoint& p : graph_.curves[curve].points) p.width_px *= 2;
+  second_look(rig, families, std::vector<std::vector<cv::Mat>>(1), {&graph_, 1}, labeling_);
   EXPECT_EQ(label_of(curve), -1);
 }
 
