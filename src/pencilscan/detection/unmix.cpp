@@ -3,61 +3,137 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <numeric>
 #include <opencv2/imgproc.hpp>
+
+#include "pencilscan/core/median.h"
 
 namespace pencilscan {
 namespace {
 
-constexpr double kRidgeSigmaPx = 1.3;
-/// A channel that shows less than this share of the strongest one is taken for crosstalk.
-constexpr float kCrosstalkLimit = 0.3F;
 constexpr std::size_t kMinimumSamples = 200;
 
-/// -Laplacian of Gaussian of one channel: positive on lines of any direction.
-cv::Mat ridge_strength(const cv::Mat& channel) {
-  cv::Mat smooth;
-  cv::GaussianBlur(channel, smooth, {}, kRidgeSigmaPx);
-  cv::Mat laplacian;
-  cv::Laplacian(smooth, laplacian, CV_32F, 1);
-  return -laplacian;
-}
+/// What the lines of one colour look like in the camera.
+struct LineColor {
+  Rgb projected{};
+  Eigen::Vector3f direction;  ///< unit
+  std::vector<Eigen::Vector3f> samples;
+};
 
-/// True when some family has a colour without channel c, that is where c can be seen to be zero.
-bool can_be_dark(const std::vector<ColorFamily>& families, std::size_t c) {
+std::vector<LineColor> line_colors(const std::vector<ColorFamily>& families) {
+  std::vector<LineColor> colors;
   for (const ColorFamily& family : families) {
-    for (const std::string& color : family.colors) {
-      if (color_from_name(color).value_or(Rgb{1, 1, 1})[c] == 0) return true;
+    for (const std::string& name : family.colors) {
+      const Rgb rgb = color_from_name(name).value_or(Rgb{1, 1, 1});
+      const Eigen::Vector3f direction(static_cast<float>(rgb[0]), static_cast<float>(rgb[1]),
+                                      static_cast<float>(rgb[2]));
+      if (std::none_of(colors.begin(), colors.end(),
+                       [&](const LineColor& c) { return c.projected == rgb; }))
+        colors.push_back({rgb, direction.normalized(), {}});
     }
   }
-  return false;
+  return colors;
 }
 
-/// Coefficients of channel c on the two others, from samples where c ought to be zero.
-/// Three rounds of least squares, each keeping what lies near the last fit.
-Eigen::Vector2d leak_coefficients(const std::vector<Eigen::Vector3f>& samples, int c) {
-  const int a = (c + 1) % 3;
-  const int b = (c + 2) % 3;
-  Eigen::Vector2d leak(0, 0);
-  float tolerance = kCrosstalkLimit;
-  for (int round = 0; round < 4; ++round) {
-    Eigen::Matrix2d N = 1e-12 * Eigen::Matrix2d::Identity();
-    Eigen::Vector2d r(0, 0);
-    std::size_t used = 0;
-    for (const Eigen::Vector3f& s : samples) {
-      const float strongest = std::max(s[a], s[b]);
-      const Eigen::Vector2d others(std::max(0.F, s[a]), std::max(0.F, s[b]));
-      const double residual = s[c] - leak.dot(others);
-      if (std::abs(residual) > tolerance * strongest) continue;
-      N += others * others.transpose() / (strongest * strongest);
-      r += others * s[c] / (strongest * strongest);
-      ++used;
-    }
-    if (used < kMinimumSamples) return {0, 0};
-    leak = N.inverse() * r;
-    leak = leak.cwiseMax(0).cwiseMin(0.4);
-    tolerance *= 0.6F;
+/// Light of the image above the dark between the lines, all channels, where some channel is strong.
+std::vector<Eigen::Vector3f> lit_samples(const cv::Mat& image) {
+  constexpr double kStrong = 0.15;  // of the brightest
+  constexpr int kAround = 21;       // px, holds a gap between two lines
+  cv::Mat smooth;
+  cv::GaussianBlur(image, smooth, {}, 1);
+  cv::Mat dark;
+  cv::erode(smooth, dark, cv::Mat::ones(kAround, kAround, CV_8U));
+  const cv::Mat light = smooth - dark;
+  std::vector<float> brightest;
+  const auto pixel = [&](int y, int x) {
+    const auto& v = light.at<cv::Vec3f>(y, x);
+    return Eigen::Vector3f(v[0], v[1], v[2]);
+  };
+  for (int y = 0; y < image.rows; y += 2) {
+    for (int x = 0; x < image.cols; x += 2) brightest.push_back(pixel(y, x).maxCoeff());
   }
-  return leak;
+  const float peak = *std::max_element(brightest.begin(), brightest.end());
+  std::vector<Eigen::Vector3f> samples;
+  for (int y = 0; y < image.rows; y += 2) {
+    for (int x = 0; x < image.cols; x += 2) {
+      const Eigen::Vector3f s = pixel(y, x);
+      if (s.maxCoeff() > static_cast<float>(kStrong) * peak) samples.push_back(s / s.maxCoeff());
+    }
+  }
+  return samples;
+}
+
+/// Mean of the densest quarter of the values (after Robertson and Cryer 1974).
+float densest(std::vector<float> values) {
+  std::sort(values.begin(), values.end());
+  const std::size_t quarter = values.size() / 4;
+  std::size_t best = 0;
+  for (std::size_t i = 0; i + quarter < values.size(); ++i) {
+    if (values[i + quarter] - values[i] < values[best + quarter] - values[best]) best = i;
+  }
+  const auto first = values.begin() + static_cast<std::ptrdiff_t>(best);
+  return std::accumulate(first, first + static_cast<std::ptrdiff_t>(quarter), 0.F) /
+         static_cast<float>(quarter);
+}
+
+/// Gives every sample to the colour it looks most like and turns the colours to what their samples
+/// look like, starting from what was projected. Samples between two colours (crossings) belong to
+/// none; with more rounds, a colour could slide to where the crossings are.
+void find_line_colors(const std::vector<Eigen::Vector3f>& samples, std::vector<LineColor>& colors) {
+  constexpr int kRounds = 2;
+  constexpr float kFarthest = 0.1F;  // squared distance of unit vectors
+  constexpr float kClearer = 1.5F;   // squared distance of the next colour
+  for (int round = 0; round < kRounds; ++round) {
+    for (LineColor& color : colors) color.samples.clear();
+    for (const Eigen::Vector3f& sample : samples) {
+      const Eigen::Vector3f unit = sample.normalized();
+      float best = std::numeric_limits<float>::max();
+      float second = best;
+      LineColor* nearest = nullptr;
+      for (LineColor& color : colors) {
+        const float d = (unit - color.direction).squaredNorm();
+        if (d < best) {
+          second = best;
+          best = d;
+          nearest = &color;
+        } else {
+          second = std::min(second, d);
+        }
+      }
+      if (best < kFarthest && second > kClearer * best) nearest->samples.push_back(sample);
+    }
+    for (LineColor& color : colors) {
+      if (color.samples.size() < kMinimumSamples) continue;
+      // Light of other lines only adds to a channel: the densest values are those without.
+      Eigen::Vector3f middle;
+      for (Eigen::Index c = 0; c < 3; ++c) {
+        std::vector<float> values;
+        for (const Eigen::Vector3f& s : color.samples) values.push_back(s.normalized()[c]);
+        middle[c] = densest(std::move(values));
+      }
+      color.direction = middle.normalized();
+    }
+  }
+}
+
+/// What channel c shows of the two others, where it was not projected itself: least squares over
+/// the colours without c.
+Eigen::Vector2d leak_coefficients(const std::vector<LineColor>& colors, std::size_t c) {
+  constexpr double kPrior = 1e-3;  // towards no leak, where one colour alone says little
+  constexpr double kLargestLeak = 0.6;
+  Eigen::Matrix2d N = Eigen::Matrix2d::Zero();
+  Eigen::Vector2d r(0, 0);
+  for (const LineColor& color : colors) {
+    if (color.projected[c] != 0 || color.samples.size() < kMinimumSamples) continue;
+    const Eigen::Vector3d d = color.direction.cast<double>();
+    const Eigen::Vector2d others(d[static_cast<Eigen::Index>((c + 1) % 3)],
+                                 d[static_cast<Eigen::Index>((c + 2) % 3)]);
+    N += others * others.transpose();
+    r += others * d[static_cast<Eigen::Index>(c)];
+  }
+  N.diagonal().array() += kPrior * N.trace() + 1e-12;
+  return (N.inverse() * r).cwiseMax(0).cwiseMin(kLargestLeak);
 }
 
 Mat3 stated_matrix(const Camera& camera, const Rig& rig) {
@@ -75,33 +151,19 @@ Unmixing estimate_unmixing(const Camera& camera, const Rig& rig,
     result.projector_from_camera = stated_matrix(camera, rig).inverse();
     return result;
   }
-  std::vector<cv::Mat> channels;
-  cv::split(image, channels);
-  std::array<cv::Mat, 3> ridge;
-  for (std::size_t c = 0; c < 3; ++c) ridge[c] = ridge_strength(channels[c]);
-  cv::Mat strongest = cv::max(ridge[0], cv::max(ridge[1], ridge[2]));
-  double peak = 0;
-  cv::minMaxLoc(strongest, nullptr, &peak);
-  const auto threshold = static_cast<float>(0.1 * peak);
-
+  std::vector<LineColor> colors = line_colors(families);
+  find_line_colors(lit_samples(image), colors);
   Mat3 camera_from_projector = Mat3::Identity();
-  for (int c = 0; c < 3; ++c) {
-    if (!can_be_dark(families, static_cast<std::size_t>(c))) continue;
-    std::vector<Eigen::Vector3f> samples;
-    for (int y = 0; y < image.rows; y += 2) {
-      for (int x = 0; x < image.cols; x += 2) {
-        if (strongest.at<float>(y, x) < threshold) continue;
-        const Eigen::Vector3f s(ridge[0].at<float>(y, x), ridge[1].at<float>(y, x),
-                                ridge[2].at<float>(y, x));
-        const float others = std::max(s[(c + 1) % 3], s[(c + 2) % 3]);
-        if (others < threshold || std::abs(s[c]) > kCrosstalkLimit * others) continue;
-        samples.push_back(s);
-      }
-    }
-    if (samples.size() < kMinimumSamples) continue;
-    const Eigen::Vector2d leak = leak_coefficients(samples, c);
-    camera_from_projector(c, (c + 1) % 3) = leak[0];
-    camera_from_projector(c, (c + 2) % 3) = leak[1];
+  for (std::size_t c = 0; c < 3; ++c) {
+    const bool is_dark_somewhere =
+        std::any_of(colors.begin(), colors.end(), [&](const auto& color) {
+          return color.projected[c] == 0 && color.samples.size() >= kMinimumSamples;
+        });
+    if (!is_dark_somewhere) continue;
+    const Eigen::Vector2d leak = leak_coefficients(colors, c);
+    const auto row = static_cast<Eigen::Index>(c);
+    camera_from_projector(row, (row + 1) % 3) = leak[0];
+    camera_from_projector(row, (row + 2) % 3) = leak[1];
     result.estimated = true;
   }
   result.projector_from_camera = camera_from_projector.inverse();

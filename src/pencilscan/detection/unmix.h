@@ -14,9 +14,9 @@ struct Unmixing {
 };
 
 /// The stated matrix inverted (the mean over projectors where they differ), or else an estimate
-/// from the frame: ridge strengths of one channel at clear ridges of the others, where it ought to
-/// show nothing, regressed on those (crosstalk of the projector panel, filters and sensor
-/// together). `image` is linear light, CV_32FC3, RGB.
+/// from the frame: what each colour of lines looks like above the dark between them says what a
+/// channel shows of the others where it was not projected (crosstalk of the projector panel,
+/// filters and sensor together). `image` is linear light, CV_32FC3, RGB.
 [[nodiscard]] Unmixing estimate_unmixing(const Camera& camera, const Rig& rig,
                                          const std::vector<ColorFamily>& families,
                                          const cv::Mat& image);
