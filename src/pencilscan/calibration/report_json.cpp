@@ -138,7 +138,6 @@ nlohmann::ordered_json calibration_json(const CalibrationReport& report) {
     json["board"] = {{"corners", result.problem.board_views.size()},
                      {"rms_px", result.board_rms_px}};
   json["extra_sigma_px"] = result.extra_sigma_px;
-  json["design_effect"] = report.uncertainty.design_effect;
   json["shared_error_px"] = report.uncertainty.shared_px;
   json["volume"] = {{"radius", report.uncertainty.volume_radius},
                     {"point_sigma_median", report.uncertainty.volume_median},

@@ -40,67 +40,43 @@ Eigen::MatrixXd gauge(const BundleProblem& problem, const Vec3& middle) {
   return G;
 }
 
-/// How errors of neighbours hang together. Robust sums: single wrong codes say nothing of others.
-class NeighbourErrors {
- public:
-  NeighbourErrors(const BundleProblem& problem, double loss_scale, double extra_sigma_px) {
-    constexpr int kPatches = 20;  // along an image's width, of one capture: a piece of surface
-    constexpr int kCells = 8;     // of all captures: a part of the lens
-    for_each_residual(problem, [&](std::size_t t, const TrackView& view, const Vec2& error) {
-      const double sigma = loss_scale * std::hypot(view.sigma_px, extra_sigma_px);
-      const double weight = 1 / (1 + error.squaredNorm() / (sigma * sigma));
-      const double width = 2 * problem.devices[view.device].prior[kCx] + 1;
-      const auto add = [&](std::size_t capture, int across, Sums& sums) {
-        const double size = width / across;
-        Sum& sum = sums[{view.device, capture, static_cast<int>(view.pixel.x() / size),
-                         static_cast<int>(view.pixel.y() / size)}];
-        sum.errors += weight * error;
-        sum.squares += weight * weight * error.squaredNorm();
-        sum.weight += weight;
-        ++sum.count;
-      };
-      add(problem.tracks[t].capture, kPatches, patches_);
-      add(0, kCells, cells_);
-    });
-  }
-
-  /// By how much the variance of sums over pieces of surface exceeds that of as many independent
-  /// errors ("design effect"); at least 1.
-  [[nodiscard]] double design_effect() const {
-    double of_sums = 0;
-    double of_errors = 0;
-    for (const auto& [key, sum] : patches_) {
-      of_sums += sum.errors.squaredNorm();
-      of_errors += sum.squares;
-    }
-    return of_errors > 0 ? std::max(1.0, of_sums / of_errors) : 1;
-  }
-
-  /// What the means of parts of the images scatter beyond that, px.
-  [[nodiscard]] double shared_px(double design_effect) const {
-    constexpr std::size_t kFewest = 5;
-    double sum = 0;
-    double count = 0;
-    for (const auto& [key, cell] : cells_) {
-      if (cell.count < kFewest) continue;
-      sum += (cell.errors.squaredNorm() - design_effect * cell.squares) /
-             (2 * cell.weight * cell.weight);
-      count += 1;
-    }
-    return count > 0 ? std::sqrt(std::max(0.0, sum / count)) : 0;
-  }
-
- private:
-  struct Sum {
-    Vec2 errors = Vec2::Zero();
+/// Error that neighbours in an image share, px: what the means of cells scatter beyond what as many
+/// independent errors would. Lenses unlike the model, texture and light from elsewhere make
+/// neighbours err alike. 0 where chance explains the means (to one standard error).
+double shared_error(const BundleProblem& problem) {
+  constexpr int kCells = 8;  // along an image's width
+  constexpr double kFewest = 5;
+  struct Cell {
+    Vec2 sum = Vec2::Zero();
     double squares = 0;
-    double weight = 0;
-    std::size_t count = 0;
+    double count = 0;
   };
-  using Sums = std::map<std::tuple<std::size_t, std::size_t, int, int>, Sum>;
-  Sums patches_;
-  Sums cells_;
-};
+  std::map<std::tuple<std::size_t, int, int>, Cell> cells;
+  for_each_residual(problem, [&](std::size_t, const TrackView& view, const Vec2& error) {
+    const double size = (2 * problem.devices[view.device].prior[kCx] + 1) / kCells;
+    Cell& cell = cells[{view.device, static_cast<int>(view.pixel.x() / size),
+                        static_cast<int>(view.pixel.y() / size)}];
+    cell.sum += error;
+    cell.squares += error.squaredNorm();
+    cell.count += 1;
+  });
+  double sum = 0;
+  double squares = 0;
+  double count = 0;
+  for (const auto& [key, cell] : cells) {
+    if (cell.count < kFewest) continue;
+    const double of_mean = cell.sum.squaredNorm() / (cell.count * cell.count);
+    const double by_chance = cell.squares / (cell.count * cell.count);
+    const double shared = (of_mean - by_chance) / 2;
+    sum += shared;
+    squares += shared * shared;
+    count += 1;
+  }
+  if (count < 2) return 0;
+  const double mean = sum / count;
+  const double error = std::sqrt(std::max(0.0, squares / count - mean * mean) / count);
+  return std::sqrt(std::max(0.0, mean - error));
+}
 
 struct Covariance {
   std::vector<Eigen::Index> at;  ///< rows of the full system that are free
@@ -258,10 +234,8 @@ Uncertainty uncertainty(const BundleProblem& problem, unsigned free_inner, doubl
     if (device.present) distance = std::max(distance, (center_of(device) - middle).norm());
 
   const ReducedEquations normal(problem, free_inner, loss_scale, extra_sigma_px);
-  const NeighbourErrors neighbours(problem, loss_scale, extra_sigma_px);
-  result.design_effect = neighbours.design_effect();
-  result.shared_px = neighbours.shared_px(result.design_effect);
-  result.variance_factor = std::max(normal.variance_factor(), 0.05) * result.design_effect;
+  result.shared_px = shared_error(problem);
+  result.variance_factor = std::max(normal.variance_factor(), 0.05);
   const Covariance covariance =
       invert(normal, problem, middle, distance, result.variance_factor, result.shared_px);
   for (std::size_t i = 0; i < covariance.at.size(); ++i) {

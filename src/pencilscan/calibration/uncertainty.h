@@ -19,9 +19,7 @@ struct DeviceUncertainty {
 struct Uncertainty {
   std::vector<DeviceUncertainty> devices;
   double variance_factor = 1;  ///< of the whitened residuals; random sd are multiplied by its root
-  /// The part of it that comes from neighbours on a piece of surface that err alike; 1: none.
-  double design_effect = 1;
-  double shared_px = 0;  ///< error that parts of the images share
+  double shared_px = 0;        ///< error that neighbours in an image share
   /// Errors of points of the working volume, from the rig's own errors alone, after the similarity
   /// that fits best (poses of the whole rig and its scale mean nothing): root mean square per point
   /// over random rigs, then median and 95th percentile over points; rig units.
