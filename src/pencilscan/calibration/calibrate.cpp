@@ -79,7 +79,8 @@ class Calibration {
     const std::size_t before = views();
     drop_epipolar_outliers(input_.rig, result_.pairs, options_.least_inlier_share,
                            result_.problem.tracks);
-    result_.views_dropped = before - views();
+    epipolar_outliers_ = before - views();
+    candidates_ = result_.problem.tracks;
     if (!find_structure()) return finish(false);
     refine();
     keep_given_values();
@@ -253,6 +254,10 @@ class Calibration {
     const std::size_t cameras = input_.rig.cameras.size();
     triangulate_all(result_.problem, kLeastAngle);
     const std::vector<char> agrees = given_agrees();
+    // A guess that the data contradict says nothing any more.
+    for (std::size_t d = 0; d < agrees.size(); ++d)
+      if (input_.known[d].K && agrees[d] == 0)
+        set_priors({}, d < cameras, calibrated_device(input_.rig, d), result_.problem.devices[d]);
     const double free_scale = error_scale(result_.problem);
     for (const int attempt : {0, 1, 2}) {  // all given ones, the cameras' alone, the projectors'
       BundleProblem trial = result_.problem;
@@ -289,11 +294,16 @@ class Calibration {
   }
 
   void last_stage() {
-    for (const int round : {0, 1}) {
-      say("adjusting all correspondences", 0.6 + 0.2 * round);
+    for (const int round : {0, 1, 2, 3}) {
+      say("adjusting all correspondences", 0.6 + 0.1 * round);
+      if (round < 3) {
+        // Early stages drop views that only a poor start contradicts: all of them count again.
+        result_.problem.tracks = candidates_;
+        result_.views_dropped = epipolar_outliers_;
+      }
       triangulate_all(result_.problem, kLeastAngle);
-      drop();
-      stage(kAll, 0, round == 0 ? 30 : 200);
+      if (round > 0) drop();
+      stage(kAll, round < 2 ? options_.stage_tracks : 0, round == 3 ? 200 : 50);
     }
   }
 
@@ -367,8 +377,10 @@ class Calibration {
   const CalibrationInput& input_;
   const CalibrateOptions& options_;
   const Progress& progress_;
-  Rig rig_;                  ///< with focal lengths that boards give
-  std::vector<char> known_;  ///< per device: K is given, or from boards
+  Rig rig_;                            ///< with focal lengths that boards give
+  std::vector<char> known_;            ///< per device: K is given, or from boards
+  std::vector<Track> candidates_;      ///< what fundamental matrices left
+  std::size_t epipolar_outliers_ = 0;  ///< views that they dropped
   CalibrationResult result_;
 };
 

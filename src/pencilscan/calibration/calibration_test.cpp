@@ -136,6 +136,29 @@ TEST(Calibrate, FocalLengthsThatAreFivePercentOffAreOnlyAStart) {
   }
 }
 
+TEST(Calibrate, FourPoorGuessesEndInTheSamePlace) {
+  const Rig truth = ring(4, 4);
+  std::vector<Rig> found;
+  for (const double factor : {0.7, 0.85, 1.25, 1.5}) {
+    CalibrationInput input = input_of(truth, tracks_of(truth, {.count = 1500}), false);
+    for (std::size_t d = 0; d < device_total(truth); ++d) {
+      const Device& device = calibrated_device(truth, d);
+      const double focal = factor * device.K(0, 0) * (1 + 0.02 * static_cast<double>(d % 3));
+      calibrated_device(input.rig, d).K << focal, 0, device.width / 2, 0, focal, device.height / 2,
+          0, 0, 1;
+      input.known[d].K = true;
+    }
+    const auto result = calibrate(input, kQuick);
+    ASSERT_TRUE(result.solved) << factor;
+    EXPECT_LT(result.rms_px, 0.1) << factor;
+    for (std::size_t d = 0; d < device_total(truth); ++d) EXPECT_NE(result.placed[d], 0) << factor;
+    found.push_back(result.rig);
+  }
+  for (std::size_t i = 1; i < found.size(); ++i)
+    EXPECT_LT(projection_error(found[0], found[i]), 0.2)
+        << i;  // the poorest guess loses some views
+}
+
 TEST(Verdict, PlanarSceneIsUnusable) {
   const Rig truth = ring(1, 1);
   const CalibrationInput input =
