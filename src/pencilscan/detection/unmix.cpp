@@ -38,27 +38,23 @@ std::vector<LineColor> line_colors(const std::vector<ColorFamily>& families) {
 
 /// Light of the image above the dark between the lines, all channels, where some channel is strong.
 std::vector<Eigen::Vector3f> lit_samples(const cv::Mat& image) {
-  constexpr double kStrong = 0.15;  // of the brightest
-  constexpr int kAround = 21;       // px, holds a gap between two lines
-  cv::Mat smooth;
-  cv::GaussianBlur(image, smooth, {}, 1);
+  constexpr float kStrong = 0.15F;  // of the brightest
+  constexpr int kAround = 11;       // px of the halved image: holds a gap between two lines
+  cv::Mat half_size;
+  cv::pyrDown(image, half_size);
   cv::Mat dark;
-  cv::erode(smooth, dark, cv::Mat::ones(kAround, kAround, CV_8U));
-  const cv::Mat light = smooth - dark;
-  std::vector<float> brightest;
-  const auto pixel = [&](int y, int x) {
-    const auto& v = light.at<cv::Vec3f>(y, x);
-    return Eigen::Vector3f(v[0], v[1], v[2]);
-  };
-  for (int y = 0; y < image.rows; y += 2) {
-    for (int x = 0; x < image.cols; x += 2) brightest.push_back(pixel(y, x).maxCoeff());
-  }
-  const float peak = *std::max_element(brightest.begin(), brightest.end());
+  cv::erode(half_size, dark, cv::Mat::ones(kAround, kAround, CV_8U));
+  const cv::Mat light = half_size - dark;
+  const cv::Mat values = light.reshape(1);
+  double peak = 0;
+  cv::minMaxLoc(values, nullptr, &peak);
   std::vector<Eigen::Vector3f> samples;
-  for (int y = 0; y < image.rows; y += 2) {
-    for (int x = 0; x < image.cols; x += 2) {
-      const Eigen::Vector3f s = pixel(y, x);
-      if (s.maxCoeff() > static_cast<float>(kStrong) * peak) samples.push_back(s / s.maxCoeff());
+  for (int y = 0; y < light.rows; ++y) {
+    for (int x = 0; x < light.cols; ++x) {
+      const auto& v = light.at<cv::Vec3f>(y, x);
+      const float strongest = std::max({v[0], v[1], v[2]});
+      if (strongest > kStrong * static_cast<float>(peak))
+        samples.emplace_back(v[0] / strongest, v[1] / strongest, v[2] / strongest);
     }
   }
   return samples;

@@ -154,10 +154,13 @@ std::vector<std::vector<float>> along_curves(const LabelledPieces& pieces,
   return forward;
 }
 
+/// How many labels of a piece go on. `lacks_crossings`: those of all pieces of its camera.
 std::size_t kept_labels(const std::vector<PieceLabel>& labels, bool is_crossed,
-                        const JointOptions& options) {
+                        bool lacks_crossings, const JointOptions& options) {
   const auto most = static_cast<std::size_t>(options.max_labels);
-  if (!is_crossed) return 6 * most;  // nothing tells them apart yet
+  // Where nothing crosses, nothing tells them apart yet.
+  if (lacks_crossings) return 6 * most;
+  if (!is_crossed) return 3 * most;
   // The more patterns share a colour, the more of their lines meet at some depth by chance.
   constexpr std::size_t kFewPatterns = 3;
   std::size_t patterns = 0;
@@ -176,7 +179,7 @@ void keep_supported(LabelledPieces& pieces, const JointOptions& options) {
   const bool lacks = lacks_crossings(pieces.graph);
   for (std::size_t p = 0; p < pieces.labels.size(); ++p) {
     auto& labels = pieces.labels[p];
-    const std::size_t max_labels = kept_labels(labels, !lacks && is_crossed[p] != 0, options);
+    const std::size_t max_labels = kept_labels(labels, is_crossed[p] != 0, lacks, options);
     std::vector<std::size_t> order(labels.size());
     for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
     const std::size_t count = std::min(labels.size(), max_labels);

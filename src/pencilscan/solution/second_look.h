@@ -24,7 +24,7 @@ struct SecondLookOptions {
   double support_px = 16;         ///< within which lines around must be known ...
   double support_lines = 1.5;     ///< ... or so many line spacings, if those are more
   int min_support = 3;            ///< points of them
-  int passes = 4;
+  int passes = 3;
   float confidence = 0.99F;
 };
 
