@@ -91,6 +91,24 @@ class HandTest(unittest.TestCase):
         self.assertAlmostEqual(volume / expected, 1, delta=0.01)
 
 
+class ObjectsTest(unittest.TestCase):
+    def volume(self, vertices, triangles):
+        a, b, c = (vertices[triangles[:, k]] for k in range(3))
+        return np.sum(np.cross(a, b) * c) / 6
+
+    def test_balls_and_knot_are_closed_and_turned_outwards(self):
+        ball = self.volume(*shapes.ball((5, 0, 0), 40))
+        self.assertAlmostEqual(ball / (4 / 3 * np.pi * 40**3), 1, delta=0.01)
+        vertices, triangles = shapes.knot(125, 26)
+        self.assertAlmostEqual(np.linalg.norm(vertices, axis=1).max(), 125, delta=1)
+        edges = np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]],
+                                        triangles[:, [2, 0]]]), axis=1)
+        self.assertTrue((np.unique(edges, axis=0, return_counts=True)[1] == 2).all())
+        line = vertices.reshape(600, 48, 3).mean(1)
+        length = np.linalg.norm(np.roll(line, -1, 0) - line, axis=1).sum()
+        self.assertAlmostEqual(self.volume(vertices, triangles) / (np.pi * 13**2 * length), 1, delta=0.02)
+
+
 class FilesTest(unittest.TestCase):
     def test_a_mesh_comes_back(self):
         vertices, triangles = shapes.cube(10)
