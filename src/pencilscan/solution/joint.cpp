@@ -81,9 +81,9 @@ PairwiseEnergy pairwise_energy(const LabelledPieces& pieces, const JointOptions&
 
 /// Where nothing crosses: pieces side by side are lines side by side.
 void add_order(const Rig& rig, const GridGraph& graph, const LabelledPieces& pieces,
-               PairwiseEnergy& energy) {
+               std::span<const NextPiece> next_pieces, PairwiseEnergy& energy) {
   const Camera& camera = rig.cameras[static_cast<std::size_t>(graph.camera)];
-  for (const NextPiece& next : next_pieces(camera, graph, pieces.graph)) {
+  for (const NextPiece& next : next_pieces) {
     const auto& a = pieces.labels[static_cast<std::size_t>(next.a)];
     const auto& b = pieces.labels[static_cast<std::size_t>(next.b)];
     const Vec3 ray = camera.normalized_from_pixel(next.pixel.cast<double>()).homogeneous();
@@ -167,6 +167,50 @@ void leave_periodic(const Rig& rig, const LabelledPieces& pieces,
   }
 }
 
+/// Pieces side by side vouch for each other, also for the lines of another projector. So where no
+/// chain of neighbours leads to a piece that others cross, what neighbours said does not count.
+void leave_unanchored(const LabelledPieces& pieces, std::span<const NextPiece> next_pieces,
+                      std::vector<Decision>& decisions) {
+  constexpr float kPerNeighbor = 3;  // what one adds to the margin, about
+  const auto label_of = [&](int p) -> const PieceLabel* {
+    const auto k = static_cast<std::size_t>(p);
+    return decisions[k].label < 0 ? nullptr
+                                  : &pieces.labels[k][static_cast<std::size_t>(decisions[k].label)];
+  };
+  std::vector<std::vector<int>> linked(decisions.size());
+  std::vector<int> neighbors(decisions.size(), 0);
+  const auto link = [&](int a, int b, int lines_apart) {
+    const PieceLabel* la = label_of(a);
+    const PieceLabel* lb = label_of(b);
+    if (la == nullptr || lb == nullptr || !(la->pattern == lb->pattern) ||
+        std::abs(la->line - lb->line) != lines_apart)
+      return;
+    linked[static_cast<std::size_t>(a)].push_back(b);
+    linked[static_cast<std::size_t>(b)].push_back(a);
+    neighbors[static_cast<std::size_t>(a)] += lines_apart;
+    neighbors[static_cast<std::size_t>(b)] += lines_apart;
+  };
+  for (const NextPiece& next : next_pieces) link(next.a, next.b, 1);
+  for (const auto& [a, b] : pieces.graph.continuations) link(a, b, 0);
+  std::vector<char> is_anchored = crossed_pieces(pieces.graph);
+  std::vector<int> open;
+  for (std::size_t p = 0; p < is_anchored.size(); ++p) {
+    if (is_anchored[p] != 0) open.push_back(static_cast<int>(p));
+  }
+  while (!open.empty()) {
+    const int p = open.back();
+    open.pop_back();
+    for (const int q : linked[static_cast<std::size_t>(p)]) {
+      if (is_anchored[static_cast<std::size_t>(q)] != 0) continue;
+      is_anchored[static_cast<std::size_t>(q)] = 1;
+      open.push_back(q);
+    }
+  }
+  for (std::size_t p = 0; p < decisions.size(); ++p) {
+    if (is_anchored[p] == 0) decisions[p].margin -= kPerNeighbor * static_cast<float>(neighbors[p]);
+  }
+}
+
 /// Share of points that are right at this margin: a logistic fit over five rendered scenes (bunny
 /// with and without texture, hand, two balls, cube); benchmarks/accuracy prints the comparison.
 float confidence_of(float margin) { return 1 / (1 + std::exp(0.13F - 0.52F * margin)); }
@@ -212,11 +256,14 @@ Labeling solve_joint(const Rig& rig, const std::vector<ColorFamily>& families,
   const OtherViews others(rig, graphs, pieces);
   std::vector<std::optional<Surroundings>> surroundings(graphs.size());
   std::vector<PairwiseEnergy> energies(graphs.size());
+  std::vector<std::vector<NextPiece>> beside(graphs.size());
   parallel_for(graphs.size(), [&](std::size_t g) {
     surroundings[g].emplace(rig.cameras[static_cast<std::size_t>(graphs[g].camera)], graphs[g],
                             pieces[g]);
     energies[g] = pairwise_energy(pieces[g], options);
-    add_order(rig, graphs[g], pieces[g], energies[g]);
+    beside[g] = next_pieces(rig.cameras[static_cast<std::size_t>(graphs[g].camera)], graphs[g],
+                            pieces[g].graph);
+    add_order(rig, graphs[g], pieces[g], beside[g], energies[g]);
   });
   std::vector<std::vector<Decision>> decisions(graphs.size());
   std::vector<PieceBeliefs> beliefs(graphs.size());
@@ -234,7 +281,11 @@ Labeling solve_joint(const Rig& rig, const std::vector<ColorFamily>& families,
               : enumerate_clusters(energies[g]);
       next[g] = beliefs_of(pieces[g], costs);
       decisions[g] = decisions_of(pieces[g], costs);
-      if (lacks_crossings(pieces[g].graph)) leave_periodic(rig, pieces[g], decisions[g]);
+      if (lacks_crossings(pieces[g].graph)) {
+        leave_periodic(rig, pieces[g], decisions[g]);
+      } else {
+        leave_unanchored(pieces[g], beside[g], decisions[g]);
+      }
     });
     beliefs = std::move(next);
   }

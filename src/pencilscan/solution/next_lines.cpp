@@ -42,7 +42,6 @@ std::vector<NextPiece> next_pieces(const Camera& camera, const GridGraph& graph,
   std::vector<NextPiece> result;
   std::set<std::pair<int, int>> seen;
   const std::vector<char> is_crossed = crossed_pieces(pieces);
-  const bool is_alone = lacks_crossings(pieces);
   for (std::size_t p = 0; p < pieces.pieces.size(); ++p) {
     if (is_crossed[p] != 0) continue;
     const CurvePiece& piece = pieces.pieces[p];
@@ -66,7 +65,6 @@ std::vector<NextPiece> next_pieces(const Camera& camera, const GridGraph& graph,
         found = &place;
       });
       if (found == nullptr) continue;
-      if (!is_alone && is_crossed[static_cast<std::size_t>(found->piece)] == 0) continue;
       const int a = static_cast<int>(p);
       if (!seen.insert(std::minmax(a, found->piece)).second) continue;
       result.push_back({a, found->piece, at, tangent, side});

@@ -20,8 +20,7 @@ struct NextPiece {
 [[nodiscard]] bool lacks_crossings(const PieceGraph& graph);
 
 /// The next piece on both sides of each that nothing crosses, up to 48 px away, in its own
-/// direction. Where there are crossings, only next pieces that cross others count: several lines
-/// that nothing crosses would only vouch for each other, also for lines of another projector.
+/// direction.
 [[nodiscard]] std::vector<NextPiece> next_pieces(const Camera& camera, const GridGraph& graph,
                                                  const PieceGraph& pieces);
 
