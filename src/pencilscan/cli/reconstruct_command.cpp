@@ -14,6 +14,7 @@ struct ReconstructOptions {
   CommonOptions common;
   std::string rig;
   std::string frames;
+  std::string plain_frames;
   std::string out;
   std::string method = "joint";
   std::string cost = "normalized";
@@ -48,6 +49,7 @@ void reconstruct(const ReconstructOptions& options) {
   // The paper's two methods keep their own, continuous planes: their surface rests on the curves.
   sequence.shape.depth.enabled =
       !options.no_depth && sequence.points.solution.method == Method::kJoint;
+  sequence.plain_frames = options.plain_frames;
   sequence.refine_rig = options.refine_rig;
   sequence.meshes = !options.no_mesh;
   sequence.pictures = !options.no_pictures;
@@ -60,6 +62,7 @@ void reconstruct(const ReconstructOptions& options) {
                          " depth-maps=" + (options.depth_maps ? "yes" : "no") +
                          " refine-rig=" + (options.refine_rig ? "yes" : "no");
   if (options.no_mesh) sequence.description += " mesh=no";
+  if (!options.plain_frames.empty()) sequence.description += " plain=yes";
   for (const std::string& format : options.mesh_formats) sequence.description += " " + format;
   const auto [outcomes, refinement] =
       reconstruct_sequence(options.rig, options.frames, options.out, sequence, stderr_progress());
@@ -104,6 +107,10 @@ void add_reconstruct_command(CLI::App& app) {
   command->add_option("--frames", options->frames, "folder that holds the frame folders")
       ->required();
   command->add_option("--out", options->out, "output folder, one folder per frame")->required();
+  command->add_option(
+      "--plain-frames", options->plain_frames,
+      "folder of frame folders of the same names (or of one) with images of the same "
+      "moments in plain light: the colour is theirs");
   command
       ->add_option("--method", options->method,
                    "how lines are told apart: joint, the paper's two, or the grid of one projector "

@@ -54,7 +54,21 @@ double plane_error_px(const CrossingDisagreement& crossings) {
   return kDeviationPerMedian * std::sqrt(std::max(0.0, devices2) / 2);
 }
 
-/// Images as vertex_colors() wants them; overexposed pixels are NaN.
+/// `linear` with NaN where the image as read is overexposed.
+cv::Mat without_overexposed(const cv::Mat& linear, const cv::Mat& raw) {
+  constexpr float kFull = 0.998F;
+  cv::Mat image = linear.clone();
+  for (int v = 0; v < image.rows; ++v) {
+    for (int u = 0; u < image.cols; ++u) {
+      const auto& value = raw.at<cv::Vec3f>(v, u);
+      if (std::max({value[0], value[1], value[2]}) >= kFull)
+        image.at<cv::Vec3f>(v, u) = cv::Vec3f::all(std::nanf(""));
+    }
+  }
+  return image;
+}
+
+/// Images as vertex_colors() wants them.
 std::vector<ColorView> color_views(const Rig& rig, const Frame& frame, const PointResult& points,
                                    const DepthReport& depth) {
   std::vector<ColorView> views;
@@ -62,21 +76,22 @@ std::vector<ColorView> color_views(const Rig& rig, const Frame& frame, const Poi
     if (frame.images[c].empty()) continue;
     ColorView view;
     view.camera = static_cast<int>(c);
+    view.is_plain = rig.cameras[c].sees_texture_only;
     view.image = linearized(frame.images[c], rig.cameras[c].gamma);
-    if (!rig.cameras[c].sees_texture_only)
-      view.image = unmixed(view.image, points.detections[c].unmixing);
-    view.image = view.image.clone();
-    constexpr float kFull = 0.998F;
-    for (int v = 0; v < view.image.rows; ++v) {
-      for (int u = 0; u < view.image.cols; ++u) {
-        const auto& raw = frame.images[c].at<cv::Vec3f>(v, u);
-        if (std::max({raw[0], raw[1], raw[2]}) >= kFull)
-          view.image.at<cv::Vec3f>(v, u) = cv::Vec3f::all(std::nanf(""));
-      }
-    }
+    if (!view.is_plain) view.image = unmixed(view.image, points.detections[c].unmixing);
+    view.image = without_overexposed(view.image, frame.images[c]);
     for (const CameraDepthReport& of_camera : depth.cameras) {
       if (of_camera.camera == view.camera) view.blur_px = of_camera.blur_px;
     }
+    views.push_back(std::move(view));
+  }
+  for (std::size_t c = 0; c < frame.plain.size(); ++c) {
+    if (frame.plain[c].empty()) continue;
+    ColorView view;
+    view.camera = static_cast<int>(c);
+    view.is_plain = true;
+    view.image =
+        without_overexposed(linearized(frame.plain[c], rig.cameras[c].gamma), frame.plain[c]);
     views.push_back(std::move(view));
   }
   return views;
@@ -181,7 +196,7 @@ ShapeResult measure_shape(const Rig& rig, const Frame& frame, const PointResult&
     std::vector<Silhouette> silhouettes;
     for (const ColorView& view : views) {
       const Camera& camera = rig.cameras[static_cast<std::size_t>(view.camera)];
-      if (camera.sees_texture_only) continue;
+      if (view.is_plain) continue;
       silhouettes.push_back(silhouette(view.camera, view.image, line_reach_px(rig, camera)));
     }
     result.surface =

@@ -22,6 +22,8 @@ namespace pencilscan {
 struct Frame {
   std::string name;
   std::vector<cv::Mat> images;  ///< one per camera of the rig, CV_32FC3 RGB as read; empty: missing
+  /// The same moment in plain light, for colour: as `images`, or nothing at all.
+  std::vector<cv::Mat> plain;
 };
 
 struct PointOptions {

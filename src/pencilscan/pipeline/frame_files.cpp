@@ -15,6 +15,19 @@ std::string camera_names(const Rig& rig) {
   return names;
 }
 
+/// The image of a camera; empty where there is no file.
+cv::Mat read_camera_image(const Camera& camera, const std::optional<std::filesystem::path>& file) {
+  if (!file) return {};
+  cv::Mat image = read_image(*file);
+  if (image.cols != camera.width || image.rows != camera.height) {
+    throw InputError(
+        file->string(), "image size", std::to_string(image.cols) + "x" + std::to_string(image.rows),
+        "must be " + std::to_string(camera.width) + "x" + std::to_string(camera.height) +
+            " as camera " + camera.name + " of the rig");
+  }
+  return image;
+}
+
 }  // namespace
 
 std::vector<FrameFiles> find_frames(const Rig& rig, const std::filesystem::path& folder) {
@@ -23,7 +36,7 @@ std::vector<FrameFiles> find_frames(const Rig& rig, const std::filesystem::path&
   }
   std::vector<FrameFiles> frames;
   for (const auto& entry : std::filesystem::directory_iterator(folder)) {
-    if (entry.is_directory()) frames.push_back({entry.path().filename().string(), {}});
+    if (entry.is_directory()) frames.push_back({entry.path().filename().string(), {}, {}});
   }
   if (frames.empty()) {
     throw InputError(folder.string(), "frame folders", "none",
@@ -45,23 +58,27 @@ std::vector<FrameFiles> find_frames(const Rig& rig, const std::filesystem::path&
   return frames;
 }
 
+void add_plain_frames(const Rig& rig, const std::filesystem::path& folder,
+                      std::vector<FrameFiles>& frames) {
+  const std::vector<FrameFiles> plain = find_frames(rig, folder);
+  for (FrameFiles& frame : frames) {
+    const auto own = std::find_if(plain.begin(), plain.end(),
+                                  [&](const FrameFiles& p) { return p.name == frame.name; });
+    if (own == plain.end() && plain.size() > 1) {
+      throw InputError(folder.string(), "frame folders", std::to_string(plain.size()),
+                       "must hold one named " + frame.name + ", or one in all");
+    }
+    frame.plain = (own == plain.end() ? plain.front() : *own).images;
+  }
+}
+
 Frame read_frame(const Rig& rig, const FrameFiles& files) {
   Frame frame;
   frame.name = files.name;
-  for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
-    frame.images.emplace_back();
-    if (!files.images[c]) continue;
-    const Camera& camera = rig.cameras[c];
-    frame.images.back() = read_image(*files.images[c]);
-    const cv::Size size = frame.images.back().size();
-    if (size.width != camera.width || size.height != camera.height) {
-      throw InputError(files.images[c]->string(), "image size",
-                       std::to_string(size.width) + "x" + std::to_string(size.height),
-                       "must be " + std::to_string(camera.width) + "x" +
-                           std::to_string(camera.height) + " as camera " + camera.name +
-                           " of the rig");
-    }
-  }
+  for (std::size_t c = 0; c < files.images.size(); ++c)
+    frame.images.push_back(read_camera_image(rig.cameras[c], files.images[c]));
+  for (std::size_t c = 0; c < files.plain.size(); ++c)
+    frame.plain.push_back(read_camera_image(rig.cameras[c], files.plain[c]));
   return frame;
 }
 
@@ -75,8 +92,9 @@ std::uint64_t hash_bytes(const std::string& bytes, std::uint64_t hash) {
 
 std::uint64_t frame_hash(const FrameFiles& files) {
   std::uint64_t hash = hash_bytes(files.name);
-  for (const auto& image : files.images) {
-    hash = image ? hash_bytes(read_file(*image), hash) : hash_bytes("missing", hash);
+  for (const auto* images : {&files.images, &files.plain}) {
+    for (const auto& image : *images)
+      hash = image ? hash_bytes(read_file(*image), hash) : hash_bytes("missing", hash);
   }
   return hash;
 }

@@ -256,6 +256,28 @@ TEST_F(PipelineTest, RefinedRigIsWrittenUsedAndResumed) {
   EXPECT_EQ(read_file(out / "rig.json"), rigs[0]);
 }
 
+TEST_F(PipelineTest, PlainImagesGiveTheColor) {
+  const fs::path plain = *folder_ / "plain";
+  for (const Camera& camera : rig_->cameras) {
+    write_image(plain / "still" / (camera.name + ".png"),
+                cv::Mat(camera.height, camera.width, CV_32FC3, cv::Scalar(0.6, 0.15, 0.3)));
+  }
+  SequenceOptions options = quick();
+  options.plain_frames = plain;
+  ASSERT_TRUE(run(*folder_ / "frames", *folder_ / "out_plain", options).front().done);
+  const TriangleMesh mesh = read_mesh(*folder_ / "out_plain" / "000000" / "mesh_measured.ply");
+  ASSERT_FALSE(mesh.color.empty());
+  std::size_t right = 0;
+  for (const auto& color : mesh.color)
+    right += std::abs(color[0] / color[1] - 4) < 0.2 && std::abs(color[2] / color[1] - 2) < 0.1;
+  EXPECT_GT(right, mesh.color.size() * 95 / 100);
+  // One of a wrong size is refused before anything is written.
+  write_image(plain / "still" / (rig_->cameras[0].name + ".png"), cv::Mat(9, 9, CV_32FC3));
+  EXPECT_THROW(static_cast<void>(run(*folder_ / "frames", *folder_ / "out_none", options)),
+               InputError);
+  EXPECT_FALSE(fs::exists(*folder_ / "out_none"));
+}
+
 TEST_F(PipelineTest, RigOfOneProjectorIsNotRefinedAndStaysAsItIs) {
   Rig rig = *rig_;
   rig.projectors.pop_back();

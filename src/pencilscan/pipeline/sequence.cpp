@@ -209,7 +209,8 @@ SequenceOutcome reconstruct_sequence(const fs::path& rig_path, const fs::path& f
                                      const fs::path& out, const SequenceOptions& options,
                                      const Progress& progress) {
   Rig rig = read_rig(rig_path);
-  const std::vector<FrameFiles> frames = find_frames(rig, frames_path);
+  std::vector<FrameFiles> frames = find_frames(rig, frames_path);
+  if (!options.plain_frames.empty()) add_plain_frames(rig, options.plain_frames, frames);
   if (options.refine_rig && is_output_rig(rig_path, out)) {
     throw InputError("--rig", "", rig_path.string(),
                      "must not be the rig.json in --out, where the refined rig is written");

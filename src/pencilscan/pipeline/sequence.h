@@ -14,8 +14,9 @@ namespace pencilscan {
 struct SequenceOptions {
   PointOptions points;
   ShapeOptions shape;
-  bool refine_rig = false;  ///< correct the poses of the devices from the frames first
-  bool meshes = true;       ///< false: points.ply and curves.ply alone, much faster
+  std::filesystem::path plain_frames;  ///< the same moments without patterns, for colour; or empty
+  bool refine_rig = false;             ///< correct the poses of the devices from the frames first
+  bool meshes = true;                  ///< false: points.ply and curves.ply alone, much faster
   bool pictures = true;
   bool depth_maps = false;                ///< depth/ and sigma/ of every camera
   std::vector<std::string> mesh_formats;  ///< of obj, stl, glb: the closed mesh once more

@@ -532,6 +532,7 @@ std::vector<ColorView> ball_images(const Rig& rig, const std::function<Vec3(cons
     view.camera = static_cast<int>(c);
     view.image = cv::Mat(camera.height, camera.width, CV_32FC3, cv::Scalar::all(0));
     view.blur_px = 0.3;
+    view.is_plain = camera.sees_texture_only;
     for (int v = 0; v < camera.height; ++v) {
       for (int u = 0; u < camera.width; ++u) {
         const auto x = hit_ball(camera.ray(Vec2(u, v)));

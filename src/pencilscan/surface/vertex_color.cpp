@@ -61,7 +61,7 @@ class Light {
     for (const ColorView& view : views) {
       patterns_.emplace_back();
       const Camera& camera = rig.cameras[static_cast<std::size_t>(view.camera)];
-      if (camera.sees_texture_only) continue;
+      if (view.is_plain) continue;
       for (std::size_t p = 0; p < rig.projectors.size(); ++p) {
         for (std::size_t k = 0; k < rig.projectors[p].patterns.size(); ++k)
           patterns_.back().emplace_back(rig, camera, static_cast<int>(p), static_cast<int>(k));
@@ -121,7 +121,7 @@ class Light {
 
 std::vector<Sample> collect(const Rig& rig, const TriangleMesh& mesh,
                             std::span<const ColorView> views, const ColorOptions& options,
-                            bool texture_cameras) {
+                            bool has_plain) {
   const Light light(rig, mesh, views, options);
   const std::vector<Vec3> normals = vertex_normals(mesh);
   std::vector<Sample> samples(mesh.vertices.size() * views.size());
@@ -132,7 +132,7 @@ std::vector<Sample> collect(const Rig& rig, const TriangleMesh& mesh,
     irradiance.clear();
     for (std::size_t k = 0; k < views.size(); ++k) {
       const Camera& camera = rig.cameras[static_cast<std::size_t>(views[k].camera)];
-      if (camera.sees_texture_only != texture_cameras) continue;
+      if (views[k].is_plain != has_plain) continue;
       const auto pixel = camera.project(x);
       if (!pixel || !camera.contains(*pixel) || !light.sees(camera.center(), x, normals[v]))
         continue;
@@ -140,7 +140,7 @@ std::vector<Sample> collect(const Rig& rig, const TriangleMesh& mesh,
       sample.image = bilinear(views[k].image, *pixel);
       if (!sample.image.isFinite().all()) continue;
       sample.weight = static_cast<float>((camera.center() - x).normalized().dot(normals[v]));
-      if (texture_cameras) {
+      if (has_plain) {
         sample.light = Channels::Ones();
       } else {
         if (irradiance.empty()) light.irradiance(x, normals[v], irradiance);
@@ -276,16 +276,15 @@ std::vector<std::array<float, 3>> vertex_colors(const Rig& rig, const TriangleMe
                                                 std::span<const ColorView> views,
                                                 const ColorOptions& options) {
   if (mesh.faces.empty() || views.empty()) return {};
-  const bool texture_cameras = std::any_of(views.begin(), views.end(), [&](const ColorView& view) {
-    return rig.cameras[static_cast<std::size_t>(view.camera)].sees_texture_only;
-  });
-  const std::vector<Sample> samples = collect(rig, mesh, views, options, texture_cameras);
+  const bool has_plain =
+      std::any_of(views.begin(), views.end(), [](const ColorView& view) { return view.is_plain; });
+  const std::vector<Sample> samples = collect(rig, mesh, views, options, has_plain);
   std::vector<Channels> ambient(views.size(), Channels::Zero());
   std::vector<Evidence> sums = evidence(samples, views.size(), ambient);
   const Neighbors neighbors(mesh);
   const auto smoothing = static_cast<float>(options.smoothing);
   std::vector<Channels> rho = solve(neighbors, sums, smoothing, options.rounds / 2);
-  if (!texture_cameras) {
+  if (!has_plain) {
     ambient = ambient_light(samples, views.size(), rho);
     sums = evidence(samples, views.size(), ambient);
     rho = solve(neighbors, sums, smoothing, options.rounds);

@@ -20,10 +20,11 @@ struct ColorOptions {
 /// One camera's image as colour needs it.
 struct ColorView {
   int camera = 0;
-  /// CV_32FC3, linear: projector RGB of a camera that sees patterns, camera RGB of one that sees
-  /// texture only; NaN where overexposed.
+  /// CV_32FC3, linear: projector RGB of an image with patterns, camera RGB of a plain one; NaN
+  /// where overexposed.
   cv::Mat image;
-  double blur_px = 0.8;  ///< of camera and projector together
+  double blur_px = 0.8;   ///< of camera and projector together
+  bool is_plain = false;  ///< no patterns in the image: taken without them, or by a texture camera
 };
 
 /// Albedo per vertex (linear red, green, blue in [0, 1], up to one common factor, which no frame
@@ -32,8 +33,8 @@ struct ColorView {
 /// P_p: the pattern's colour at the vertex with its lines as blurred as in the image, a_c: ambient
 /// light of camera c, estimated where no line falls. Least squares per vertex and channel; what is
 /// in the dark of a channel, or invented, is filled from its neighbours (the weighted Laplace
-/// equation on the mesh). Where the rig has cameras with the role "texture", they alone count,
-/// their light taken as even. Empty when no camera gives a colour. All projectors are taken as
+/// equation on the mesh). Where there are plain views, they alone count, their light taken as even.
+/// Empty when no camera gives a colour. All projectors are taken as
 /// equally bright at the centre of the volume.
 [[nodiscard]] std::vector<std::array<float, 3>> vertex_colors(const Rig& rig,
                                                               const TriangleMesh& mesh,
