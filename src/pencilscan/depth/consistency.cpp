@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
 
 #include "pencilscan/core/chunks.h"
 #include "pencilscan/core/median.h"
+#include "pencilscan/depth/pruning.h"
 
 namespace pencilscan {
 namespace {
@@ -248,31 +248,6 @@ void scale_sigma(double factor, std::span<DepthMap> maps) {
   }
 }
 
-/// Measured nodes next to node i of one map that continue its surface.
-template <typename Visit>
-void for_each_neighbor(const DepthMap& map, std::size_t i, int reach, Visit&& visit) {
-  const int row = static_cast<int>(i) / map.columns;
-  const int column = static_cast<int>(i) % map.columns;
-  const DepthNode& n = map.nodes[i];
-  for (int dr = -reach; dr <= reach; ++dr) {
-    for (int dc = -reach; dc <= reach; ++dc) {
-      const int r = row + dr;
-      const int c = column + dc;
-      if ((dr == 0 && dc == 0) || r < 0 || c < 0 || r >= map.rows || c >= map.columns) continue;
-      const std::size_t j = map.index(r, c);
-      const DepthNode& m = map.nodes[j];
-      if (!m.measured()) continue;
-      const float dx = static_cast<float>(dc * map.stride);
-      const float dy = static_cast<float>(dr * map.stride);
-      // Both tangent planes predict the middle.
-      const float step =
-          (m.w - 0.5F * (m.wx * dx + m.wy * dy)) - (n.w + 0.5F * (n.wx * dx + n.wy * dy));
-      const float limit = (0.5F + 3 * (n.sigma + m.sigma)) * n.w * n.w;
-      if (std::abs(step) < limit) visit(j);
-    }
-  }
-}
-
 /// What the fit of a window cannot see: on a slanted surface the quadric bends more within it, and
 /// at the rim it leans on one side. Factors from rendered bunny, hand and balls.
 void widen_uncertain(const Rig& rig, std::span<DepthMap> maps) {
@@ -292,107 +267,6 @@ void widen_uncertain(const Rig& rig, std::span<DepthMap> maps) {
     });
     for (std::size_t i = 0; i < factor.size(); ++i) map.nodes[i].sigma *= factor[i];
   }
-}
-
-/// Lines of one projector fit a surface that is off by a whole line as well as the true one. So a
-/// node that shows one projector only, and that no other camera confirms, must continue into its
-/// neighbours, on nearly all sides where no labelled curve passes through it.
-std::size_t drop_lone(const Comparison& comparison, std::span<DepthMap> maps) {
-  constexpr int kLeastNeighbors = 3;
-  constexpr int kLeastNeighborsGrown = 7;
-  constexpr float kMisfit = 2.5F;
-  std::vector<char> drop(comparison.nodes().size(), 0);
-  parallel_chunks(drop.size(), [&](std::size_t i) {
-    const Node& node = comparison.nodes()[i];
-    const DepthNode& n = maps[node.map].nodes[node.index];
-    if (!n.measured() || std::popcount(n.lit) > 1 || n.support > 0.01F) return;
-    int neighbors = 0;
-    for_each_neighbor(maps[node.map], node.index, 1, [&](std::size_t) { ++neighbors; });
-    const int least = n.seeded ? kLeastNeighbors : kLeastNeighborsGrown;
-    drop[i] = neighbors < least || n.misfit > kMisfit ? 1 : 0;
-  });
-  std::size_t dropped = 0;
-  for (std::size_t i = 0; i < drop.size(); ++i) {
-    if (drop[i] == 0) continue;
-    DepthNode& n = maps[comparison.nodes()[i].map].nodes[comparison.nodes()[i].index];
-    n.w = 0;
-    n.reason = HoleReason::kOneProjector;
-    ++dropped;
-  }
-  return dropped;
-}
-
-/// Removes `nodes` of a map: other views, or their own lines, do not bear them out.
-std::size_t drop_nodes(std::span<const std::size_t> nodes, HoleReason reason, DepthMap& map) {
-  for (const std::size_t k : nodes) {
-    map.nodes[k].w = 0;
-    map.nodes[k].reason = reason;
-  }
-  return nodes.size();
-}
-
-/// Patches of one projector's lines that no other camera confirms: growth that slipped by a line
-/// looks the same there. They stay where labelled curves hold them and nothing speaks against them.
-std::size_t drop_unconfirmed_patches(DepthMap& map) {
-  constexpr double kLeastSeeded = 0.02;      // share of the nodes
-  constexpr double kLeastConfidence = 0.75;  // mean
-  const auto is_weak = [&](std::size_t i) {
-    const DepthNode& n = map.nodes[i];
-    return n.measured() && std::popcount(n.lit) <= 1 && n.support <= 0.01F;
-  };
-  std::size_t dropped = 0;
-  std::vector<char> seen(map.nodes.size(), 0);
-  std::vector<std::size_t> patch;
-  for (std::size_t i = 0; i < map.nodes.size(); ++i) {
-    if (seen[i] || !is_weak(i)) continue;
-    patch.assign(1, i);
-    seen[i] = 1;
-    double seeds = 0;
-    double confidence = 0;
-    for (std::size_t k = 0; k < patch.size(); ++k) {
-      seeds += map.nodes[patch[k]].seeded ? 1 : 0;
-      confidence += static_cast<double>(map.nodes[patch[k]].confidence);
-      for_each_neighbor(map, patch[k], 1, [&](std::size_t j) {
-        if (!seen[j] && is_weak(j)) {
-          patch.push_back(j);
-          seen[j] = 1;
-        }
-      });
-    }
-    const auto size = static_cast<double>(patch.size());
-    if (seeds >= kLeastSeeded * size && confidence >= kLeastConfidence * size) continue;
-    dropped += drop_nodes(patch, HoleReason::kOneProjector, map);
-  }
-  return dropped;
-}
-
-std::size_t drop_islands(const ConsistencyOptions& options, std::span<const char> supported,
-                         const Comparison& comparison, std::size_t map_index, DepthMap& map) {
-  std::size_t dropped = 0;
-  std::vector<char> seen(map.nodes.size(), 0);
-  std::vector<std::size_t> component;
-  for (std::size_t i = 0; i < map.nodes.size(); ++i) {
-    if (seen[i] || !map.nodes[i].measured()) continue;
-    component.assign(1, i);
-    seen[i] = 1;
-    std::size_t supports = 0;
-    std::size_t seeds = 0;
-    for (std::size_t k = 0; k < component.size(); ++k) {
-      const std::int32_t id = comparison.id(map_index, component[k]);
-      supports += supported[static_cast<std::size_t>(id)] ? 1 : 0;
-      seeds += map.nodes[component[k]].seeded ? 1 : 0;
-      for_each_neighbor(map, component[k], 1, [&](std::size_t j) {
-        if (!seen[j]) component.push_back(j);
-        seen[j] = 1;
-      });
-    }
-    // Growth keeps to one surface: an island without a labelled curve was reached by a slip.
-    const bool slipped = seeds == 0 && supports == 0;
-    const bool large = component.size() >= static_cast<std::size_t>(options.min_component);
-    if (!slipped && (large || 2 * supports >= component.size())) continue;
-    dropped += drop_nodes(component, HoleReason::kContradicted, map);
-  }
-  return dropped;
 }
 
 }  // namespace
@@ -443,11 +317,9 @@ ConsistencyReport check_consistency(const Rig& rig, std::span<const int> pattern
       belief[i] = (1 + s / n) / (1 + s / n + weight * c / n);
     });
   }
-  std::vector<char> supported(count);
   for (std::size_t i = 0; i < count; ++i) {
     const Node& node = comparison.nodes()[i];
     DepthNode& n = maps[node.map].nodes[node.index];
-    supported[i] = support[i] > 0.5F;
     n.confidence = belief[i];
     n.support = support[i];
     if (belief[i] >= static_cast<float>(options.min_confidence)) continue;
@@ -457,10 +329,11 @@ ConsistencyReport check_consistency(const Rig& rig, std::span<const int> pattern
   }
   report.sigma_scale = sigma_scale(links);
   scale_sigma(kUnseenErrors * std::clamp(report.sigma_scale, 1 / kUnseenErrors, 4.0), maps);
-  report.unconfirmed = drop_lone(comparison, maps);
-  for (DepthMap& map : maps) report.unconfirmed += drop_unconfirmed_patches(map);
-  for (std::size_t m = 0; m < maps.size(); ++m)
-    report.islands += drop_islands(options, supported, comparison, m, maps[m]);
+  for (DepthMap& map : maps) {
+    report.unconfirmed += drop_lone_nodes(map);
+    report.unconfirmed += drop_unconfirmed_patches(map);
+    report.islands += drop_islands(options.min_component, map);
+  }
   return report;
 }
 

@@ -308,58 +308,56 @@ TEST(Consistency, FloatingPatchIsRemovedAndUnconfirmedDepthStays) {
   EXPECT_LT(check_consistency(scene.rig, projectors, alone).contradicted, 5u);
 }
 
-TEST(Consistency, IslandsThatOnlyGrewAreRemoved) {
+/// How many nodes around the middle of the ball one camera alone keeps after change(node,
+/// is_around) of every measured one, and of how many.
+template <class Change>
+std::pair<std::size_t, std::size_t> kept_of_patch(Change change) {
   const BallScene& scene = ball_scene();
-  // One camera alone, so that nobody contradicts: a patch 6 mm behind the rest is a surface of its
-  // own. It may stay where a labelled curve started it, and not where growth slipped there.
+  std::vector<DepthMap> maps = {scene.measure().maps[0]};
+  std::vector<std::size_t> patch;
+  for (std::size_t i = 0; i < maps[0].nodes.size(); ++i) {
+    DepthNode& node = maps[0].nodes[i];
+    if (!node.measured()) continue;
+    const bool is_around = (maps[0].pixel(i) - Vec2(125, 100)).norm() <= 20;
+    change(node, is_around);
+    if (is_around) patch.push_back(i);
+  }
+  const std::vector<int> projectors = {0, 1};
+  static_cast<void>(check_consistency(scene.rig, projectors, maps));
+  std::size_t left = 0;
+  for (const std::size_t i : patch) left += maps[0].nodes[i].measured() ? 1 : 0;
+  return {left, patch.size()};
+}
+
+/// With one camera nobody contradicts: a patch may stay where a labelled curve started it, and not
+/// where growth slipped there.
+template <class Change>
+void expect_only_a_seeded_patch_stays(Change change) {
   for (const bool seeded : {true, false}) {
-    std::vector<DepthMap> maps = {scene.measure().maps[0]};
-    std::vector<std::size_t> patch;
-    for (std::size_t i = 0; i < maps[0].nodes.size(); ++i) {
-      DepthNode& node = maps[0].nodes[i];
-      if (!node.measured() || (maps[0].pixel(i) - Vec2(125, 100)).norm() > 20) continue;
-      node.w = static_cast<float>(1 / (1 / static_cast<double>(node.w) + 6));
-      node.seeded = seeded;
-      patch.push_back(i);
-    }
-    const std::vector<int> projectors = {0, 1};
-    static_cast<void>(check_consistency(scene.rig, projectors, maps));
-    std::size_t left = 0;
-    for (const std::size_t i : patch) left += maps[0].nodes[i].measured() ? 1 : 0;
+    const auto [left, size] = kept_of_patch([&](DepthNode& node, bool is_around) {
+      change(node, is_around);
+      if (is_around) node.seeded = seeded;
+    });
+    ASSERT_GT(size, 30u);
     if (seeded) {
-      EXPECT_GT(left, patch.size() * 9 / 10);
+      EXPECT_GT(left, size * 9 / 10);
     } else {
       EXPECT_EQ(left, 0U);
     }
   }
 }
 
+TEST(Consistency, IslandsThatOnlyGrewAreRemoved) {
+  // 6 mm behind the rest: a surface of its own.
+  expect_only_a_seeded_patch_stays([](DepthNode& node, bool is_around) {
+    if (is_around) node.w = static_cast<float>(1 / (1 / static_cast<double>(node.w) + 6));
+  });
+}
+
 TEST(Consistency, PatchesOfOneProjectorNeedACurveOrAnotherView) {
-  const BallScene& scene = ball_scene();
-  // One camera alone; a patch that continues the rest, but shows the lines of one projector only.
-  for (const bool seeded : {true, false}) {
-    std::vector<DepthMap> maps = {scene.measure().maps[0]};
-    std::vector<std::size_t> patch;
-    for (std::size_t i = 0; i < maps[0].nodes.size(); ++i) {
-      DepthNode& node = maps[0].nodes[i];
-      if (!node.measured()) continue;
-      const bool inside = (maps[0].pixel(i) - Vec2(125, 100)).norm() <= 20;
-      node.lit = inside ? 1 : 3;
-      if (!inside) continue;
-      node.seeded = seeded;
-      patch.push_back(i);
-    }
-    ASSERT_GT(patch.size(), 30u);
-    const std::vector<int> projectors = {0, 1};
-    static_cast<void>(check_consistency(scene.rig, projectors, maps));
-    std::size_t left = 0;
-    for (const std::size_t i : patch) left += maps[0].nodes[i].measured() ? 1 : 0;
-    if (seeded) {
-      EXPECT_GT(left, patch.size() * 9 / 10);
-    } else {
-      EXPECT_EQ(left, 0U);
-    }
-  }
+  // It continues the rest, but shows the lines of one projector only.
+  expect_only_a_seeded_patch_stays(
+      [](DepthNode& node, bool is_around) { node.lit = is_around ? 1 : 3; });
 }
 
 }  // namespace
