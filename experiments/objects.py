@@ -31,16 +31,11 @@ def balls():
     return shapes.joined([shapes.ball((60, -30, -20), 45), shapes.ball((-40, 20, 20), 75)])
 
 
-def bunny():
-    vertices, triangles = shapes.read_obj(common.BUNNY)
-    return vertices[:, [0, 2, 1]] * [1, -1, 1], triangles
-
-
 # name: what it stands for, its maker, options of simulate, is it intricate or thin
 OBJECTS = {
-    "bunny": ("plain", bunny, [], False),
-    "texture": ("bunny, albedo 0.4 to 0.8", bunny, ["--texture", "noise", "--contrast", 0.5], False),
-    "specular": ("bunny, shiny", bunny, ["--specular", 0.3, "--roughness", 0.05], False),
+    "bunny": ("plain", shapes.bunny, [], False),
+    "texture": ("bunny, albedo 0.4 to 0.8", shapes.bunny, ["--texture", "noise", "--contrast", 0.5], False),
+    "specular": ("bunny, shiny", shapes.bunny, ["--specular", 0.3, "--roughness", 0.05], False),
     "cat": ("statue, open below", model("cat.3ds"), [], False),
     "balls": ("two balls, one before the other", balls, [], False),
     "horse": ("statue with thin legs", model("horse.3ds"), [], True),

@@ -4,6 +4,8 @@ import math
 
 import numpy as np
 
+import common
+
 
 def read_obj(path):
     """Vertices and triangles of an OBJ."""
@@ -16,6 +18,12 @@ def read_obj(path):
             corner = [int(w.split("/")[0]) - 1 for w in word[1:]]
             triangles += [(corner[0], a, b) for a, b in zip(corner[1:], corner[2:])]
     return np.array(vertices), np.array(triangles)
+
+
+def bunny():
+    """The Stanford bunny upright."""
+    vertices, triangles = read_obj(common.BUNNY)
+    return vertices[:, [0, 2, 1]] * [1, -1, 1], triangles
 
 
 def cube(edge, turn_deg=45):

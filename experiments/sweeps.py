@@ -38,8 +38,7 @@ SWEEPS = {
 
 def bunny(radius):
     """The bunny upright, its farthest vertex `radius` mm from the middle of its box."""
-    vertices, triangles = shapes.read_obj(common.BUNNY)
-    vertices = vertices[:, [0, 2, 1]] * [1, -1, 1]
+    vertices, triangles = shapes.bunny()
     vertices -= (vertices.min(0) + vertices.max(0)) / 2
     return vertices * radius / np.linalg.norm(vertices, axis=1).max(), triangles
 
