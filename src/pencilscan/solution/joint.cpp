@@ -81,9 +81,9 @@ PairwiseEnergy pairwise_energy(const LabelledPieces& pieces, const JointOptions&
 
 /// Where nothing crosses: pieces side by side are lines side by side.
 void add_order(const Rig& rig, const GridGraph& graph, const LabelledPieces& pieces,
-               std::span<const NextPiece> next_pieces, PairwiseEnergy& energy) {
+               std::span<const NextPiece> beside, PairwiseEnergy& energy) {
   const Camera& camera = rig.cameras[static_cast<std::size_t>(graph.camera)];
-  for (const NextPiece& next : next_pieces) {
+  for (const NextPiece& next : beside) {
     const auto& a = pieces.labels[static_cast<std::size_t>(next.a)];
     const auto& b = pieces.labels[static_cast<std::size_t>(next.b)];
     const Vec3 ray = camera.normalized_from_pixel(next.pixel.cast<double>()).homogeneous();
@@ -169,7 +169,7 @@ void leave_periodic(const Rig& rig, const LabelledPieces& pieces,
 
 /// Pieces side by side vouch for each other, also for the lines of another projector. So where no
 /// chain of neighbours leads to a piece that others cross, what neighbours said does not count.
-void leave_unanchored(const LabelledPieces& pieces, std::span<const NextPiece> next_pieces,
+void leave_unanchored(const LabelledPieces& pieces, std::span<const NextPiece> beside,
                       std::vector<Decision>& decisions) {
   constexpr float kPerNeighbor = 3;  // what one adds to the margin, about
   const auto label_of = [&](int p) -> const PieceLabel* {
@@ -190,7 +190,7 @@ void leave_unanchored(const LabelledPieces& pieces, std::span<const NextPiece> n
     neighbors[static_cast<std::size_t>(a)] += lines_apart;
     neighbors[static_cast<std::size_t>(b)] += lines_apart;
   };
-  for (const NextPiece& next : next_pieces) link(next.a, next.b, 1);
+  for (const NextPiece& next : beside) link(next.a, next.b, 1);
   for (const auto& [a, b] : pieces.graph.continuations) link(a, b, 0);
   std::vector<char> is_anchored = crossed_pieces(pieces.graph);
   std::vector<int> open;

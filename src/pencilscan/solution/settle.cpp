@@ -29,8 +29,8 @@ Opinion opinion_of(const SurfacePatch& patch, const Camera& camera, const Eigen:
 /// knows what the quadratic cannot follow, curve ends at depth steps or errors that neighbours
 /// share. So the error grows more slowly than the propagated one (`propagated`), but also with the
 /// disagreement of the points around, where they lie to one side, with the patch's bend and where
-/// point and patch are `deviations` of their own apart. Exponents and scale by maximum likelihood
-/// from the errors of eight rendered objects (experiments/objects.py).
+/// point and patch are `deviations` of their own apart. Exponents and scale fitted to the errors of
+/// rendered objects, most of them those of experiments/objects.py.
 double settled_sigma(double propagated, double deviations, const Camera& camera, double footprint,
                      const SurfacePatch& patch) {
   constexpr double kScale = 0.43;
