@@ -32,18 +32,17 @@ std::vector<Vec3> points_in(const Sphere& volume) {
 
 void compare(const Rig& truth, const Rig& found) {
   BundleProblem problem;
-  for (std::size_t d = 0; d < device_total(found); ++d) {
-    problem.devices.push_back(bundle_device(calibrated_device(found, d)));
+  for (std::size_t d = 0; d < device_count(found); ++d) {
+    problem.devices.push_back(bundle_device(device_at(found, d)));
     problem.devices.back().present = true;
   }
   std::vector<Vec3> points;
   std::vector<Vec3> measured;
   for (const Vec3& x : points_in(working_volume(truth))) {
     Track track;
-    for (std::size_t d = 0; d < device_total(truth); ++d) {
-      const auto pixel = calibrated_device(truth, d).project(x);
-      if (pixel && calibrated_device(truth, d).contains(*pixel))
-        track.views.push_back({d, *pixel, 1});
+    for (std::size_t d = 0; d < device_count(truth); ++d) {
+      const auto pixel = device_at(truth, d).project(x);
+      if (pixel && device_at(truth, d).contains(*pixel)) track.views.push_back({d, *pixel, 1});
     }
     const auto y = triangulate(problem, track, 0.01);
     if (!y) continue;
@@ -61,17 +60,16 @@ void compare(const Rig& truth, const Rig& found) {
   std::vector<double> errors;
   for (Eigen::Index i = 0; i < n; ++i) {
     const Vec3 moved = (S * a.col(i).homogeneous()).head<3>();
-    for (std::size_t d = 0; d < device_total(truth); ++d) {
-      const auto p = calibrated_device(truth, d).project(a.col(i));
-      const auto q = calibrated_device(found, d).project(moved);
-      if (p && q && calibrated_device(truth, d).contains(*p)) errors.push_back((*p - *q).norm());
+    for (std::size_t d = 0; d < device_count(truth); ++d) {
+      const auto p = device_at(truth, d).project(a.col(i));
+      const auto q = device_at(found, d).project(moved);
+      if (p && q && device_at(truth, d).contains(*p)) errors.push_back((*p - *q).norm());
     }
   }
   std::sort(errors.begin(), errors.end());
   double focal = 0;
-  for (std::size_t d = 0; d < device_total(truth); ++d) {
-    const double error =
-        calibrated_device(found, d).K(0, 0) / calibrated_device(truth, d).K(0, 0) - 1;
+  for (std::size_t d = 0; d < device_count(truth); ++d) {
+    const double error = device_at(found, d).K(0, 0) / device_at(truth, d).K(0, 0) - 1;
     focal = std::max(focal, std::abs(error));
   }
   std::printf("points                %zu\n", points.size());

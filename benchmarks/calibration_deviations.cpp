@@ -67,9 +67,9 @@ Eigen::MatrixXd gauge_of(const std::vector<BundleDevice>& devices, double distan
 /// The rig with lenses as unlike the usual as set_priors() expects.
 Rig with_drawn_lenses(Rig rig, std::uint64_t seed) {
   Random random(seed);
-  for (std::size_t d = 0; d < device_total(rig); ++d) {
+  for (std::size_t d = 0; d < device_count(rig); ++d) {
     const bool is_camera = d < rig.cameras.size();
-    Device& device = calibrated_device(rig, d);
+    Device& device = device_at(rig, d);
     const double width = device.width;
     device.K(0, 2) = (width - 1) / 2 + random.normal(0, (is_camera ? 0.02 : 0.04) * width);
     if (is_camera) device.K(1, 2) = (device.height - 1) / 2.0 + random.normal(0, 0.02 * width);
@@ -145,8 +145,8 @@ int main(int argc, char** argv) {
 
   const Rig ring = sample::ring(cameras, cameras);
   BundleProblem exact;
-  for (std::size_t d = 0; d < device_total(ring); ++d) {
-    exact.devices.push_back(bundle_device(calibrated_device(ring, d)));
+  for (std::size_t d = 0; d < device_count(ring); ++d) {
+    exact.devices.push_back(bundle_device(device_at(ring, d)));
     exact.devices.back().present = true;
   }
   constexpr double kDistance = 1100;
@@ -156,12 +156,11 @@ int main(int argc, char** argv) {
     sample::TrackScene noisy = scene;
     noisy.noise_seed = 100 + i;
     const Rig truth = one_lens ? ring : with_drawn_lenses(ring, 1000 + i);
-    for (std::size_t d = 0; d < device_total(truth); ++d)
-      all[i].truth.push_back(bundle_device(calibrated_device(truth, d)));
+    for (std::size_t d = 0; d < device_count(truth); ++d)
+      all[i].truth.push_back(bundle_device(device_at(truth, d)));
     CalibrationInput input = sample::input_of(truth, sample::tracks_of(truth, noisy), known);
-    for (std::size_t d = 0; d < device_total(truth); ++d) {  // a start: what is judged is the end
-      calibrated_device(input.rig, d).device_from_world =
-          calibrated_device(truth, d).device_from_world;
+    for (std::size_t d = 0; d < device_count(truth); ++d) {  // a start: what is judged is the end
+      device_at(input.rig, d).device_from_world = device_at(truth, d).device_from_world;
       input.known[d].pose = true;
     }
     input.distance.reset();

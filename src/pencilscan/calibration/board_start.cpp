@@ -207,7 +207,7 @@ void place_from_plane(const CalibrationInput& input, const std::vector<Sighting>
   Mat3 of_most;
   for (const auto& [b, points] : plane_points(problem, sightings, d)) {
     if (points.pixels.size() < kFewest) continue;
-    const double tolerance = 0.005 * calibrated_device(input.rig, d).width;  // lenses bend
+    const double tolerance = 0.005 * device_at(input.rig, d).width;  // lenses bend
     const cv::Mat found = cv::findHomography(points.on_board, points.pixels, cv::RANSAC, tolerance);
     if (found.empty()) continue;
     Mat3 H;
@@ -221,7 +221,7 @@ void place_from_plane(const CalibrationInput& input, const std::vector<Sighting>
   if (most == 0) return;
   BundleDevice& device = problem.devices[d];
   if (!is_known) {
-    choose_inner(homographies, calibrated_device(input.rig, d).height, device);
+    choose_inner(homographies, device_at(input.rig, d).height, device);
     device.prior_sigma[kFx] *= device.inner[kFx] / device.prior[kFx];
     device.prior[kFx] = device.inner[kFx];
   }
@@ -253,7 +253,7 @@ std::vector<char> focal_lengths_from_boards(const CalibrationInput& input, Rig& 
       points.push_back(seen.first);
       pixels.push_back(seen.second);
     }
-    Device& device = calibrated_device(rig, camera);
+    Device& device = device_at(rig, camera);
     const double width = device.width;
     cv::Mat K = (cv::Mat_<double>(3, 3) << 1.5 * width, 0, (width - 1) / 2, 0, 1.5 * width,
                  (device.height - 1) / 2.0, 0, 0, 1);

@@ -192,9 +192,9 @@ class OnBoard : public testing::Test {
 
   CalibrationResult calibrated() {
     input_.rig = truth_;
-    input_.known.assign(device_total(truth_), {});
+    input_.known.assign(device_count(truth_), {});
     for (std::size_t d = 0; d < input_.known.size(); ++d) {
-      Device& device = calibrated_device(input_.rig, d);
+      Device& device = device_at(input_.rig, d);
       device.K = Mat3::Identity();
       device.device_from_world = {};
     }

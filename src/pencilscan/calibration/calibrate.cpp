@@ -115,10 +115,9 @@ class Calibration {
     const bool posed = std::all_of(input_.known.begin(), input_.known.end(),
                                    [](const GivenCalibration& k) { return k.pose; });
     std::vector<BundleDevice> devices;
-    for (std::size_t d = 0; d < device_total(rig); ++d) {
-      devices.push_back(bundle_device(calibrated_device(rig, d)));
-      set_priors(input_.known[d], d < rig.cameras.size(), calibrated_device(rig, d),
-                 devices.back());
+    for (std::size_t d = 0; d < device_count(rig); ++d) {
+      devices.push_back(bundle_device(device_at(rig, d)));
+      set_priors(input_.known[d], d < rig.cameras.size(), device_at(rig, d), devices.back());
       devices.back().present = posed;
     }
     return devices;
@@ -236,7 +235,7 @@ class Calibration {
     for (std::size_t d = 0; d < agrees.size(); ++d) {
       const BundleDevice& found = result_.problem.devices[d];
       if (!input_.known[d].K) continue;
-      const Mat3& K = calibrated_device(input_.rig, d).K;
+      const Mat3& K = device_at(input_.rig, d).K;
       const auto is_near = [&](Intrinsic i, double given) {
         const double slack = std::max(kDeviations * sigma.devices[d].inner[i],
                                       options_.given_focal_tolerance * given);
@@ -257,7 +256,7 @@ class Calibration {
     // A guess that the data contradict says nothing any more.
     for (std::size_t d = 0; d < agrees.size(); ++d)
       if (input_.known[d].K && agrees[d] == 0)
-        set_priors({}, d < cameras, calibrated_device(input_.rig, d), result_.problem.devices[d]);
+        set_priors({}, d < cameras, device_at(input_.rig, d), result_.problem.devices[d]);
     const double free_scale = error_scale(result_.problem);
     for (const int attempt : {0, 1, 2}) {  // all given ones, the cameras' alone, the projectors'
       BundleProblem trial = result_.problem;
@@ -266,7 +265,7 @@ class Calibration {
         const bool in_group = attempt == 0 || (attempt == 1) == (d < cameras);
         if (!input_.known[d].K || !in_group) continue;
         held[d] = 1;
-        const Device& given = calibrated_device(input_.rig, d);
+        const Device& given = device_at(input_.rig, d);
         BundleDevice exact = bundle_device(given);
         for (std::size_t i = 0; i < kIntrinsics; ++i)
           if (i < kK1 || input_.known[d].distortion) trial.devices[d].inner[i] = exact.inner[i];
@@ -310,16 +309,15 @@ class Calibration {
   CalibrationResult finish(bool solved) {
     result_.solved = solved;
     result_.rig = input_.rig;
-    result_.placed.assign(device_total(input_.rig), 0);
-    result_.residuals.resize(device_total(input_.rig));
-    result_.inner_held.resize(device_total(input_.rig), 0);
+    result_.placed.assign(device_count(input_.rig), 0);
+    result_.residuals.resize(device_count(input_.rig));
+    result_.inner_held.resize(device_count(input_.rig), 0);
     if (!solved) return std::move(result_);
     rescale_to_boards(result_.problem);
     result_.rig.unit_known = fix_frame(input_, result_.problem);
     for (std::size_t d = 0; d < result_.placed.size(); ++d) {
       result_.placed[d] = result_.problem.devices[d].present ? 1 : 0;
-      if (result_.placed[d] != 0)
-        set_device(result_.problem.devices[d], calibrated_device(result_.rig, d));
+      if (result_.placed[d] != 0) set_device(result_.problem.devices[d], device_at(result_.rig, d));
     }
     measure();
     return std::move(result_);

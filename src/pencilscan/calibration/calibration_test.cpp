@@ -23,8 +23,8 @@ using namespace sample;
 double projection_error(const Rig& truth, const Rig& found) {
   constexpr Eigen::Index kPoints = 100;
   BundleProblem problem;
-  for (std::size_t d = 0; d < device_total(found); ++d) {
-    problem.devices.push_back(bundle_device(calibrated_device(found, d)));
+  for (std::size_t d = 0; d < device_count(found); ++d) {
+    problem.devices.push_back(bundle_device(device_at(found, d)));
     problem.devices.back().present = true;
   }
   Random random(1);
@@ -33,17 +33,17 @@ double projection_error(const Rig& truth, const Rig& found) {
   for (Eigen::Index i = 0; i < kPoints; ++i) {
     a.col(i) << random.uniform(-90, 90), random.uniform(-90, 90), random.uniform(-90, 90);
     Track track;
-    for (std::size_t d = 0; d < device_total(truth); ++d)
-      track.views.push_back({d, *calibrated_device(truth, d).project(a.col(i)), 1});
+    for (std::size_t d = 0; d < device_count(truth); ++d)
+      track.views.push_back({d, *device_at(truth, d).project(a.col(i)), 1});
     b.col(i) = triangulate(problem, track, 0.01).value_or(Vec3::Constant(1e6));
   }
   const Eigen::Matrix4d S = fit_similarity(a, b, true);
   std::vector<double> errors;
   for (Eigen::Index i = 0; i < kPoints; ++i) {
     const Vec3 moved = (S * a.col(i).homogeneous()).head<3>();
-    for (std::size_t d = 0; d < device_total(truth); ++d) {
-      const auto p = calibrated_device(truth, d).project(a.col(i));
-      const auto q = calibrated_device(found, d).project(moved);
+    for (std::size_t d = 0; d < device_count(truth); ++d) {
+      const auto p = device_at(truth, d).project(a.col(i));
+      const auto q = device_at(found, d).project(moved);
       if (p && q) errors.push_back((*p - *q).norm());
     }
   }
@@ -101,11 +101,11 @@ TEST(Calibrate, RingIsFoundFromImageSizesDespiteOutliers) {
       calibrate(input_of(truth, tracks_of(truth, {.count = 1000, .outliers = 0.3}), false), kQuick);
   ASSERT_TRUE(result.solved);
   EXPECT_LT(result.rms_px, 0.15);
-  for (std::size_t d = 0; d < device_total(truth); ++d) {
+  for (std::size_t d = 0; d < device_count(truth); ++d) {
     ASSERT_NE(result.placed[d], 0) << d;
-    const double focal = calibrated_device(truth, d).K(0, 0);
+    const double focal = device_at(truth, d).K(0, 0);
     // A third of a ring with 900 points: weaker than what is asked of whole rings.
-    EXPECT_NEAR(calibrated_device(result.rig, d).K(0, 0) / focal, 1, 0.02) << d;
+    EXPECT_NEAR(device_at(result.rig, d).K(0, 0) / focal, 1, 0.02) << d;
   }
   EXPECT_TRUE(result.rig.unit_known);
   EXPECT_LT(projection_error(truth, result.rig), 1.0);
@@ -141,17 +141,16 @@ TEST(Calibrate, FourPoorGuessesEndInTheSamePlace) {
   std::vector<Rig> found;
   for (const double factor : {0.7, 0.85, 1.25, 1.5}) {
     CalibrationInput input = input_of(truth, tracks_of(truth, {.count = 1500}), false);
-    for (std::size_t d = 0; d < device_total(truth); ++d) {
-      const Device& device = calibrated_device(truth, d);
+    for (std::size_t d = 0; d < device_count(truth); ++d) {
+      const Device& device = device_at(truth, d);
       const double focal = factor * device.K(0, 0) * (1 + 0.02 * static_cast<double>(d % 3));
-      calibrated_device(input.rig, d).K << focal, 0, device.width / 2, 0, focal, device.height / 2,
-          0, 0, 1;
+      device_at(input.rig, d).K << focal, 0, device.width / 2, 0, focal, device.height / 2, 0, 0, 1;
       input.known[d].K = true;
     }
     const auto result = calibrate(input, kQuick);
     ASSERT_TRUE(result.solved) << factor;
     EXPECT_LT(result.rms_px, 0.1) << factor;
-    for (std::size_t d = 0; d < device_total(truth); ++d) EXPECT_NE(result.placed[d], 0) << factor;
+    for (std::size_t d = 0; d < device_count(truth); ++d) EXPECT_NE(result.placed[d], 0) << factor;
     found.push_back(result.rig);
   }
   for (std::size_t i = 1; i < found.size(); ++i)
@@ -202,7 +201,7 @@ TEST(Verdict, SwappedFoldersAreNamed) {
   const auto result = calibrate(input, kQuick);
   ASSERT_TRUE(result.solved);
   Uncertainty sigma;
-  sigma.devices.resize(device_total(truth));
+  sigma.devices.resize(device_count(truth));
   const Verdict verdict = judge(input, result, sigma, {});
   std::string all;
   for (const Finding& finding : verdict.findings) all += finding.what + "\n";
@@ -215,8 +214,7 @@ TEST(Uncertainty, CoversTheErrorsOfTheResult) {
   const Uncertainty sigma =
       uncertainty(result.problem, result.free_inner, 2, result.extra_sigma_px);
   for (std::size_t d = 3; d < 6; ++d) {
-    const double error =
-        calibrated_device(result.rig, d).K(0, 0) - calibrated_device(truth, d).K(0, 0);
+    const double error = device_at(result.rig, d).K(0, 0) - device_at(truth, d).K(0, 0);
     EXPECT_GT(sigma.devices[d].inner[kFx], 0);
     EXPECT_LT(std::abs(error), 4 * sigma.devices[d].inner[kFx]);
   }
@@ -229,8 +227,8 @@ CalibrationResult exact_ring(const std::vector<Track>& tracks, const Rig& truth)
   CalibrationResult result;
   result.solved = true;
   result.rig = truth;
-  for (std::size_t d = 0; d < device_total(truth); ++d) {
-    result.problem.devices.push_back(bundle_device(calibrated_device(truth, d)));
+  for (std::size_t d = 0; d < device_count(truth); ++d) {
+    result.problem.devices.push_back(bundle_device(device_at(truth, d)));
     result.problem.devices.back().present = true;
   }
   result.problem.tracks = tracks;
@@ -283,7 +281,7 @@ TEST(CalibrationReport, IsOnePageAndValidJson) {
   EXPECT_EQ(json["verdict"], to_string(verdict.grade));
   // Places for the 3-D picture: a point is where a device saw it.
   EXPECT_GT(json["points"].size(), 100U);
-  const RigidTransform& pose = calibrated_device(result.rig, 1).device_from_world;
+  const RigidTransform& pose = device_at(result.rig, 1).device_from_world;
   const auto& device = json["devices"][1];
   for (int row = 0; row < 3; ++row) {
     const auto axis = device["R"][static_cast<std::size_t>(row)].get<std::vector<double>>();

@@ -164,8 +164,7 @@ std::optional<Finding> judge_loop(const CalibrationResult& result, const LoopClo
       Grade::kDoubtful,
       "the ring does not close: once round it, each step by the correspondences of its "
       "own two devices, points come back " +
-          std::string(gap.data()) + " off in " +
-          calibrated_device(result.rig, loop.devices.front()).name,
+          std::string(gap.data()) + " off in " + device_at(result.rig, loop.devices.front()).name,
       "look at the errors of the single devices, and add captures that neighbours share"};
 }
 

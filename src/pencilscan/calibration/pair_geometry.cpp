@@ -19,8 +19,8 @@ double epipolar_distance(const Rig& rig, const PairGeometry& pair, const PairMat
   const Vec3 line_p = pair.fundamental * match.in_camera.homogeneous();
   const Vec3 line_c = pair.fundamental.transpose() * match.in_projector.homogeneous();
   const double error = std::abs(match.in_projector.homogeneous().dot(line_p));
-  return std::max(error / line_p.head<2>().norm() / calibrated_device(rig, pair.projector).width,
-                  error / line_c.head<2>().norm() / calibrated_device(rig, pair.camera).width);
+  return std::max(error / line_p.head<2>().norm() / device_at(rig, pair.projector).width,
+                  error / line_c.head<2>().norm() / device_at(rig, pair.camera).width);
 }
 
 double planar_share(const std::vector<cv::Point2d>& a, const std::vector<cv::Point2d>& b,
@@ -36,8 +36,8 @@ void solve_pair(const Rig& rig, const std::vector<PairMatch>& matches, PairGeome
                 const PairGeometryOptions& options) {
   pair.matches = matches.size();
   if (matches.size() < options.least_matches) return;
-  const double width_c = calibrated_device(rig, pair.camera).width;
-  const double width_p = calibrated_device(rig, pair.projector).width;
+  const double width_c = device_at(rig, pair.camera).width;
+  const double width_p = device_at(rig, pair.projector).width;
   // Widths alike, so that one tolerance holds on both sides.
   std::vector<cv::Point2d> a;
   std::vector<cv::Point2d> b;
@@ -127,9 +127,9 @@ void drop_epipolar_outliers(const Rig& rig, std::span<const PairGeometry> pairs,
 
 Rig rig_with_guess(const Rig& rig, const FocalGuess& guess, const std::vector<char>& known) {
   Rig result = rig;
-  for (std::size_t d = 0; d < device_total(rig); ++d) {
+  for (std::size_t d = 0; d < device_count(rig); ++d) {
     if (known[d] != 0) continue;
-    Device& device = calibrated_device(result, d);
+    Device& device = device_at(result, d);
     const bool is_camera = d < rig.cameras.size();
     const double focal = (is_camera ? guess.camera_scale : guess.projector_scale) * device.width;
     device.K = camera_matrix(
@@ -176,8 +176,8 @@ std::vector<FocalGuess> guess_focal_lengths(const Rig& rig, std::span<const Pair
     double weights = 0;
     for (const PairGeometry& pair : pairs) {
       if (pair.inliers < 50) continue;
-      const Mat3 E = calibrated_device(guessed, pair.projector).K.transpose() * pair.fundamental *
-                     calibrated_device(guessed, pair.camera).K;
+      const Mat3 E = device_at(guessed, pair.projector).K.transpose() * pair.fundamental *
+                     device_at(guessed, pair.camera).K;
       sum += std::min(inequality(E), 0.5);
       weights += 1;
     }

@@ -100,7 +100,7 @@ bool fix_frame(const CalibrationInput& input, BundleProblem& problem) {
   for (std::size_t d = 0; d < problem.devices.size(); ++d) {
     if (!problem.devices[d].present || !input.known[d].pose) continue;
     from.push_back(center_of(problem.devices[d]));
-    to.push_back(calibrated_device(input.rig, d).center());
+    to.push_back(device_at(input.rig, d).center());
   }
   bool scaled = !problem.board_views.empty();
   double scale = 1;

@@ -5,16 +5,11 @@
 
 #include "pencilscan/calibration/board_corners.h"
 #include "pencilscan/calibration/structure.h"
+#include "pencilscan/geometry/cross_matrix.h"
 #include "pencilscan/geometry/least_squares.h"
 
 namespace pencilscan {
 namespace {
-
-Mat3 cross_matrix(const Vec3& v) {
-  Mat3 m;
-  m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
-  return m;
-}
 
 /// How a corner moves, in the board's frame, by one standard deviation of each error of its shape.
 /// Printed boards are stretched by a part in a thousand along one side (paper, rollers) and

@@ -82,7 +82,7 @@ std::string verdict_part(const CalibrationReport& report) {
 /// Mean residual per part of the image as arrows, single errors as dots.
 std::string residual_plot(const CalibrationReport& report, std::size_t d,
                           const std::vector<TrendCell>& cells) {
-  const Device& device = calibrated_device(report.result.rig, d);
+  const Device& device = device_at(report.result.rig, d);
   constexpr double kWidth = 240;
   constexpr double kArrow = 200;  // plot px per image px
   const double scale = kWidth / device.width;
@@ -138,7 +138,7 @@ std::string overlap_plot(const CalibrationReport& report) {
     svg += "<circle cx='" + at(p.x()) + "' cy='" + at(p.y()) + "' r='6' fill='" +
            std::string(is_camera ? "#205080" : "#d08020") + "'/><text x='" + at(p.x() + 8) +
            "' y='" + at(p.y() + 4) + "' font-size='12'>" +
-           escaped(calibrated_device(report.input.rig, d).name) + "</text>";
+           escaped(device_at(report.input.rig, d).name) + "</text>";
   }
   return svg + "</svg>";
 }
@@ -150,8 +150,8 @@ std::string loop_part(const CalibrationReport& report) {
            "is no way round to come back on.</p>";
   std::string names;
   for (const std::size_t d : loop.devices)
-    names += escaped(calibrated_device(report.input.rig, d).name) + ", ";
-  const std::string& first = calibrated_device(report.input.rig, loop.devices.front()).name;
+    names += escaped(device_at(report.input.rig, d).name) + ", ";
+  const std::string& first = device_at(report.input.rig, loop.devices.front()).name;
   return "<p>Once round the ring (" + names + "and back to " + escaped(first) +
          "), each step by the correspondences of its own two devices alone: points of the volume "
          "come back " +
@@ -168,7 +168,7 @@ std::string parameters_part(const CalibrationReport& report) {
   for (const char* name : kIntrinsicNames) html += head(name);
   html += head("rotation sd, deg") + head("position sd x, y, z") + "</tr>";
   for (std::size_t d = 0; d < report.result.placed.size(); ++d) {
-    html += "<tr>" + cell(escaped(calibrated_device(report.input.rig, d).name));
+    html += "<tr>" + cell(escaped(device_at(report.input.rig, d).name));
     if (report.result.placed[d] == 0) {
       html += "<td colspan='11'>not placed</td></tr>";
       continue;
@@ -196,8 +196,8 @@ std::string pairs_part(const CalibrationReport& report) {
                      head("fit one geometry") + head("fit one plane") + "</tr>";
   for (const PairGeometry& pair : report.result.pairs) {
     html += "<tr>" +
-            cell(escaped(calibrated_device(report.input.rig, pair.projector).name + "/" +
-                         calibrated_device(report.input.rig, pair.camera).name)) +
+            cell(escaped(device_at(report.input.rig, pair.projector).name + "/" +
+                         device_at(report.input.rig, pair.camera).name)) +
             cell(std::to_string(pair.matches)) + cell(number(100 * pair.inlier_share()) + " %") +
             cell(number(100 * pair.planar_share) + " %") + "</tr>";
   }

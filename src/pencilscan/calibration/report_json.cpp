@@ -49,9 +49,9 @@ Json points_json(const BundleProblem& problem) {
 Json device_json(const CalibrationReport& report, std::size_t d) {
   const CalibrationResult& result = report.result;
   Json json;
-  json["name"] = calibrated_device(report.input.rig, d).name;
-  json["width"] = calibrated_device(report.input.rig, d).width;
-  json["height"] = calibrated_device(report.input.rig, d).height;
+  json["name"] = device_at(report.input.rig, d).name;
+  json["width"] = device_at(report.input.rig, d).width;
+  json["height"] = device_at(report.input.rig, d).height;
   json["placed"] = result.placed[d] != 0;
   if (result.placed[d] == 0) return json;
   const BundleDevice& device = result.problem.devices[d];
@@ -67,7 +67,7 @@ Json device_json(const CalibrationReport& report, std::size_t d) {
     if (u.is_prior[i]) parameter["held_at_prior"] = true;
     json["parameters"][kIntrinsicNames[i]] = parameter;
   }
-  const RigidTransform& pose = calibrated_device(result.rig, d).device_from_world;
+  const RigidTransform& pose = device_at(result.rig, d).device_from_world;
   for (int row = 0; row < 3; ++row) json["R"].push_back(list(pose.rotation.row(row).transpose()));
   json["t"] = list(pose.translation);
   json["rotation_sigma_deg"] = u.rotation_rad * 180 / std::numbers::pi;
@@ -79,8 +79,8 @@ Json device_json(const CalibrationReport& report, std::size_t d) {
 Json pairs_json(const CalibrationReport& report) {
   Json pairs = Json::array();
   for (const PairGeometry& pair : report.result.pairs) {
-    pairs.push_back({{"projector", calibrated_device(report.input.rig, pair.projector).name},
-                     {"camera", calibrated_device(report.input.rig, pair.camera).name},
+    pairs.push_back({{"projector", device_at(report.input.rig, pair.projector).name},
+                     {"camera", device_at(report.input.rig, pair.camera).name},
                      {"correspondences", pair.matches},
                      {"inlier_share", pair.inlier_share()},
                      {"planar_share", pair.planar_share}});
@@ -109,7 +109,7 @@ Json loop_json(const CalibrationReport& report) {
   Json json{{"closed_ring", !loop.devices.empty()}};
   if (loop.devices.empty()) return json;
   for (const std::size_t d : loop.devices)
-    json["devices"].push_back(calibrated_device(report.input.rig, d).name);
+    json["devices"].push_back(device_at(report.input.rig, d).name);
   json["rotation_deg"] = loop.rotation_rad * 180 / std::numbers::pi;
   json["scale"] = loop.scale;
   json["gap"] = loop.gap;

@@ -64,8 +64,8 @@ inline std::vector<Track> tracks_of(const Rig& rig, const TrackScene& scene) {
     Vec3 point = scene.radius * std::cbrt(random.uniform()) * normal;
     if (scene.planar) point = Vec3(0, random.uniform(-150, 150), random.uniform(-150, 150));
     std::vector<TrackView> views;
-    for (std::size_t d = 0; d < device_total(rig); ++d) {
-      const Device& device = calibrated_device(rig, d);
+    for (std::size_t d = 0; d < device_count(rig); ++d) {
+      const Device& device = device_at(rig, d);
       const Vec3 to_device = (device.center() - point).normalized();
       if (to_device.dot(scene.planar ? Vec3(Vec3::UnitX()) : normal) < 0.3) continue;
       const auto pixel = device.project(point);
@@ -94,9 +94,9 @@ inline std::vector<Track> tracks_of(const Rig& rig, const TrackScene& scene) {
 inline CalibrationInput input_of(const Rig& truth, std::vector<Track> tracks, bool cameras_known) {
   CalibrationInput input;
   input.rig = truth;
-  input.known.resize(device_total(truth));
+  input.known.resize(device_count(truth));
   for (std::size_t d = 0; d < input.known.size(); ++d) {
-    Device& device = calibrated_device(input.rig, d);
+    Device& device = device_at(input.rig, d);
     const bool known = cameras_known && d < truth.cameras.size();
     input.known[d].K = input.known[d].distortion = known;
     device.device_from_world = {};
@@ -105,8 +105,8 @@ inline CalibrationInput input_of(const Rig& truth, std::vector<Track> tracks, bo
     device.distortion = {};
   }
   input.tracks = std::move(tracks);
-  input.distance = KnownDistance{
-      0, 1, (truth.cameras[0].center() - calibrated_device(truth, 1).center()).norm()};
+  input.distance =
+      KnownDistance{0, 1, (truth.cameras[0].center() - device_at(truth, 1).center()).norm()};
   return input;
 }
 

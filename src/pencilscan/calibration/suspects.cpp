@@ -54,7 +54,7 @@ class PairFit {
 };
 
 std::string folder(const Rig& rig, const DevicePair& pair) {
-  return calibrated_device(rig, pair.second).name + "/" + calibrated_device(rig, pair.first).name;
+  return device_at(rig, pair.second).name + "/" + device_at(rig, pair.first).name;
 }
 
 std::vector<Finding> find_swaps(const CalibrationInput& input, const Matches& matches,
@@ -100,13 +100,13 @@ Finding name_mover(const CalibrationInput& input, const std::set<DevicePair>& ba
   for (const DevicePair& pair : bad) {
     if (pair.first != mover->first && pair.second != mover->first) continue;
     const std::size_t partner = pair.first == mover->first ? pair.second : pair.first;
-    partners.push_back(calibrated_device(input.rig, partner).name);
+    partners.push_back(device_at(input.rig, partner).name);
     const auto found = captures.find(pair);
     if (found != captures.end()) when.insert(found->second.begin(), found->second.end());
   }
   const bool is_camera = mover->first < input.rig.cameras.size();
   std::string text = std::string(is_camera ? "camera " : "projector ") +
-                     calibrated_device(input.rig, mover->first).name + " has moved: its images " +
+                     device_at(input.rig, mover->first).name + " has moved: its images " +
                      (is_camera ? "of " : "in ") + join(partners) +
                      " do not fit the rest of the rig";
   if (!when.empty()) {

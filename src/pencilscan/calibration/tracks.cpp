@@ -23,8 +23,8 @@ bool inside(const Vec2& pixel, const Vec2& size) {
 TrackBuilder::TrackBuilder(const Rig& rig, const GrayTrackOptions& options)
     : options_(options), cameras_(rig.cameras.size()) {
   PENCILSCAN_CHECK(options.spacing_px >= 8);
-  for (std::size_t d = 0; d < device_total(rig); ++d) {
-    const Device& device = calibrated_device(rig, d);
+  for (std::size_t d = 0; d < device_count(rig); ++d) {
+    const Device& device = device_at(rig, d);
     columns_.push_back(device.width / options.spacing_px + 1);
     size_.emplace_back(device.width, device.height);
   }

@@ -6,7 +6,7 @@
 
 #include "pencilscan/calibration/gray_decode.h"
 #include "pencilscan/geometry/types.h"
-#include "pencilscan/rig/rig.h"
+#include "pencilscan/rig/device_list.h"
 
 namespace pencilscan {
 
@@ -31,18 +31,6 @@ struct Track {
   for (const TrackView& view : track.views)
     if (view.device == device) return &view;
   return nullptr;
-}
-
-[[nodiscard]] inline std::size_t device_total(const Rig& rig) {
-  return rig.cameras.size() + rig.projectors.size();
-}
-[[nodiscard]] inline const Device& calibrated_device(const Rig& rig, std::size_t device) {
-  if (device < rig.cameras.size()) return rig.cameras[device];
-  return rig.projectors[device - rig.cameras.size()];
-}
-[[nodiscard]] inline Device& calibrated_device(Rig& rig, std::size_t device) {
-  if (device < rig.cameras.size()) return rig.cameras[device];
-  return rig.projectors[device - rig.cameras.size()];
 }
 
 struct GrayTrackOptions {

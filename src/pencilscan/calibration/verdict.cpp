@@ -48,7 +48,7 @@ class Judge {
     findings_.push_back({grade, what, advice});
   }
   [[nodiscard]] const std::string& name(std::size_t d) const {
-    return calibrated_device(input_.rig, d).name;
+    return device_at(input_.rig, d).name;
   }
 
   void judge_scene() {
@@ -149,7 +149,7 @@ class Judge {
       for (const std::size_t i : {kFx, kCx, kCy})
         if (u.is_prior[i]) at_prior.push_back(name(d) + " " + kIntrinsicNames[i]);
       judge_lens(d);
-      const Device& placed = calibrated_device(result_.rig, d);
+      const Device& placed = device_at(result_.rig, d);
       const double scale = device.inner[kFx] / placed.width;
       if (scale < 0.3 || scale > 10)
         add(Grade::kUnusable,
@@ -249,7 +249,7 @@ std::vector<std::vector<TrendCell>> residual_trends(const CalibrationResult& res
     return std::clamp(static_cast<int>((x + 0.5) * kCells / size), 0, kCells - 1);
   };
   for_each_residual(result.problem, [&](std::size_t, const TrackView& view, const Vec2& error) {
-    const Device& device = calibrated_device(result.rig, view.device);
+    const Device& device = device_at(result.rig, view.device);
     TrendCell& at = trends[view.device][static_cast<std::size_t>(
         kCells * cell_of(view.pixel.y(), device.height) + cell_of(view.pixel.x(), device.width))];
     ++at.views;

@@ -8,6 +8,7 @@
 #include "pencilscan/calibration/gray_decode.h"
 #include "pencilscan/calibration/tracks.h"
 #include "pencilscan/cli/command.h"
+#include "pencilscan/cli/device_arguments.h"
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/core/stopwatch.h"
@@ -29,27 +30,16 @@ struct CalibrateCommand {
   bool overwrite = false;
 };
 
-std::size_t device_by_name(const Rig& rig, const std::string& name) {
-  for (std::size_t d = 0; d < device_total(rig); ++d)
-    if (calibrated_device(rig, d).name == name) return d;
-  throw InputError("command line", "--known-distance", name, "must be the name of a device");
-}
-
 std::optional<KnownDistance> known_distance(const CalibrateCommand& command, const Rig& rig) {
   if (command.known_distance.empty()) return std::nullopt;
   KnownDistance distance;
-  distance.a = device_by_name(rig, command.known_distance[0]);
-  distance.b = device_by_name(rig, command.known_distance[1]);
-  std::size_t used = 0;
-  try {
-    distance.mm = std::stod(command.known_distance[2], &used);
-  } catch (const std::exception&) {
-    used = 0;
-  }
-  if (used != command.known_distance[2].size() || !(distance.mm > 0) ||
-      !std::isfinite(distance.mm) || distance.a == distance.b)
+  distance.a = device_by_name(rig, command.known_distance[0], "--known-distance");
+  distance.b = device_by_name(rig, command.known_distance[1], "--known-distance");
+  const auto mm = positive_number(command.known_distance[2]);
+  if (!mm || distance.a == distance.b)
     throw InputError("command line", "--known-distance", command.known_distance[2],
                      "must be two different devices and a distance > 0 in mm");
+  distance.mm = *mm;
   return distance;
 }
 
@@ -160,7 +150,7 @@ void run_calibrate(const CalibrateCommand& command) {
   const CalibrationResult result = calibrate(input, options, progress);
   progress("judging", 0.9);
   Uncertainty sigma;
-  sigma.devices.resize(device_total(input.rig));
+  sigma.devices.resize(device_count(input.rig));
   if (result.solved) {
     sigma = uncertainty(result.problem, result.free_inner, BundleOptions{}.loss_scale,
                         result.extra_sigma_px, command.common.seed);

@@ -5,13 +5,16 @@
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <sstream>
 
+#include "pencilscan/cli/device_arguments.h"
 #include "pencilscan/core/error.h"
 #include "pencilscan/exchange/colmap_model.h"
 #include "pencilscan/exchange/opencv_file.h"
 #include "pencilscan/io/file.h"
 #include "pencilscan/io/image.h"
 #include "pencilscan/report/rig_picture.h"
+#include "pencilscan/rig/device_list.h"
 #include "pencilscan/rig/devices_file.h"
 
 namespace pencilscan::cli {
@@ -96,32 +99,24 @@ ExchangeOptions exchange_options(const ImportCommand& command) {
 
 void apply_known_distance(const std::vector<std::string>& words, UncalibratedRig& rig) {
   if (words.empty()) return;
-  std::size_t used = 0;
-  double mm = 0;
-  try {
-    mm = std::stod(words[2], &used);
-  } catch (const std::exception&) {
-    used = 0;
-  }
-  if (used != words[2].size() || !std::isfinite(mm) || !(mm > 0))
+  const auto mm = positive_number(words[2]);
+  if (!mm)
     throw InputError("command line", "--known-distance", words[2], "must be a distance > 0 in mm");
-  scale_rig(words[0], words[1], mm, rig);
+  scale_rig(words[0], words[1], *mm, rig);
 }
 
 /// What is still missing, for people.
 std::string missing_values(const UncalibratedRig& rig) {
   std::string text;
-  std::size_t d = 0;
-  const auto look = [&](const Device& device) {
-    const GivenCalibration& given = rig.given[d++];
+  for (std::size_t d = 0; d < device_count(rig.rig); ++d) {
+    const GivenCalibration& given = rig.given[d];
     std::string lacks;
     if (!given.K) lacks += " K";
     if (!given.distortion) lacks += " distortion";
     if (!given.pose) lacks += " R t";
-    if (!lacks.empty()) text += (text.empty() ? "" : "; ") + device.name + " lacks" + lacks;
-  };
-  for (const Camera& camera : rig.rig.cameras) look(camera);
-  for (const Projector& projector : rig.rig.projectors) look(projector);
+    if (!lacks.empty())
+      text += (text.empty() ? "" : "; ") + device_at(rig.rig, d).name + " lacks" + lacks;
+  }
   return text;
 }
 
@@ -194,27 +189,19 @@ struct ExportCommand {
   bool is_xml = false;
 };
 
-const Device& device_named(const Rig& rig, const std::string& name) {
-  for (const Camera& camera : rig.cameras)
-    if (camera.name == name) return camera;
-  for (const Projector& projector : rig.projectors)
-    if (projector.name == name) return projector;
-  throw InputError("command line", "--stereo", name, "must be the name of a device");
-}
-
 void export_opencv(const ExportCommand& command, const Rig& rig) {
   const OpencvSyntax syntax = command.is_xml ? OpencvSyntax::kXml : OpencvSyntax::kYaml;
   const char* ending = command.is_xml ? ".xml" : ".yml";
+  const auto stereo_device = [&](std::size_t i) -> const Device& {
+    return device_at(rig, device_by_name(rig, command.stereo[i], "--stereo"));
+  };
   std::vector<std::pair<std::string, std::string>> files;
   if (command.stereo.empty()) {
-    for (const Camera& camera : rig.cameras)
-      files.emplace_back(camera.name + ending, opencv_text(camera, syntax));
-    for (const Projector& projector : rig.projectors)
-      files.emplace_back(projector.name + ending, opencv_text(projector, syntax));
+    for (std::size_t d = 0; d < device_count(rig); ++d)
+      files.emplace_back(device_at(rig, d).name + ending, opencv_text(device_at(rig, d), syntax));
   } else {
     files.emplace_back(command.stereo[0] + "-" + command.stereo[1] + ending,
-                       opencv_stereo_text(device_named(rig, command.stereo[0]),
-                                          device_named(rig, command.stereo[1]), syntax));
+                       opencv_stereo_text(stereo_device(0), stereo_device(1), syntax));
   }
   for (const auto& [name, text] : files) write_text(fs::path(command.opencv) / name, text);
 }
@@ -232,7 +219,7 @@ void run_export(const ExportCommand& command) {
   }
   print_figures(command.common,
                 {{"folder", command.opencv.empty() ? command.colmap : command.opencv},
-                 {"devices", rig.cameras.size() + rig.projectors.size()}});
+                 {"devices", device_count(rig)}});
 }
 
 void add_export(CLI::App& group) {

@@ -4,6 +4,7 @@
 #include <cstdio>
 
 #include "pencilscan/core/error.h"
+#include "pencilscan/rig/device_list.h"
 
 namespace pencilscan {
 namespace {
@@ -47,16 +48,14 @@ std::vector<ExchangedDevice> merged(std::vector<ExchangedDevice> described) {
 /// Devices of pairs whose pose only the base knows.
 void adopt_poses(const UncalibratedRig& base, double mm_per_unit,
                  std::vector<ExchangedDevice>& devices) {
-  const auto adopt = [&](const Device& from, const GivenCalibration& given) {
+  for (std::size_t d = 0; d < device_count(base.rig); ++d) {
+    const Device& from = device_at(base.rig, d);
     ExchangedDevice* known = find_device(devices, from.name);
-    if (known == nullptr || known->given.pose || !given.pose) return;
+    if (known == nullptr || known->given.pose || !base.given[d].pose) continue;
     known->device.device_from_world = from.device_from_world;
     known->device.device_from_world.translation /= mm_per_unit;
     known->given.pose = true;
-  };
-  std::size_t d = 0;
-  for (const Camera& camera : base.rig.cameras) adopt(camera, base.given[d++]);
-  for (const Projector& projector : base.rig.projectors) adopt(projector, base.given[d++]);
+  }
 }
 
 /// Poses follow from each other along the pairs.
@@ -169,18 +168,17 @@ UncalibratedRig join_rig(ExchangedRig files, const UncalibratedRig& base,
 
 void scale_rig(const std::string& first, const std::string& second, double mm,
                UncalibratedRig& rig) {
-  std::vector<Device*> devices;
-  for (Camera& camera : rig.rig.cameras) devices.push_back(&camera);
-  for (Projector& projector : rig.rig.projectors) devices.push_back(&projector);
   const auto center_of_device = [&](const std::string& name) {
-    for (std::size_t d = 0; d < devices.size(); ++d)
-      if (devices[d]->name == name && rig.given[d].pose) return devices[d]->center();
+    for (std::size_t d = 0; d < device_count(rig.rig); ++d)
+      if (device_at(rig.rig, d).name == name && rig.given[d].pose)
+        return device_at(rig.rig, d).center();
     throw InputError("command line", "--known-distance", name, "must be a device with a pose");
   };
   const double now = (center_of_device(first) - center_of_device(second)).norm();
   if (!(now > 0))
     throw InputError("command line", "--known-distance", second, "must not stand at " + first);
-  for (Device* device : devices) device->device_from_world.translation *= mm / now;
+  for (std::size_t d = 0; d < device_count(rig.rig); ++d)
+    device_at(rig.rig, d).device_from_world.translation *= mm / now;
   if (rig.rig.volume) {
     rig.rig.volume->center *= mm / now;
     rig.rig.volume->radius *= mm / now;

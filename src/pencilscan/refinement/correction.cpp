@@ -4,15 +4,10 @@
 #include <cmath>
 
 #include "pencilscan/core/check.h"
+#include "pencilscan/geometry/cross_matrix.h"
 
 namespace pencilscan {
 namespace {
-
-Mat3 cross_matrix(const Vec3& v) {
-  Mat3 m;
-  m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
-  return m;
-}
 
 Mat3 rotation_of(const Vec3& vector) {
   const double angle = vector.norm();
@@ -21,13 +16,6 @@ Mat3 rotation_of(const Vec3& vector) {
 }
 
 }  // namespace
-
-std::size_t device_count(const Rig& rig) { return rig.cameras.size() + rig.projectors.size(); }
-
-const Device& device_at(const Rig& rig, std::size_t index) {
-  if (index < rig.cameras.size()) return rig.cameras[index];
-  return rig.projectors[index - rig.cameras.size()];
-}
 
 double focal_px(const Device& device) { return 0.5 * (device.K(0, 0) + device.K(1, 1)); }
 

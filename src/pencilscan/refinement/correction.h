@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "pencilscan/rig/rig.h"
+#include "pencilscan/rig/device_list.h"
 
 namespace pencilscan {
 
@@ -14,12 +14,9 @@ struct PoseCorrection {
   Vec3 translation_mm = Vec3::Zero();
 };
 
-/// One per device: the rig's cameras, then its projectors.
+/// One per device (device_list.h).
 using RigCorrection = std::vector<PoseCorrection>;
 
-[[nodiscard]] std::size_t device_count(const Rig& rig);
-/// Device by index in a RigCorrection.
-[[nodiscard]] const Device& device_at(const Rig& rig, std::size_t index);
 [[nodiscard]] double focal_px(const Device& device);
 
 /// The calibrated pose with its correction.
