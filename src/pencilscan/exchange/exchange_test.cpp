@@ -9,6 +9,7 @@
 #include "pencilscan/exchange/colmap_model.h"
 #include "pencilscan/exchange/opencv_file.h"
 #include "pencilscan/io/file.h"
+#include "pencilscan/io/temporary_folder.h"
 #include "pencilscan/rig/devices_file.h"
 #include "pencilscan/rig/sample_devices.h"
 
@@ -21,17 +22,11 @@ using ::testing::HasSubstr;
 class Exchange : public ::testing::Test {
  protected:
   void SetUp() override {
-    folder_ = fs::path(::testing::TempDir()) /
-              (std::string("exchange_") +
-               ::testing::UnitTest::GetInstance()->current_test_info()->name());
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
     rig_ = sample::small_rig(640, 480, 100);
     rig_.cameras[0].distortion = {-0.1, 0.07, 1e-3, -2e-3, 0.02};
     rig_.cameras[1].distortion = {-0.2, 0.03, 0, 0, 0};
     rig_.projectors[1].K(1, 2) = 700.25;  // lens shift beyond the panel
   }
-  void TearDown() override { fs::remove_all(folder_); }
 
   fs::path write(const std::string& name, const std::string& text) {
     std::ofstream(folder_ / name) << text;
@@ -53,7 +48,8 @@ class Exchange : public ::testing::Test {
     return {rig_.cameras[0], rig_.cameras[1], rig_.projectors[0], rig_.projectors[1]};
   }
 
-  fs::path folder_;
+  TemporaryFolder temporary_{::testing::UnitTest::GetInstance()->current_test_info()->name()};
+  fs::path folder_ = temporary_.path();
   Rig rig_;
 };
 

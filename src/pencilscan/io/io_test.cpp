@@ -15,6 +15,7 @@
 #include "pencilscan/io/mesh_file.h"
 #include "pencilscan/io/ply.h"
 #include "pencilscan/io/point_file.h"
+#include "pencilscan/io/temporary_folder.h"
 
 namespace pencilscan {
 namespace {
@@ -24,15 +25,6 @@ namespace fs = std::filesystem;
 /// A folder of its own per test, removed afterwards.
 class Io : public ::testing::Test {
  protected:
-  void SetUp() override {
-    folder_ =
-        fs::path(::testing::TempDir()) /
-        (std::string("io_") + ::testing::UnitTest::GetInstance()->current_test_info()->name());
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-
   fs::path put(const std::string& name, const std::string& bytes) {
     std::ofstream(folder_ / name, std::ios::binary) << bytes;
     return folder_ / name;
@@ -45,7 +37,8 @@ class Io : public ::testing::Test {
         std::distance(fs::directory_iterator(folder_), fs::directory_iterator{}));
   }
 
-  fs::path folder_;
+  TemporaryFolder temporary_{::testing::UnitTest::GetInstance()->current_test_info()->name()};
+  fs::path folder_ = temporary_.path();
 };
 
 /// The one-line error of reading; empty when nothing was thrown.

@@ -9,6 +9,7 @@
 #include "pencilscan/core/error.h"
 #include "pencilscan/io/file.h"
 #include "pencilscan/io/image.h"
+#include "pencilscan/io/temporary_folder.h"
 #include "pencilscan/page/page.h"
 #include "pencilscan/page/sample_result.h"
 #include "pencilscan/page/table_file.h"
@@ -27,15 +28,6 @@ constexpr const char* kDrawing =
 
 class Experiment : public ::testing::Test {
  protected:
-  void SetUp() override {
-    root_ = fs::temp_directory_path() /
-            ("pencilscan_experiment_" + std::to_string(::getpid()) + "_" +
-             ::testing::UnitTest::GetInstance()->current_test_info()->name());
-    fs::remove_all(root_);
-    fs::create_directories(root_);
-  }
-  void TearDown() override { fs::remove_all(root_); }
-
   void write_noise(const fs::path& file, int width, int height) const {
     cv::Mat image(height, width, CV_8UC3);
     cv::theRNG().state = 3;
@@ -51,7 +43,8 @@ class Experiment : public ::testing::Test {
     return what;
   }
 
-  fs::path root_;
+  TemporaryFolder temporary_{::testing::UnitTest::GetInstance()->current_test_info()->name()};
+  fs::path root_ = temporary_.path();
 };
 
 TEST(MarkdownTables, HaveTheParagraphBeforeThemAsTitle) {

@@ -11,6 +11,7 @@
 #include <random>
 
 #include "pencilscan/core/error.h"
+#include "pencilscan/io/temporary_folder.h"
 #include "pencilscan/page/advice.h"
 #include "pencilscan/page/block.h"
 #include "pencilscan/page/geometry_blocks.h"
@@ -28,15 +29,6 @@ using ::testing::Not;
 
 class Folder : public ::testing::Test {
  protected:
-  void SetUp() override {
-    root_ = fs::temp_directory_path() /
-            ("pencilscan_page_" + std::to_string(::getpid()) + "_" +
-             ::testing::UnitTest::GetInstance()->current_test_info()->name());
-    fs::remove_all(root_);
-    fs::create_directories(root_);
-  }
-  void TearDown() override { fs::remove_all(root_); }
-
   std::string report(const PageOptions& options = {}) {
     last_ = write_report(root_, root_ / "report.html", options);
     return read_file(root_ / "report.html");
@@ -48,7 +40,8 @@ class Folder : public ::testing::Test {
     return nlohmann::json::parse(page.substr(begin, page.find("</script>", begin) - begin));
   }
 
-  fs::path root_;
+  TemporaryFolder temporary_{::testing::UnitTest::GetInstance()->current_test_info()->name()};
+  fs::path root_ = temporary_.path();
   PageReport last_;
 };
 

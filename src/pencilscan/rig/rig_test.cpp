@@ -10,6 +10,7 @@
 
 #include "pencilscan/core/error.h"
 #include "pencilscan/io/file.h"
+#include "pencilscan/io/temporary_folder.h"
 #include "pencilscan/pattern/de_bruijn.h"
 
 namespace pencilscan {
@@ -65,14 +66,6 @@ Rig example_rig() {
 
 class RigFile : public ::testing::Test {
  protected:
-  void SetUp() override {
-    folder_ =
-        std::filesystem::path(::testing::TempDir()) /
-        (std::string("rig_") + ::testing::UnitTest::GetInstance()->current_test_info()->name());
-    std::filesystem::create_directories(folder_);
-  }
-  void TearDown() override { std::filesystem::remove_all(folder_); }
-
   /// The error of reading the example with one change.
   std::string error_after(const std::function<void(nlohmann::json&)>& change) {
     write_rig(example_rig(), folder_ / "rig.json");
@@ -89,7 +82,8 @@ class RigFile : public ::testing::Test {
     return "accepted";
   }
 
-  std::filesystem::path folder_;
+  TemporaryFolder temporary_{::testing::UnitTest::GetInstance()->current_test_info()->name()};
+  std::filesystem::path folder_ = temporary_.path();
 };
 
 void expect_equal(const Device& a, const Device& b) {

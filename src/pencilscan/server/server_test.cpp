@@ -7,6 +7,7 @@
 #include <thread>
 
 // clang-format off
+#include "pencilscan/io/temporary_folder.h"
 #include "pencilscan/core/error.h"
 #include "pencilscan/page/sample_result.h"
 #include "pencilscan/server/served_files.h"
@@ -26,10 +27,6 @@ using ::testing::HasSubstr;
 class Served : public ::testing::Test {
  protected:
   void SetUp() override {
-    base_ = fs::temp_directory_path() /
-            ("pencilscan_server_" + std::to_string(::getpid()) + "_" +
-             ::testing::UnitTest::GetInstance()->current_test_info()->name());
-    fs::remove_all(base_);
     root_ = base_ / "out";
     sample::write_output(root_, 1);
     write_text(base_ / "secret.txt", "secret");
@@ -46,7 +43,6 @@ class Served : public ::testing::Test {
     }
     server_->stop();
     thread_.join();
-    fs::remove_all(base_);
   }
   int status(const std::string& path, const httplib::Headers& headers = {}) {
     const auto answer = client_->Get(path.c_str(), headers);
@@ -57,7 +53,8 @@ class Served : public ::testing::Test {
     return answer ? answer->body : "";
   }
 
-  fs::path base_;
+  TemporaryFolder temporary_{::testing::UnitTest::GetInstance()->current_test_info()->name()};
+  fs::path base_ = temporary_.path();
   fs::path root_;
   std::unique_ptr<ViewServer> server_;
   std::thread thread_;
