@@ -1,10 +1,10 @@
 #include "pencilscan/calibration/gray_decode.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <numeric>
 
+#include "pencilscan/calibration/gray_crossings.h"
 #include "pencilscan/core/check.h"
 #include "pencilscan/core/median.h"
 #include "pencilscan/core/parallel.h"
@@ -133,13 +133,6 @@ class PixelDecoder {
   GrayDecodeOptions options_;
 };
 
-bool agrees(const DecodedView& view, int u, int v, int u2, int v2, double steepest) {
-  if (!view.valid(u2, v2)) return false;
-  const double reach = 1 + steepest * std::max(std::abs(u2 - u), std::abs(v2 - v));
-  return std::abs(view.code[0](v, u) - view.code[0](v2, u2)) <= reach &&
-         std::abs(view.code[1](v, u) - view.code[1](v2, u2)) <= reach;
-}
-
 void drop(DecodedView& view, const cv::Mat_<std::uint8_t>& wrong) {
   for (int v = 0; v < wrong.rows; ++v) {
     for (int u = 0; u < wrong.cols; ++u) {
@@ -159,7 +152,7 @@ void drop_unsupported(DecodedView& view, const GrayDecodeOptions& options) {
       int support = -1;  // itself
       for (int y = std::max(v - 2, 0); y <= std::min(v + 2, view.state.rows - 1); ++y)
         for (int x = std::max(u - 2, 0); x <= std::min(u + 2, view.state.cols - 1); ++x)
-          support += agrees(view, u, v, x, y, options.steepest_code) ? 1 : 0;
+          support += neighbors_agree(view, {u, v}, {x, y}, options.steepest_code) ? 1 : 0;
       if (support < options.least_support) wrong(v, u) = 1;
     }
   });
@@ -181,7 +174,7 @@ void drop_small_pieces(DecodedView& view, const GrayDecodeOptions& options) {
         for (const cv::Point step : {cv::Point(1, 0), {-1, 0}, {0, 1}, {0, -1}}) {
           const cv::Point next = at + step;
           if (!cv::Rect({0, 0}, view.state.size()).contains(next) || seen(next) != 0) continue;
-          if (!agrees(view, at.x, at.y, next.x, next.y, options.steepest_code)) continue;
+          if (!neighbors_agree(view, at, next, options.steepest_code)) continue;
           seen(next) = 1;
           piece.push_back(next);
         }
@@ -191,47 +184,6 @@ void drop_small_pieces(DecodedView& view, const GrayDecodeOptions& options) {
     }
   }
   drop(view, wrong);
-}
-
-/// Where the panel coordinate is m + 1/2 between two pixels with codes a and b.
-cv::Vec2f crossing_between(const std::vector<cv::Mat>& difference, cv::Point p, cv::Point q,
-                           std::int32_t a, std::int32_t b, double steepest) {
-  const cv::Vec2f none(-1, 0);
-  if (a == b || std::abs(a - b) > steepest) return none;
-  cv::Vec2f best = none;
-  int best_bit = -1;
-  // The coarsest bit that changes has the widest stripes and so the steepest edge.
-  for (std::int32_t m = std::min(a, b); m < std::max(a, b); ++m) {
-    const int bit = std::countr_zero(static_cast<std::uint32_t>(m) + 1);
-    if (bit <= best_bit || static_cast<std::size_t>(bit) >= difference.size()) continue;
-    const float at_p = difference[static_cast<std::size_t>(bit)].at<float>(p);
-    const float at_q = difference[static_cast<std::size_t>(bit)].at<float>(q);
-    if ((at_p > 0) == (at_q > 0)) continue;
-    best = {at_p / (at_p - at_q), static_cast<float>(m) + 0.5F};
-    best_bit = bit;
-  }
-  return best;
-}
-
-void find_crossings(const GrayStack& stack, const GrayDecodeOptions& options, DecodedView& view) {
-  for (std::size_t axis = 0; axis < 2; ++axis) {
-    for (std::size_t direction = 0; direction < 2; ++direction) {
-      auto& crossing = view.crossing[axis][direction];
-      crossing = cv::Mat_<cv::Vec2f>(view.state.size(), cv::Vec2f(-1, 0));
-      const cv::Point step = direction == 0 ? cv::Point(1, 0) : cv::Point(0, 1);
-      parallel_for(static_cast<std::size_t>(view.state.rows - step.y), [&](std::size_t row) {
-        const int v = static_cast<int>(row);
-        for (int u = 0; u + step.x < view.state.cols; ++u) {
-          if (!view.valid(u, v) ||
-              !agrees(view, u, v, u + step.x, v + step.y, options.steepest_code))
-            continue;
-          crossing(v, u) = crossing_between(
-              stack.difference[axis], {u, v}, cv::Point(u, v) + step, view.code[axis](v, u),
-              view.code[axis](v + step.y, u + step.x), options.steepest_code);
-        }
-      });
-    }
-  }
 }
 
 double inverted_share(const GrayStack& stack, double noise) {
@@ -248,6 +200,13 @@ double inverted_share(const GrayStack& stack, double noise) {
 }
 
 }  // namespace
+
+bool neighbors_agree(const DecodedView& view, cv::Point a, cv::Point b, double steepest_code) {
+  if (!view.valid(b.x, b.y)) return false;
+  const double reach = 1 + steepest_code * std::max(std::abs(b.x - a.x), std::abs(b.y - a.y));
+  return std::abs(view.code[0](a) - view.code[0](b)) <= reach &&
+         std::abs(view.code[1](a) - view.code[1](b)) <= reach;
+}
 
 std::string to_string(PixelState state) {
   switch (state) {

@@ -44,8 +44,9 @@ struct GrayDecodeOptions {
 /// neighbours are dropped.
 ///
 /// Between two pixels whose codes differ, the difference of the bit that changes passes through
-/// zero where the panel coordinate is exactly m + 1/2: `crossing`. A blur, a gamma curve or ambient
-/// light moves it only to second order. Sub-pixel coordinates come from these (local_map.h).
+/// zero where the panel coordinate is m + 1/2: `crossing`. Gamma and ambient light move it only to
+/// second order; what blur on uneven surfaces does is taken out (gray_crossings.h). Sub-pixel
+/// coordinates come from these (local_map.h).
 struct DecodedView {
   cv::Mat_<std::uint8_t> state;                ///< PixelState
   std::array<cv::Mat_<std::int32_t>, 2> code;  ///< column, row; -1 where not valid

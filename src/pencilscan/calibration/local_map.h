@@ -12,7 +12,7 @@ struct LocalMapOptions {
   int largest_radius_px = 9;    ///< it grows to this while crossings are few
   int least_crossings = 14;     ///< per axis, >= 8
   double edge_sigma_px = 0.05;  ///< of a crossing's place beyond noise (rendering, blur), > 0
-  /// Texture pushes all crossings of a window one way, which their scatter does not show, >= 0.
+  /// Texture finer than the blur pushes all crossings of a window one way, unseen by their scatter.
   double bias_sigma_px = 0.012;
   double worst_rms_px = 0.6;   ///< of the crossings about the fit, panel px
   double least_inliers = 0.7;  ///< share of the crossings that fit
