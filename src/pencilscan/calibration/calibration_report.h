@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "pencilscan/calibration/color_calibration.h"
 #include "pencilscan/calibration/loop_closure.h"
 #include "pencilscan/calibration/verdict.h"
 
@@ -27,6 +28,7 @@ struct CalibrationReport {
   const Verdict& verdict;
   const std::vector<DecodeSummary>& decoded;
   const LoopClosure& loop;
+  const ColorCalibration& color;
 };
 
 /// visit(view, error) for up to `most` views of a device, evenly chosen.

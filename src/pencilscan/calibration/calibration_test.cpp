@@ -271,7 +271,7 @@ TEST(CalibrationReport, IsOnePageAndValidJson) {
       uncertainty(result.problem, result.free_inner, 2, result.extra_sigma_px);
   const Verdict verdict = judge(input, result, sigma, {});
   const LoopClosure loop = close_loop(result);
-  const CalibrationReport report{input, result, sigma, verdict, {}, loop};
+  const CalibrationReport report{input, result, sigma, verdict, {}, loop, {}};
   const std::string html = calibration_html(report);
   EXPECT_THAT(html, HasSubstr("<svg"));
   EXPECT_EQ(html.find("http"), std::string::npos);  // nothing from elsewhere

@@ -7,6 +7,7 @@
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/io/image.h"
+#include "pencilscan/pattern/solid_color.h"
 
 namespace pencilscan {
 namespace {
@@ -47,6 +48,8 @@ CapturePair capture_pair(const fs::path& folder, const Projector& projector) {
   CapturePair pair;
   pair.folder = folder;
   pair.files = numbered_files(folder);
+  for (const SolidImage& image : solid_images())
+    if (const auto file = find_image(folder, image.name)) pair.solids[image.name] = *file;
   const auto bits =
       static_cast<std::size_t>(gray_code_bits(projector.width) + gray_code_bits(projector.height));
   pair.inverses = pair.files.size() == 2 + 2 * bits;
@@ -60,20 +63,18 @@ CapturePair capture_pair(const fs::path& folder, const Projector& projector) {
   return pair;
 }
 
-cv::Mat read_grey(const fs::path& path, const Camera& camera) {
-  const cv::Mat color = read_image(path);
+}  // namespace
+
+cv::Mat read_color_image(const fs::path& path, const Camera& camera) {
+  cv::Mat color = read_image(path);
   if (color.cols != camera.width || color.rows != camera.height) {
     throw InputError(path.string(), "size",
                      std::to_string(color.cols) + " x " + std::to_string(color.rows),
                      "must be that of camera " + camera.name + ", " + std::to_string(camera.width) +
                          " x " + std::to_string(camera.height));
   }
-  cv::Mat grey;
-  cv::transform(color, grey, cv::Matx13f(1.F / 3, 1.F / 3, 1.F / 3));
-  return grey;
+  return color;
 }
-
-}  // namespace
 
 GrayStack make_gray_stack(int panel_width, int panel_height, bool inverses,
                           const std::function<cv::Mat(std::size_t)>& image) {
@@ -135,7 +136,10 @@ std::vector<CapturePair> list_captures(const fs::path& captures, const Rig& rig)
 }
 
 cv::Mat read_gray_image(const CapturePair& pair, const Rig& rig, std::size_t image) {
-  return read_grey(pair.files[image], rig.cameras[pair.camera]);
+  const cv::Mat color = read_color_image(pair.files[image], rig.cameras[pair.camera]);
+  cv::Mat grey;
+  cv::transform(color, grey, cv::Matx13f(1.F / 3, 1.F / 3, 1.F / 3));
+  return grey;
 }
 
 GrayStack read_gray_stack(const CapturePair& pair, const Rig& rig) {

@@ -3,6 +3,7 @@
 #include <array>
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <opencv2/core.hpp>
 #include <string>
 #include <vector>
@@ -13,20 +14,21 @@
 
 namespace pencilscan {
 
-/// What one camera saw of one projector's Gray-code sequence, reduced to what decoding needs.
+/// What one camera saw of one projector's Gray-code sequence, reduced to what decoding needs: grey
+/// (CV_32FC1), or one stack of all three channels (CV_32FC3, not to be decoded as it is).
 struct GrayStack {
-  cv::Mat white;         ///< CV_32FC1, [0, 1]
-  cv::Mat black;         ///< CV_32FC1
+  cv::Mat white;  ///< [0, 1]
+  cv::Mat black;
   bool inverses = true;  ///< each bit was shown with its inverse
   int panel_width = 0;   ///< px of the projector
   int panel_height = 0;  ///< px
-  /// [axis][bit], bit 0 the least significant, CV_32FC1: pattern - inverse, or
+  /// [axis][bit], bit 0 the least significant: pattern - inverse, or
   /// 2 pattern - white - black without inverses. About +-(white - black).
   std::array<std::vector<cv::Mat>, 2> difference;
 };
 
 /// The stack of images in the order of gray_code_sequence(panel_width, panel_height, inverses),
-/// each CV_32FC1 of one size; the images are those that `image(i)` returns.
+/// each of one size and type; the images are those that `image(i)` returns.
 [[nodiscard]] GrayStack make_gray_stack(int panel_width, int panel_height, bool inverses,
                                         const std::function<cv::Mat(std::size_t)>& image);
 
@@ -37,6 +39,8 @@ struct CapturePair {
   bool inverses = true;
   std::filesystem::path folder;
   std::vector<std::filesystem::path> files;
+  /// Those of solid_images() that are there, by name.
+  std::map<std::string, std::filesystem::path> solids;
 };
 
 /// All pairs of a captures folder, projectors first. A camera that lacks a folder is left out.
@@ -45,6 +49,8 @@ struct CapturePair {
 [[nodiscard]] std::vector<CapturePair> list_captures(const std::filesystem::path& captures,
                                                      const Rig& rig);
 
+/// One image of a pair as stored, CV_32FC3 RGB. InputError when its size is not the camera's.
+[[nodiscard]] cv::Mat read_color_image(const std::filesystem::path& path, const Camera& camera);
 /// One image of a pair as grey. InputError when its size is not the camera's.
 [[nodiscard]] cv::Mat read_gray_image(const CapturePair& pair, const Rig& rig, std::size_t image);
 /// Reads one pair's images; colour becomes grey. InputError when an image's size is not the

@@ -204,6 +204,26 @@ std::string pairs_part(const CalibrationReport& report) {
   return html + "</table></div>";
 }
 
+std::string color_part(const CalibrationReport& report) {
+  std::string html = "<ul>";
+  for (const std::string& remark : report.color.remarks) html += "<li>" + escaped(remark) + "</li>";
+  html += "</ul>";
+  const auto& devices = report.color.lateral.devices;
+  if (devices.empty()) return html;
+  html += "<div class='wide'><table><tr>" + head("device") + head("red, px") + head("green, px") +
+          head("blue, px") + "</tr>";
+  for (std::size_t d = 0; d < devices.size(); ++d) {
+    html += "<tr>" + cell(escaped(device_at(report.input.rig, d).name));
+    for (const ColorDisplacementEstimate& e : devices[d])
+      html += cell(number(e.value.shift_px.x(), 2) + ", " + number(e.value.shift_px.y(), 2) +
+                   " &plusmn; " + number(e.shift_sigma_px.maxCoeff(), 1));
+    html += "</tr>";
+  }
+  return html +
+         "</table></div><p>Where each device has each colour in the middle of its image, against "
+         "all colours together.</p>";
+}
+
 std::string decoding_part(const CalibrationReport& report) {
   std::string html = "<div class='wide'><table><tr>" + head("capture, pair");
   for (std::size_t s = 0; s < kPixelStates; ++s)
@@ -239,8 +259,8 @@ std::string calibration_html(const CalibrationReport& report) {
         "camera and a projector; red: many of them contradict each other.</p>" +
         overlap_plot(report) + loop_part(report) + "<h2>Parameters</h2>" + parameters_part(report);
   }
-  html += "<h2>Pairs</h2>" + pairs_part(report) + "<h2>Decoding, in pixels</h2>" +
-          decoding_part(report);
+  html += "<h2>Colour</h2>" + color_part(report) + "<h2>Pairs</h2>" + pairs_part(report) +
+          "<h2>Decoding, in pixels</h2>" + decoding_part(report);
   return html + "</body></html>\n";
 }
 

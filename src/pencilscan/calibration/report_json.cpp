@@ -143,6 +143,7 @@ nlohmann::ordered_json calibration_json(const CalibrationReport& report) {
                     {"point_sigma_median", report.uncertainty.volume_median},
                     {"point_sigma_p95", report.uncertainty.volume_p95}};
   json["loop"] = loop_json(report);
+  json["color"] = color_json(report.input.rig, report.color);
   json["devices"] = Json::array();
   for (std::size_t d = 0; d < result.placed.size(); ++d)
     json["devices"].push_back(device_json(report, d));

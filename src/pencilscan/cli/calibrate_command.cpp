@@ -46,7 +46,7 @@ std::optional<KnownDistance> known_distance(const CalibrateCommand& command, con
 /// Decodes one pair and adds its correspondences, unless the codes make no sense; looks for the
 /// board where all of the panel is lit.
 DecodeSummary decode_pair(const CapturePair& pair, std::size_t capture, const Rig& rig,
-                          TrackBuilder& tracks, BoardFinder* boards,
+                          TrackBuilder& tracks, ColorCollector& colors, BoardFinder* boards,
                           std::vector<Finding>& findings) {
   const Projector& projector = rig.projectors[pair.projector];
   const GrayStack stack = read_gray_stack(pair, rig);
@@ -67,6 +67,7 @@ DecodeSummary decode_pair(const CapturePair& pair, std::size_t capture, const Ri
   }
   const std::size_t before = tracks.samples();
   tracks.add(capture, pair.camera, pair.projector, view);
+  colors.add(pair, view);
   summary.samples = tracks.samples() - before;
   return summary;
 }
@@ -78,6 +79,10 @@ void check_command(const CalibrateCommand& command) {
   if (!command.overwrite && fs::exists(command.out, ignored))
     throw InputError("command line", "--out", command.out,
                      "must be a new file (or give --overwrite)");
+}
+
+void print_remarks(const ColorCalibration& color) {
+  for (const std::string& remark : color.remarks) std::cerr << "colour: " << remark << "\n";
 }
 
 void print_verdict(const Verdict& verdict) {
@@ -122,6 +127,7 @@ void run_calibrate(const CalibrateCommand& command) {
   GrayTrackOptions track_options;
   track_options.max_tracks = command.max_tracks;
   TrackBuilder tracks(input.rig, track_options);
+  ColorCollector colors(input.rig);
   std::vector<DecodeSummary> decoded;
   std::vector<Finding> findings;
   std::vector<std::vector<CapturePair>> captures;
@@ -132,8 +138,8 @@ void run_calibrate(const CalibrateCommand& command) {
       progress("decoding", (static_cast<double>(k) +
                             static_cast<double>(i) / static_cast<double>(captures[k].size())) /
                                static_cast<double>(captures.size()));
-      decoded.push_back(
-          decode_pair(captures[k][i], k, input.rig, tracks, boards ? &*boards : nullptr, findings));
+      decoded.push_back(decode_pair(captures[k][i], k, input.rig, tracks, colors,
+                                    boards ? &*boards : nullptr, findings));
     }
   }
   input.tracks = tracks.tracks();
@@ -147,7 +153,9 @@ void run_calibrate(const CalibrateCommand& command) {
   }
 
   CalibrateOptions options;
-  const CalibrationResult result = calibrate(input, options, progress);
+  CalibrationResult result = calibrate(input, options, progress);
+  const ColorCalibration color = colors.result();
+  set_colors(color, result.rig);
   progress("judging", 0.9);
   Uncertainty sigma;
   sigma.devices.resize(device_count(input.rig));
@@ -159,12 +167,13 @@ void run_calibrate(const CalibrateCommand& command) {
   if (const auto finding = judge_loop(result, loop)) findings.push_back(*finding);
   const Verdict verdict = judge(input, result, sigma, std::move(findings));
   progress("judging", 1);
-  const CalibrationReport report{input, result, sigma, verdict, decoded, loop};
+  const CalibrationReport report{input, result, sigma, verdict, decoded, loop, color};
   const fs::path folder = fs::path(command.out).parent_path();
   write_json(folder / "calibration.json", calibration_json(report));
   write_text(folder / "calibration.html", calibration_html(report));
   if (verdict.grade != Grade::kUnusable) write_rig(result.rig, command.out);
   print_verdict(verdict);
+  print_remarks(color);
   print_figures(command.common, figures_of(result, sigma, verdict, watch.seconds()));
   if (verdict.grade == Grade::kUnusable) {
     std::cout.flush();

@@ -10,6 +10,7 @@
 #include "pencilscan/io/image.h"
 #include "pencilscan/pattern/gray_code.h"
 #include "pencilscan/pattern/line_pattern.h"
+#include "pencilscan/pattern/solid_color.h"
 #include "pencilscan/rig/rig.h"
 
 namespace pencilscan::cli {
@@ -21,6 +22,7 @@ struct PatternOptions {
   std::string out;
   bool gray_code = false;
   bool no_inverses = false;
+  bool solids = false;
 };
 
 std::string file_name(std::size_t number) {
@@ -50,9 +52,17 @@ void write_gray_codes(const PatternOptions& options) {
       }
       index.push_back(entry);
     }
+    if (options.solids) {
+      for (const SolidImage& image : solid_images()) {
+        const cv::Mat panel(projector.height, projector.width, CV_32FC3,
+                            cv::Scalar(image.value[0], image.value[1], image.value[2]));
+        write_image(out / projector.name / (image.name + ".png"), panel);
+        index.push_back({{"file", image.name + ".png"}, {"shows", image.value}});
+      }
+    }
     write_json(out / projector.name / "index.json",
                {{"width", projector.width}, {"height", projector.height}, {"images", index}});
-    figures[projector.name] = {{"images", sequence.size()}};
+    figures[projector.name] = {{"images", index.size()}};
   }
   print_figures(options.common, figures);
 }
@@ -91,6 +101,8 @@ void add_pattern_command(CLI::App& app) {
   command->add_flag("--gray-code", options->gray_code,
                     "Gray codes instead, <projector>/NNN.png with an index.json; sizes suffice");
   command->add_flag("--no-inverses", options->no_inverses, "Gray codes without inverse images");
+  command->add_flag("--solids", options->solids,
+                    "With --gray-code: even colours as well, for crosstalk and gamma");
   add_common_options(*command, options->common, "pencilscan pattern --rig rig.json --out patterns");
   command->callback([options] { run_pattern(*options); });
 }

@@ -39,6 +39,7 @@ struct SimulateOptions {
   std::vector<double> translate_mm = {0, 0, 0};
 
   bool gray_code = false;
+  bool color_captures = false;
   bool truth_maps = false;
   bool export_povray = false;
 
@@ -205,11 +206,19 @@ int write_captures(const SimulateOptions& options, const Rig& rig, const Triangl
     const Projector& projector = rig.projectors[pair / rig.cameras.size()];
     const std::size_t c = pair % rig.cameras.size();
     std::vector<PanelLight> sequence;
+    std::vector<std::string> names;
     for (const auto& image : gray_code_sequence(projector.width, projector.height)) {
+      names.push_back(frame_name(static_cast<int>(names.size())).substr(3));
       sequence.push_back(gray_code_light(projector, image, film));
     }
-    const auto images =
-        render_sequence(rig, c, pair / rig.cameras.size(), object, sequence, options.render);
+    if (options.color_captures) {
+      for (const SolidImage& image : solid_images()) {
+        names.push_back(image.name);
+        sequence.push_back(solid_light(projector, image, film));
+      }
+    }
+    const auto render = options.color_captures ? render_color_sequence : render_sequence;
+    const auto images = render(rig, c, pair / rig.cameras.size(), object, sequence, options.render);
     if (images.empty()) continue;  // the camera cannot see this projector's light
     ++written;
     const fs::path folder =
@@ -217,7 +226,7 @@ int write_captures(const SimulateOptions& options, const Rig& rig, const Triangl
     const SensorOptions sensor = sensor_of(options, rig.cameras[c]);
     parallel_for(images.size(), [&](std::size_t i) {
       const auto number = kFirstCaptureImage + static_cast<std::uint32_t>(pair * 64 + i);
-      write_image(folder / (frame_name(static_cast<int>(i)).substr(3) + ".png"),
+      write_image(folder / (names[i] + ".png"),
                   apply_sensor(images[i], sensor, options.common.seed, number), options.bits);
     });
   }
@@ -339,6 +348,8 @@ void add_simulate_command(CLI::App& app) {
       ->required();
   command->add_flag("--overwrite", options->overwrite, "Replace an earlier result in --out");
   command->add_flag("--gray-code", options->gray_code, "Also write Gray-code captures");
+  command->add_flag("--color-captures", options->color_captures,
+                    "Gray-code captures in colour, with solid colours");
   command->add_flag("--truth-maps", options->truth_maps,
                     "Also write depth, line coordinates, lit masks and cosines");
   command->add_flag("--export-povray", options->export_povray,

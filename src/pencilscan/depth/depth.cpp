@@ -53,7 +53,8 @@ DepthResult measure_depth(const Rig& rig, const std::vector<ColorFamily>& famili
   std::vector<double> blur(cameras.size());
   parallel_for(cameras.size(), [&](std::size_t i) {
     const std::size_t c = cameras[i];
-    const cv::Mat rgb = unmixed(linearized(images[c], rig.cameras[c].gamma), unmixings[c]);
+    const Camera& camera = rig.cameras[c];
+    const cv::Mat rgb = projector_light(camera, linearized(images[c], camera.gamma), unmixings[c]);
     std::vector<cv::Mat> presence;
     for (const ColorFamily& family : families) presence.push_back(presence_image(rgb, family));
     const CameraLight light = measure_light(rig, static_cast<int>(c), families, std::move(presence),

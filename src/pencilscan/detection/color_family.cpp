@@ -66,4 +66,37 @@ std::vector<ColorFamily> color_families(const Rig& rig) {
   return families;
 }
 
+Rig with_registered_patterns(Rig rig) {
+  if (std::all_of(rig.projectors.begin(), rig.projectors.end(),
+                  [](const Projector& p) { return p.color_registration.none(); }))
+    return rig;
+  for (const ColorFamily& family : color_families(rig)) {
+    for (const PatternRef& ref : family.patterns) {
+      Projector& projector = rig.projectors[static_cast<std::size_t>(ref.projector)];
+      if (projector.color_registration.none()) continue;
+      LinePattern& pattern = projector.patterns[static_cast<std::size_t>(ref.pattern)];
+      pattern.max_lines = projector.line_count(pattern);
+      Vec3 weight = Vec3::Zero();  // of red, green and blue in where its lines are found
+      for (const std::string& color : pattern.colors)
+        weight += family.presence.cwiseProduct(vector_of(color));
+      weight /= weight.sum();
+      const auto axis = static_cast<Eigen::Index>(pattern.axis);
+      const auto model_position = [&](double px) {
+        double mean = 0;
+        for (std::size_t k = 0; k < 3; ++k)
+          mean += weight[static_cast<Eigen::Index>(k)] *
+                  projector.color_registration.from_color(k, projector, {px, px})[axis];
+        return mean;
+      };
+      const double offset = model_position(pattern.offset_px);
+      const double scale = model_position(pattern.offset_px + 1) - offset;
+      pattern.offset_px = offset;
+      pattern.pitch_px *= scale;
+      pattern.line_width_px *= scale;
+    }
+  }
+  for (Projector& projector : rig.projectors) projector.color_registration = {};
+  return rig;
+}
+
 }  // namespace pencilscan

@@ -29,4 +29,9 @@ struct ColorFamily {
 
 [[nodiscard]] std::vector<ColorFamily> color_families(const Rig& rig);
 
+/// The rig with every pattern where the projector's model has the colours by which its lines are
+/// found (presence), so that color_registration of projectors is spent: twice is as once. Lines of
+/// one pattern that different colours show get the mean over the pattern's colours.
+[[nodiscard]] Rig with_registered_patterns(Rig rig);
+
 }  // namespace pencilscan

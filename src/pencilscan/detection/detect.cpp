@@ -57,8 +57,8 @@ CameraDetection detect_curves(const Camera& camera, const Rig& rig,
   const cv::Mat whole = linearized(image, camera.gamma);
   const cv::Rect area = lit_area(whole);
   const cv::Mat linear = whole(area);
-  result.unmixing = estimate_unmixing(camera, rig, families, linear);
-  const cv::Mat rgb = unmixed(linear, result.unmixing);
+  result.unmixing = estimate_unmixing(camera, rig, families, registered(camera, linear, area.tl()));
+  const cv::Mat rgb = projector_light(camera, linear, result.unmixing, area.tl());
   // Find and trace the curves of each family, then fit them together.
   std::vector<std::vector<Curve>> curves_of(families.size());
   result.presence.resize(families.size());

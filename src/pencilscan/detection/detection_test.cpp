@@ -194,5 +194,57 @@ TEST(EstimateUnmixing, FindsTheCrosstalkThatTheRigDoesNotState) {
   }
 }
 
+TEST(Registered, BringsEachColourToWhereTheModelHasIt) {
+  Camera camera;
+  camera.width = 200;
+  camera.height = 150;
+  camera.color_registration.colors[0] = {Vec2(0.45, -0.3), 1.001};
+  camera.color_registration.colors[2] = {Vec2(-0.7, 0.5), 1};
+  const auto value = [](const Vec2& p) {  // a line's profile: as narrow as they come
+    const double across = std::remainder(p.x() + 0.4 * p.y(), 9.0);
+    return std::exp(-across * across / (2 * 1.2 * 1.2));
+  };
+  const auto draw = [&](const cv::Rect& area, bool displaced) {
+    cv::Mat image(area.size(), CV_32FC3);
+    for (int y = 0; y < area.height; ++y)
+      for (int x = 0; x < area.width; ++x)
+        for (std::size_t k = 0; k < 3; ++k) {
+          const Vec2 pixel(x + area.x, y + area.y);
+          const Vec2 at =
+              displaced ? camera.color_registration.from_color(k, camera, pixel) : pixel;
+          image.at<cv::Vec3f>(y, x)[static_cast<int>(k)] = static_cast<float>(value(at));
+        }
+    return image;
+  };
+  for (const cv::Rect area : {cv::Rect(0, 0, 200, 150), cv::Rect(37, 21, 90, 80)}) {
+    const cv::Mat result = registered(camera, draw(area, true), area.tl());
+    const cv::Mat expected = draw(area, false);
+    const cv::Rect inside(5, 5, area.width - 10, area.height - 10);
+    EXPECT_LT(cv::norm(result(inside), expected(inside), cv::NORM_INF), 0.02);
+  }
+  camera.color_registration = {};
+  const cv::Mat image = draw({0, 0, 200, 150}, false);
+  EXPECT_EQ(registered(camera, image).data, image.data);  // nothing stated: nothing copied
+}
+
+TEST(RegisteredPatterns, LinesMoveWithTheColourThatShowsThem) {
+  Rig rig = two_color_rig(200, 150);
+  auto& registration = rig.projectors[0].color_registration;
+  registration.colors[0].shift_px = Vec2(9, 9);  // red: no line of this projector
+  registration.colors[2] = {Vec2(0.5, 7), 1.002};
+  const LinePattern& before = rig.projectors[0].patterns[0];
+  const Rig located = with_registered_patterns(rig);
+  const LinePattern& after = located.projectors[0].patterns[0];
+  for (const int line : {0, 3}) {
+    const Vec2 shown(before.position_px(line), 0);
+    EXPECT_NEAR(after.position_px(line), registration.from_color(2, rig.projectors[0], shown).x(),
+                1e-12);
+  }
+  EXPECT_EQ(located.projectors[1].patterns[0].offset_px, rig.projectors[1].patterns[0].offset_px);
+  // Spent: once more changes nothing.
+  EXPECT_TRUE(located.projectors[0].color_registration.none());
+  EXPECT_EQ(with_registered_patterns(located).projectors[0].patterns[0].offset_px, after.offset_px);
+}
+
 }  // namespace
 }  // namespace pencilscan

@@ -173,15 +173,16 @@ cv::Mat linearized(const cv::Mat& image, double gamma) {
   return linear;
 }
 
-cv::Mat unmixed(const cv::Mat& image, const Unmixing& unmixing) {
+cv::Mat projector_light(const Camera& camera, const cv::Mat& linear, const Unmixing& unmixing,
+                        cv::Point corner) {
   cv::Matx33f matrix;
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < 3; ++j)
       matrix(i, j) = static_cast<float>(unmixing.projector_from_camera(i, j));
   }
   cv::Mat result;
-  cv::transform(image, result, matrix);
-  return result;
+  cv::transform(linear, result, matrix);
+  return registered(camera, result, corner);
 }
 
 cv::Mat presence_image(const cv::Mat& unmixed_image, const ColorFamily& family) {

@@ -24,8 +24,16 @@ struct Unmixing {
 /// linear = value^gamma.
 [[nodiscard]] cv::Mat linearized(const cv::Mat& image, double gamma);
 
-/// Unmixed image (projector RGB), CV_32FC3.
-[[nodiscard]] cv::Mat unmixed(const cv::Mat& image, const Unmixing& unmixing);
+/// Red, green and blue each where the camera's K, distortion and pose say (color_registration of
+/// the rig), CV_32FC3. `corner`: pixel of the camera that is the image's first. The image itself
+/// where the rig states nothing.
+[[nodiscard]] cv::Mat registered(const Camera& camera, const cv::Mat& image,
+                                 cv::Point corner = {0, 0});
+
+/// Light of the projectors, RGB, each colour where the camera's model says, of a linear image
+/// (CV_32FC3): unmixed, since lenses act before the sensor's filters, then registered.
+[[nodiscard]] cv::Mat projector_light(const Camera& camera, const cv::Mat& linear,
+                                      const Unmixing& unmixing, cv::Point corner = {0, 0});
 
 /// Presence channel of a family, CV_32FC1.
 [[nodiscard]] cv::Mat presence_image(const cv::Mat& unmixed_image, const ColorFamily& family);

@@ -77,8 +77,10 @@ std::vector<ColorView> color_views(const Rig& rig, const Frame& frame, const Poi
     ColorView view;
     view.camera = static_cast<int>(c);
     view.is_plain = rig.cameras[c].sees_texture_only;
-    view.image = linearized(frame.images[c], rig.cameras[c].gamma);
-    if (!view.is_plain) view.image = unmixed(view.image, points.detections[c].unmixing);
+    const Camera& camera = rig.cameras[c];
+    const cv::Mat linear = linearized(frame.images[c], camera.gamma);
+    view.image = view.is_plain ? registered(camera, linear)
+                               : projector_light(camera, linear, points.detections[c].unmixing);
     view.image = without_overexposed(view.image, frame.images[c]);
     for (const CameraDepthReport& of_camera : depth.cameras) {
       if (of_camera.camera == view.camera) view.blur_px = of_camera.blur_px;
@@ -90,8 +92,9 @@ std::vector<ColorView> color_views(const Rig& rig, const Frame& frame, const Poi
     ColorView view;
     view.camera = static_cast<int>(c);
     view.is_plain = true;
-    view.image =
-        without_overexposed(linearized(frame.plain[c], rig.cameras[c].gamma), frame.plain[c]);
+    const Camera& camera = rig.cameras[c];
+    view.image = without_overexposed(registered(camera, linearized(frame.plain[c], camera.gamma)),
+                                     frame.plain[c]);
     views.push_back(std::move(view));
   }
   return views;
@@ -138,7 +141,8 @@ PointResult detect_frame(const Rig& rig, const Frame& frame, const PointOptions&
   return result;
 }
 
-PointResult measure_points(const Rig& rig, const Frame& frame, const PointOptions& options) {
+PointResult measure_points(const Rig& stated, const Frame& frame, const PointOptions& options) {
+  const Rig rig = with_registered_patterns(stated);
   PointResult result = detect_frame(rig, frame, options);
   Stopwatch solution_watch;
   if (options.solution.method != Method::kJoint) {
@@ -180,8 +184,9 @@ PointResult measure_points(const Rig& rig, const Frame& frame, const PointOption
   return result;
 }
 
-ShapeResult measure_shape(const Rig& rig, const Frame& frame, const PointResult& points,
+ShapeResult measure_shape(const Rig& stated, const Frame& frame, const PointResult& points,
                           const ShapeOptions& options) {
+  const Rig rig = with_registered_patterns(stated);
   ShapeResult result;
   if (options.depth.enabled) {
     const Stopwatch depth_watch;

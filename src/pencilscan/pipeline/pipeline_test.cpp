@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <array>
 #include <filesystem>
 #include <fstream>
 #include <map>
@@ -10,6 +11,7 @@
 #include <utility>
 
 #include "pencilscan/core/error.h"
+#include "pencilscan/core/median.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/evaluation/label_error.h"
 #include "pencilscan/evaluation/line_recall.h"
@@ -21,6 +23,7 @@
 #include "pencilscan/pipeline/frame_files.h"
 #include "pencilscan/pipeline/rig_refinement.h"
 #include "pencilscan/pipeline/sequence.h"
+#include "pencilscan/rig/device_list.h"
 #include "pencilscan/rig/sample_devices.h"
 #include "pencilscan/simulation/panel_light.h"
 #include "pencilscan/simulation/render.h"
@@ -142,6 +145,31 @@ TEST_F(PipelineTest, LinesWithoutACodeAreToldApartWhereFourProjectorsShareAColou
   const TruthScene truth(ball(), rig);
   const auto verdicts = judge_points(truth, result.points);
   EXPECT_LT(label_figures(truth, result.points, verdicts).wrong.value(), 0.01);
+}
+
+/// Median distance of measured points from the ball, mm.
+double distance_from_ball(const PointResult& result) {
+  std::vector<double> distances;
+  for (const MeasuredPoint& p : result.points)
+    distances.push_back(std::abs(Vec3(double{p.x}, double{p.y}, double{p.z}).norm() - 95));
+  return upper_median(std::move(distances));
+}
+
+TEST_F(PipelineTest, KnownLateralColourCostsNextToNothing) {
+  Rig shifted = *rig_;
+  const std::array<Vec2, 4> shifts{Vec2(0.4, 0.3), Vec2(-0.5, 0), Vec2(0.3, -0.4), Vec2(0, 0.5)};
+  for (std::size_t d = 0; d < device_count(shifted); ++d) {
+    ColorRegistration& registration = d < 2 ? shifted.cameras[d].color_registration
+                                            : shifted.projectors[d - 2].color_registration;
+    registration.colors[0] = {shifts[d], 1.0002};
+    registration.colors[2] = {-shifts[d], 0.9998};
+  }
+  const Frame frame = render_frame(shifted, ball());
+  const double without = distance_from_ball(measure_points(*rig_, *frame_));
+  const double known = distance_from_ball(measure_points(shifted, frame));
+  const double unknown = distance_from_ball(measure_points(*rig_, frame));
+  EXPECT_LT(known, 1.1 * without + 0.002);  // float32 images, no noise: 2 um are of resampling
+  EXPECT_GT(unknown, 3 * without);
 }
 
 TEST_F(PipelineTest, SingleProjectorLabelsTheGridOfOneProjector) {

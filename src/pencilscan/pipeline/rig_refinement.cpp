@@ -89,8 +89,9 @@ bool end_alike(const Attempt& a, const Attempt& b) {
 
 }  // namespace
 
-RigRefinement refine_rig_on_frames(const Rig& calibrated, std::span<const FrameCurves> frames,
+RigRefinement refine_rig_on_frames(const Rig& stated, std::span<const FrameCurves> frames,
                                    const RigRefinementOptions& options) {
+  const Rig calibrated = with_registered_patterns(stated);
   std::optional<Attempt> best;
   for (const double tolerance : options.first_tolerances_px) {
     Attempt next = attempt(calibrated, frames, tolerance, options);
@@ -107,6 +108,10 @@ RigRefinement refine_rig_on_frames(const Rig& calibrated, std::span<const FrameC
   if (!result.report.refined) {
     result.rig = calibrated;
     result.labelings.clear();
+  }
+  for (std::size_t p = 0; p < stated.projectors.size(); ++p) {
+    result.rig.projectors[p].patterns = stated.projectors[p].patterns;
+    result.rig.projectors[p].color_registration = stated.projectors[p].color_registration;
   }
   return result;
 }

@@ -8,6 +8,7 @@
 
 #include "pencilscan/geometry/device.h"
 #include "pencilscan/pattern/line_pattern.h"
+#include "pencilscan/rig/color_registration.h"
 
 namespace pencilscan {
 
@@ -17,6 +18,7 @@ struct Camera : Device {
   std::map<std::string, Mat3> color_matrix_by_projector;
   double gamma = 1;                ///< linear = value^gamma on [0, 1]; > 0
   bool sees_texture_only = false;  ///< "role": "texture"
+  ColorRegistration color_registration;
 
   /// The matrix for one projector; identity where the rig states none.
   [[nodiscard]] Mat3 color_matrix_for(const std::string& projector) const;
@@ -27,6 +29,7 @@ struct Camera : Device {
 
 struct Projector : Device {
   std::vector<LinePattern> patterns;  ///< empty where nothing needs it (calibration)
+  ColorRegistration color_registration;
 
   /// Panel size across the lines of a pattern, px.
   [[nodiscard]] int size_across(const LinePattern& pattern) const {

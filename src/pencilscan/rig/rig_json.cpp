@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -76,6 +77,22 @@ void parse_device(const JsonField& field, Device& device, GivenCalibration* give
   }
   if (given == nullptr || given->pose)
     device.device_from_world = {parse_rotation(field.at("R")), field.at("t").vector3()};
+}
+
+constexpr std::array<const char*, 3> kColorNames{"red", "green", "blue"};
+
+ColorRegistration parse_color_registration(const JsonField& field) {
+  field.check_keys({}, {"red", "green", "blue"});
+  ColorRegistration registration;
+  for (std::size_t k = 0; k < kColorNames.size(); ++k) {
+    if (!field.has(kColorNames[k])) continue;
+    const JsonField color = field.at(kColorNames[k]);
+    color.check_keys({"shift_px"}, {"scale"});
+    const auto shift = color.at("shift_px").entries(2);
+    registration.colors[k].shift_px = {shift[0].number(), shift[1].number()};
+    if (color.has("scale")) registration.colors[k].scale = color.at("scale").positive();
+  }
+  return registration;
 }
 
 /// Keys of a device's calibration: all of them, or none is required.
@@ -184,9 +201,11 @@ LinePattern parse_pattern(const JsonField& field, const Projector& projector) {
 }
 
 Projector parse_projector(const JsonField& field, GivenCalibration* given) {
-  check_device_keys(field, {"pattern"}, given == nullptr);
+  check_device_keys(field, {"pattern", "color_registration"}, given == nullptr);
   Projector projector;
   parse_device(field, projector, given);
+  if (field.has("color_registration"))
+    projector.color_registration = parse_color_registration(field.at("color_registration"));
   if (!field.has("pattern")) return projector;
   const JsonField pattern = field.at("pattern");
   if (pattern.is_object()) {
@@ -203,9 +222,12 @@ Projector parse_projector(const JsonField& field, GivenCalibration* given) {
 
 Camera parse_camera(const JsonField& field, const std::vector<Projector>& projectors,
                     GivenCalibration* given) {
-  check_device_keys(field, {"color_matrix", "gamma", "role"}, given == nullptr);
+  check_device_keys(field, {"color_matrix", "color_registration", "gamma", "role"},
+                    given == nullptr);
   Camera camera;
   parse_device(field, camera, given);
+  if (field.has("color_registration"))
+    camera.color_registration = parse_color_registration(field.at("color_registration"));
   if (field.has("gamma")) camera.gamma = field.at("gamma").positive();
   if (field.has("role")) {
     if (field.at("role").text() != "texture") field.at("role").fail("must be \"texture\"");
@@ -270,6 +292,16 @@ Json device_to_json(const Device& device, const GivenCalibration& given) {
   return json;
 }
 
+void add_color_registration(const ColorRegistration& registration, Json& device) {
+  for (std::size_t k = 0; k < kColorNames.size(); ++k) {
+    const ColorDisplacement& color = registration.colors[k];
+    if (color.none()) continue;
+    Json& json = device["color_registration"][kColorNames[k]];
+    json["shift_px"] = {color.shift_px.x(), color.shift_px.y()};
+    if (color.scale != 1) json["scale"] = color.scale;
+  }
+}
+
 Json pattern_to_json(const LinePattern& pattern) {
   Json json;
   json["orientation"] = pattern.axis == Axis::kColumn ? "vertical" : "horizontal";
@@ -297,6 +329,7 @@ Json camera_to_json(const Camera& camera, const GivenCalibration& given) {
   } else if (camera.color_matrix) {
     json["color_matrix"] = to_json(*camera.color_matrix);
   }
+  add_color_registration(camera.color_registration, json);
   if (camera.gamma != 1) json["gamma"] = camera.gamma;
   if (camera.sees_texture_only) json["role"] = "texture";
   return json;
@@ -304,6 +337,7 @@ Json camera_to_json(const Camera& camera, const GivenCalibration& given) {
 
 Json projector_to_json(const Projector& projector, const GivenCalibration& given) {
   Json json = device_to_json(projector, given);
+  add_color_registration(projector.color_registration, json);
   if (projector.patterns.size() == 1) {
     json["pattern"] = pattern_to_json(projector.patterns.front());
   } else if (!projector.patterns.empty()) {

@@ -60,6 +60,8 @@ Rig example_rig() {
   rig.projectors[1].patterns = {rows, plain};
   rig.cameras[0].color_matrix = 0.9 * Mat3::Identity();
   rig.cameras[1].color_matrix_by_projector["proj1"] = 0.8 * Mat3::Identity();
+  rig.cameras[0].color_registration.colors[0] = {Vec2(0.3, -1.0 / 3), 1.0001};
+  rig.projectors[1].color_registration.colors[2] = {Vec2(-0.25, 0), 1};
   rig.volume = Sphere{{1, 2, 3}, 1.0 / 3};
   return rig;
 }
@@ -125,6 +127,46 @@ TEST_F(RigFile, RoundTripGivesTheSameDoubles) {
   }
   EXPECT_EQ(back.volume->center, rig.volume->center);
   EXPECT_EQ(back.volume->radius, rig.volume->radius);
+}
+
+TEST_F(RigFile, ColourRegistrationComesBack) {
+  const Rig rig = example_rig();
+  write_rig(rig, folder_ / "rig.json");
+  const Rig back = read_rig(folder_ / "rig.json");
+  const auto expect_same = [](const ColorRegistration& a, const ColorRegistration& b) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      EXPECT_EQ(a.colors[k].shift_px, b.colors[k].shift_px);
+      EXPECT_EQ(a.colors[k].scale, b.colors[k].scale);
+    }
+  };
+  for (std::size_t i = 0; i < rig.cameras.size(); ++i)
+    expect_same(rig.cameras[i].color_registration, back.cameras[i].color_registration);
+  for (std::size_t i = 0; i < rig.projectors.size(); ++i)
+    expect_same(rig.projectors[i].color_registration, back.projectors[i].color_registration);
+}
+
+TEST_F(RigFile, ColourRegistrationIsChecked) {
+  const auto with = [&](const nlohmann::json& value) {
+    return error_after(
+        [&](nlohmann::json& rig) { rig["projectors"][0]["color_registration"] = value; });
+  };
+  EXPECT_EQ(with({{"red", {{"shift_px", {0.5, 0}}}}}), "accepted");
+  EXPECT_THAT(with({{"cyan", {{"shift_px", {0.5, 0}}}}}),
+              ::testing::HasSubstr("projectors[0].color_registration"));
+  EXPECT_THAT(with({{"red", {{"shift_px", {0.5}}}}}), ::testing::HasSubstr("shift_px"));
+  EXPECT_THAT(with({{"red", {{"scale", 1}}}}), ::testing::HasSubstr("shift_px"));
+  EXPECT_THAT(with({{"red", {{"shift_px", {0, 0}}, {"scale", 0}}}}), ::testing::HasSubstr("scale"));
+}
+
+TEST(ColorRegistration, ThereAndBackIsTheSamePixel) {
+  const Device device = example_rig().cameras[0];
+  ColorRegistration registration;
+  registration.colors[0] = {Vec2(0.4, -0.2), 1.001};
+  const Vec2 pixel(17.5, 333);
+  const Vec2 there = registration.of_color(0, device, pixel);
+  EXPECT_GT((there - pixel).norm(), 0.1);
+  EXPECT_LT((registration.from_color(0, device, there) - pixel).norm(), 1e-12);
+  EXPECT_EQ(registration.of_color(1, device, pixel), pixel);
 }
 
 TEST_F(RigFile, OneColourNeedsNoCode) {

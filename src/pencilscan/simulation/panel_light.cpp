@@ -150,4 +150,11 @@ PanelLight gray_code_light(const Projector& projector, const GrayCodeImage& imag
                 film);
 }
 
+PanelLight solid_light(const Projector& projector, const SolidImage& image,
+                       const FilmOptions& film) {
+  return finish(
+      {pixel_profile(Axis::kColumn, projector.width, [&](int) { return to_vec(image.value); })},
+      film);
+}
+
 }  // namespace pencilscan

@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "pencilscan/pattern/gray_code.h"
+#include "pencilscan/pattern/solid_color.h"
 #include "pencilscan/rig/rig.h"
 
 namespace pencilscan {
@@ -56,5 +57,8 @@ struct PanelLight {
 /// One image of a Gray-code sequence, always in panel pixels.
 [[nodiscard]] PanelLight gray_code_light(const Projector& projector, const GrayCodeImage& image,
                                          const FilmOptions& film = {});
+/// An even image; the projector's light is proportional to the image's values.
+[[nodiscard]] PanelLight solid_light(const Projector& projector, const SolidImage& image,
+                                     const FilmOptions& film = {});
 
 }  // namespace pencilscan

@@ -1,5 +1,6 @@
 #include "pencilscan/simulation/render.h"
 
+#include <algorithm>
 #include <atomic>
 #include <cmath>
 
@@ -12,14 +13,12 @@ namespace {
 
 /// A projector as the inner loop needs it.
 struct Lamp {
-  const Device* device;
   Vec3 center;
   double reference_mm;  ///< distance at which the light has its nominal strength
 };
 
 Lamp make_lamp(const Rig& rig, std::size_t projector) {
-  const Device& device = rig.projectors[projector];
-  return {&device, device.center(), reference_distance(rig)};
+  return {rig.projectors[projector].center(), reference_distance(rig)};
 }
 
 /// Reflected share of the light that arrives: everything of the model but M * pattern.
@@ -35,16 +34,65 @@ double reflected(const SimulatedObject& object, const SightedPoint& sample, doub
   return options.exposure * falloff * falloff * value;
 }
 
-/// Calls shade(sample) for each of the rays of a pixel that hits the object.
-template <typename Shade>
-void for_each_hit(const CameraTracer& tracer, int x, int y, int samples, const Shade& shade) {
-  for (int j = 0; j < samples; ++j) {
-    for (int i = 0; i < samples; ++i) {
-      const Vec2 pixel(x + (i + 0.5) / samples - 0.5, y + (j + 0.5) / samples - 0.5);
-      if (const auto sample = tracer.trace(pixel)) shade(*sample);
+/// What a projector shows at a place of its model's panel, of the colours that are 1 and not 0.
+Vec3 shown_at(const Projector& projector, const PanelLight& light, const Vec2& pixel,
+              const Vec2& box_px, const Vec3& colors) {
+  if (projector.color_registration.none()) return light.at(pixel, box_px).cwiseProduct(colors);
+  Vec3 shown = Vec3::Zero();
+  for (std::size_t k = 0; k < 3; ++k) {
+    const auto i = static_cast<Eigen::Index>(k);
+    if (colors[i] != 0)
+      shown[i] = light.at(projector.color_registration.of_color(k, projector, pixel), box_px)[i];
+  }
+  return shown;
+}
+
+/// Rays of one camera through its pixels, of each colour where its lens bends them.
+class PixelRays {
+ public:
+  PixelRays(const Camera& camera, const SimulatedObject& object, int samples)
+      : camera_(camera), tracer_(camera, object), samples_(samples) {}
+
+  /// Calls shade(sample, colors) for every ray of a pixel that hits the object; colors: 1 for those
+  /// of red, green and blue that come along it.
+  template <typename Shade>
+  void for_each_hit(int x, int y, const Shade& shade) const {
+    if (camera_.color_registration.none()) {
+      if (!tracer_.may_hit(x, y)) return;
+      for_each_sample(x, y, [&](const Vec2& pixel) {
+        if (const auto sample = tracer_.trace(pixel)) shade(*sample, Vec3(1, 1, 1));
+      });
+      return;
+    }
+    for (std::size_t k = 0; k < 3; ++k) {
+      const auto bent = [&](const Vec2& pixel) {
+        return camera_.color_registration.from_color(k, camera_, pixel);
+      };
+      const Vec2 middle = bent(Vec2(x, y));
+      const auto near = [](double at, int size) {
+        return std::clamp(static_cast<int>(std::lround(at)), 0, size - 1);
+      };
+      if (!tracer_.may_hit(near(middle.x(), camera_.width), near(middle.y(), camera_.height)))
+        continue;
+      for_each_sample(x, y, [&](const Vec2& pixel) {
+        if (const auto sample = tracer_.trace(bent(pixel)))
+          shade(*sample, Vec3::Unit(static_cast<Eigen::Index>(k)));
+      });
     }
   }
-}
+
+ private:
+  template <typename Visit>
+  void for_each_sample(int x, int y, const Visit& visit) const {
+    for (int j = 0; j < samples_; ++j)
+      for (int i = 0; i < samples_; ++i)
+        visit(Vec2(x + (i + 0.5) / samples_ - 0.5, y + (j + 0.5) / samples_ - 0.5));
+  }
+
+  const Camera& camera_;
+  CameraTracer tracer_;
+  int samples_;
+};
 
 }  // namespace
 
@@ -60,6 +108,7 @@ cv::Mat render_camera(const Rig& rig, std::size_t camera_index, const SimulatedO
   PENCILSCAN_CHECK(lights.size() == rig.projectors.size() && options.samples >= 1);
   const Camera& camera = rig.cameras[camera_index];
   struct Source {
+    const Projector* projector;
     Lamp lamp;
     const PanelLight* light;
     Mat3 color;
@@ -67,24 +116,24 @@ cv::Mat render_camera(const Rig& rig, std::size_t camera_index, const SimulatedO
   std::vector<Source> sources;
   for (std::size_t p = 0; p < lights.size(); ++p) {
     if (!lights[p].on()) continue;
-    sources.push_back(
-        {make_lamp(rig, p), &lights[p], camera.color_matrix_for(rig.projectors[p].name)});
+    sources.push_back({&rig.projectors[p], make_lamp(rig, p), &lights[p],
+                       camera.color_matrix_for(rig.projectors[p].name)});
   }
-  const CameraTracer tracer(camera, object);
+  const PixelRays rays(camera, object, options.samples);
   const double per_ray = 1.0 / (options.samples * options.samples);
   cv::Mat image(camera.height, camera.width, CV_32FC3, cv::Scalar::all(0));
   parallel_for(static_cast<std::size_t>(camera.height), [&](std::size_t row) {
     const int y = static_cast<int>(row);
     for (int x = 0; x < camera.width; ++x) {
-      if (!tracer.may_hit(x, y)) continue;
       Vec3 sum = Vec3::Zero();
-      for_each_hit(tracer, x, y, options.samples, [&](const SightedPoint& sample) {
+      rays.for_each_hit(x, y, [&](const SightedPoint& sample, const Vec3& colors) {
         const double albedo = object.albedo_at(sample.point);
-        sum += Vec3::Constant(options.ambient * albedo);
+        sum += options.ambient * albedo * colors;
         for (const Source& source : sources) {
-          const auto light = incidence(*source.lamp.device, source.lamp.center, sample);
+          const auto light = incidence(*source.projector, source.lamp.center, sample);
           if (!light) continue;
-          const Vec3 shown = source.light->at(light->pixel, light->footprint_px / options.samples);
+          const Vec3 shown = shown_at(*source.projector, *source.light, light->pixel,
+                                      light->footprint_px / options.samples, colors);
           // Two thirds of the rays fall between lines: no shadow ray for those.
           if (shown.isZero(0) ||
               !object.lit(sample.point, sample.face_normal, source.lamp.center)) {
@@ -102,46 +151,76 @@ cv::Mat render_camera(const Rig& rig, std::size_t camera_index, const SimulatedO
   return image;
 }
 
-std::vector<cv::Mat> render_sequence(const Rig& rig, std::size_t camera_index,
-                                     std::size_t projector, const SimulatedObject& object,
-                                     std::span<const PanelLight> sequence,
-                                     const RenderOptions& options) {
+namespace {
+
+/// What a sequence of patterns looks like in so many channels, grey or RGB; empty where no point
+/// that the projector lights is seen.
+std::vector<cv::Mat> render_patterns_of(const Rig& rig, std::size_t camera_index,
+                                        std::size_t projector_index, const SimulatedObject& object,
+                                        std::span<const PanelLight> sequence, bool in_color,
+                                        const RenderOptions& options) {
   PENCILSCAN_CHECK(options.samples >= 1);
   const Camera& camera = rig.cameras[camera_index];
-  const Lamp lamp = make_lamp(rig, projector);
-  const CameraTracer tracer(camera, object);
+  const Projector& projector = rig.projectors[projector_index];
+  const Lamp lamp = make_lamp(rig, projector_index);
+  const PixelRays rays(camera, object, options.samples);
   const double per_ray = 1.0 / (options.samples * options.samples);
+  const Mat3 matrix = camera.color_matrix_for(projector.name);
   // White light seen by a grey camera: the mean response of the three channels.
-  const double response = camera.color_matrix_for(rig.projectors[projector].name).sum() / 3;
+  const double response = matrix.sum() / 3;
   std::vector<cv::Mat> images;
-  for (std::size_t i = 0; i < sequence.size(); ++i) {
-    images.emplace_back(camera.height, camera.width, CV_32FC1, cv::Scalar::all(0));
-  }
+  for (std::size_t i = 0; i < sequence.size(); ++i)
+    images.emplace_back(camera.height, camera.width, in_color ? CV_32FC3 : CV_32FC1,
+                        cv::Scalar::all(0));
+  const auto add = [&](cv::Mat& image, int x, int y, double share, const Vec3& light, bool mixed) {
+    if (!in_color) {
+      image.at<float>(y, x) += static_cast<float>((mixed ? response : 1) * share * light.mean());
+      return;
+    }
+    const Vec3 seen = share * (mixed ? matrix * light : light);
+    image.at<cv::Vec3f>(y, x) += cv::Vec3f(
+        static_cast<float>(seen.x()), static_cast<float>(seen.y()), static_cast<float>(seen.z()));
+  };
   std::atomic<bool> any = false;
   parallel_for(static_cast<std::size_t>(camera.height), [&](std::size_t row) {
     const int y = static_cast<int>(row);
     for (int x = 0; x < camera.width; ++x) {
-      if (!tracer.may_hit(x, y)) continue;
-      for_each_hit(tracer, x, y, options.samples, [&](const SightedPoint& sample) {
+      rays.for_each_hit(x, y, [&](const SightedPoint& sample, const Vec3& colors) {
         const double albedo = object.albedo_at(sample.point);
         if (options.ambient > 0) {
-          const auto even = static_cast<float>(per_ray * options.ambient * albedo);
-          for (cv::Mat& image : images) image.at<float>(y, x) += even;
+          for (cv::Mat& image : images)
+            add(image, x, y, per_ray * options.ambient * albedo, colors, false);
         }
-        const auto light = incidence(*lamp.device, lamp.center, sample);
+        const auto light = incidence(projector, lamp.center, sample);
         if (!light || !object.lit(sample.point, sample.face_normal, lamp.center)) return;
         any = true;
-        const double share =
-            per_ray * response * reflected(object, sample, albedo, lamp, *light, options);
-        for (std::size_t i = 0; i < sequence.size(); ++i) {
-          const Vec3 shown = sequence[i].at(light->pixel, light->footprint_px / options.samples);
-          images[i].at<float>(y, x) += static_cast<float>(share * shown.mean());
-        }
+        const double share = per_ray * reflected(object, sample, albedo, lamp, *light, options);
+        for (std::size_t i = 0; i < sequence.size(); ++i)
+          add(images[i], x, y, share,
+              shown_at(projector, sequence[i], light->pixel, light->footprint_px / options.samples,
+                       colors),
+              true);
       });
     }
   });
   if (!any) images.clear();
   return images;
+}
+
+}  // namespace
+
+std::vector<cv::Mat> render_sequence(const Rig& rig, std::size_t camera, std::size_t projector,
+                                     const SimulatedObject& object,
+                                     std::span<const PanelLight> sequence,
+                                     const RenderOptions& options) {
+  return render_patterns_of(rig, camera, projector, object, sequence, false, options);
+}
+
+std::vector<cv::Mat> render_color_sequence(const Rig& rig, std::size_t camera,
+                                           std::size_t projector, const SimulatedObject& object,
+                                           std::span<const PanelLight> sequence,
+                                           const RenderOptions& options) {
+  return render_patterns_of(rig, camera, projector, object, sequence, true, options);
 }
 
 }  // namespace pencilscan

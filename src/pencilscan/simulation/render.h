@@ -18,7 +18,8 @@ namespace pencilscan {
 /// projectors from the centre of the working volume (equal lamps, nominal strength there), h the
 /// half-way vector (Blinn 1977), M the rig's colour matrix of the camera for that projector. One
 /// pixel is the mean over samples x samples rays; the pattern under each ray is averaged over the
-/// ray's own footprint.
+/// ray's own footprint. Where the rig states a color_registration, each colour of light has rays of
+/// its own, bent by the camera's lens, and comes from its own place of the panel.
 struct RenderOptions {
   int samples = 3;             ///< rays per pixel and axis, >= 1
   double exposure = 0.55;      ///< image value of a white, facing surface at the volume's centre
@@ -44,5 +45,11 @@ struct RenderOptions {
                                                    const SimulatedObject& object,
                                                    std::span<const PanelLight> sequence,
                                                    const RenderOptions& options = {});
+/// The same in colour, CV_32FC3 RGB.
+[[nodiscard]] std::vector<cv::Mat> render_color_sequence(const Rig& rig, std::size_t camera,
+                                                         std::size_t projector,
+                                                         const SimulatedObject& object,
+                                                         std::span<const PanelLight> sequence,
+                                                         const RenderOptions& options = {});
 
 }  // namespace pencilscan

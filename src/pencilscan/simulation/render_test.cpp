@@ -287,6 +287,60 @@ TEST(RenderSequence, GrayCodesDecodeToTheProjectedPixel) {
   EXPECT_GT(decoded, 300);
 }
 
+TEST(RenderCamera, ALensMovesTheLightOfOneColour) {
+  Rig rig = pair_rig();
+  const SimulatedObject object(board(), flat_shading());
+  const cv::Mat plain = render_camera(rig, 0, object, line_lights(rig));
+  rig.cameras[0].color_registration.colors[2].shift_px = Vec2(2, -1);
+  const cv::Mat moved = render_camera(rig, 0, object, line_lights(rig));
+  const cv::Rect inside(30, 30, 140, 90);
+  std::vector<cv::Mat> before, after;
+  cv::split(plain(inside), before);
+  cv::split(moved(inside + cv::Point(2, -1)), after);
+  EXPECT_LT(cv::norm(before[2], after[2], cv::NORM_INF), 1e-5);  // whole pixels: the same rays
+  cv::split(moved(inside), after);
+  EXPECT_LT(cv::norm(before[1], after[1], cv::NORM_INF), 1e-5);
+  EXPECT_GT(cv::norm(before[2], after[2], cv::NORM_INF), 0.1);
+}
+
+TEST(RenderCamera, APanelMovesTheLinesOfOneColour) {
+  Rig rig = pair_rig();
+  rig.projectors[0].patterns[0].colors = {"blue"};
+  rig.projectors[0].patterns[0].alphabet = 1;
+  rig.projectors[0].patterns[0].sequence = {0};
+  Rig shifted = rig;
+  const SimulatedObject object(board(), flat_shading());
+  rig.projectors[0].color_registration.colors[2].shift_px = Vec2(1.5, 0);
+  // Blue of panel column q lies where the model has q - 1.5.
+  shifted.projectors[0].patterns[0].offset_px -= 1.5;
+  const cv::Mat a = render_camera(rig, 0, object, line_lights(rig));
+  const cv::Mat b = render_camera(shifted, 0, object, line_lights(shifted));
+  EXPECT_LT(cv::norm(a(cv::Rect(20, 20, 160, 110)), b(cv::Rect(20, 20, 160, 110)), cv::NORM_INF),
+            1e-5);
+}
+
+TEST(RenderSequence, InColourIsWhatTheCameraSeesOfEachColour) {
+  Rig rig = pair_rig();
+  Mat3 leaky;
+  leaky << 0.9, 0.1, 0, 0.05, 0.9, 0.05, 0, 0.1, 0.9;
+  rig.cameras[0].color_matrix = leaky;
+  const SimulatedObject object(board(), flat_shading());
+  const std::vector<PanelLight> lights{line_light(rig.projectors[0]),
+                                       solid_light(rig.projectors[0], {"red", {1, 0, 0}})};
+  const auto color = render_color_sequence(rig, 0, 0, object, lights);
+  const auto grey = render_sequence(rig, 0, 0, object, std::vector{uniform_light()});
+  ASSERT_EQ(color.size(), 2U);
+  const cv::Mat frame = render_camera(rig, 0, object, line_lights(rig));
+  EXPECT_LT(cv::norm(color[0], frame, cv::NORM_INF), 1e-5);
+  for (const cv::Point at : {cv::Point(80, 70), cv::Point(120, 90)}) {
+    const auto red = color[1].at<cv::Vec3f>(at);
+    const float light = grey[0].at<float>(at);
+    EXPECT_NEAR(red[0], 0.9 * light, 1e-4);
+    EXPECT_NEAR(red[1], 0.05 * light, 1e-4);
+    EXPECT_NEAR(red[2], 0, 1e-6);
+  }
+}
+
 TEST(RenderSequence, IsEmptyWhereTheCameraSeesNoLitPoint) {
   Rig rig = pair_rig();
   rig.projectors[0] = small_projector({-1000, 0, 0});  // behind the board
