@@ -7,6 +7,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "pencilscan/calibration/board_dictionary.h"
+#include "pencilscan/calibration/local_map.h"
 #include "pencilscan/core/error.h"
 
 namespace pencilscan {
@@ -110,10 +111,25 @@ void BoardFinder::look(std::size_t capture, std::size_t camera, const cv::Mat& i
   }
 }
 
-std::vector<BoardView> BoardFinder::views() const {
+void BoardFinder::project(std::size_t capture, std::size_t camera, std::size_t projector,
+                          const DecodedView& decoded) {
+  constexpr std::size_t kFewest = 8;
+  const auto seen = corners_.find({capture, camera});
+  if (seen == corners_.end()) return;
+  std::vector<BoardCorner> corners;
+  for (const BoardCorner& corner : seen->second) {
+    const auto map = LocalMap::fit(decoded, static_cast<int>(std::lround(corner.pixel.x())),
+                                   static_cast<int>(std::lround(corner.pixel.y())));
+    if (map) corners.push_back({corner.column, corner.row, map->panel_from_camera(corner.pixel)});
+  }
+  std::vector<BoardCorner>& best = projected_[{capture, projector}];
+  if (corners.size() >= kFewest && corners.size() > best.size()) best = std::move(corners);
+}
+
+std::vector<BoardView> BoardFinder::views_of(const Corners& all) const {
   constexpr double kCornerSigmaPx = 0.1;
   std::vector<BoardView> views;
-  for (const auto& [key, corners] : corners_)
+  for (const auto& [key, corners] : all)
     for (const BoardCorner& corner : corners)
       views.push_back({key.first,
                        board_.square_mm * Vec2(corner.column, corner.row),

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "pencilscan/calibration/bundle.h"
+#include "pencilscan/calibration/gray_decode.h"
 
 namespace pencilscan {
 
@@ -55,13 +56,24 @@ class BoardFinder {
 
   /// Looks for the board in a camera's image of a capture, unless all of it was found before.
   void look(std::size_t capture, std::size_t camera, const cv::Mat& image);
-  /// All corners; the capture is the placing of the board.
-  [[nodiscard]] std::vector<BoardView> views() const;
+  /// Where a projector (a device of the rig) has the corners that a camera found in a capture:
+  /// the panel coordinates at the corners' pixels (D. Moreno, G. Taubin, "Simple, accurate, and
+  /// robust projector-camera calibration", 3DIMPVT 2012). The camera that sees most of them counts.
+  void project(std::size_t capture, std::size_t camera, std::size_t projector,
+               const DecodedView& decoded);
+  /// All corners that cameras found; the capture is the placing of the board.
+  [[nodiscard]] std::vector<BoardView> views() const { return views_of(corners_); }
+  /// The same of projectors.
+  [[nodiscard]] std::vector<BoardView> projected_views() const { return views_of(projected_); }
   [[nodiscard]] std::size_t found() const { return corners_.size(); }
 
  private:
+  using Corners = std::map<std::pair<std::size_t, std::size_t>, std::vector<BoardCorner>>;
+  [[nodiscard]] std::vector<BoardView> views_of(const Corners& corners) const;
+
   CalibrationBoard board_;
-  std::map<std::pair<std::size_t, std::size_t>, std::vector<BoardCorner>> corners_;
+  Corners corners_;    ///< by capture and camera
+  Corners projected_;  ///< by capture and projector
 };
 
 }  // namespace pencilscan

@@ -11,6 +11,7 @@
 #include <opencv2/core/eigen.hpp>
 #include <opencv2/imgproc.hpp>
 #include <optional>
+#include <set>
 
 #include "pencilscan/calibration/board_corners.h"
 #include "pencilscan/calibration/priors.h"
@@ -357,6 +358,16 @@ void attach_boards(const CalibrationInput& input, BundleProblem& problem) {
     has_pose[s.sighting.board] = 1;
   }
   std::erase_if(problem.board_views, [&](const BoardView& v) { return has_pose[v.board] == 0; });
+}
+
+void add_projected_corners(const CalibrationInput& input, BundleProblem& problem) {
+  std::set<std::size_t> placed;
+  for (const BoardView& v : problem.board_views) placed.insert(v.board);
+  for (const BoardView& v : input.projected_corners)
+    if (placed.contains(v.board) && problem.devices[v.view.device].present)
+      problem.board_views.push_back(v);
+  for (const Sighting& s : sightings_of(problem.board_views))
+    if (s.device >= input.rig.cameras.size()) agree_on_end(s, problem);
 }
 
 void rescale_to_boards(BundleProblem& problem) {

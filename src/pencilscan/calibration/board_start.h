@@ -21,6 +21,10 @@ void place_by_boards(const CalibrationInput& input, const std::vector<char>& kno
 /// afterwards where none has enough of them.
 void attach_boards(const CalibrationInput& input, BundleProblem& problem);
 
+/// Adds projectors' views of boards that have poses: where a projector is part of the rig, the
+/// board ties it to what the camera sees of it, size and all.
+void add_projected_corners(const CalibrationInput& input, BundleProblem& problem);
+
 /// The same once more for an adjusted structure, where every board is seen by one device only: then
 /// nothing in the adjustment ties the structure's scale to the board's.
 void rescale_to_boards(BundleProblem& problem);

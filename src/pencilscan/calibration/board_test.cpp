@@ -68,6 +68,51 @@ TEST(Board, CornersAreFoundToATenthOfAPixelUnderPerspective) {
   EXPECT_TRUE(find_board(cv::Mat(480, 640, CV_32F, cv::Scalar(0.5)), kBoard).empty());
 }
 
+/// The board under Gray codes: what falls on it is weighed by black and white, then blurred.
+TEST(Board, ProjectorsHaveCornersWhereCamerasFindThem) {
+  constexpr int kCell = 40;
+  constexpr int kPanel = 512;
+  const cv::Matx33d view(0.9, 0.1, 60, -0.05, 0.85, 60, 1e-4, 1e-4, 1);
+  cv::Mat board;
+  cv::warpPerspective(flat_board(kCell), board, view, {640, 480}, cv::INTER_AREA);
+  const auto panel_at = [](double u, double v) {
+    return Vec2(30 + 0.7 * u + 0.05 * v, 40 - 0.04 * u + 0.75 * v);
+  };
+  const auto sequence = gray_code_sequence(kPanel, kPanel);
+  const auto image = [&](std::size_t number) {
+    const GrayCodeImage& shown = sequence[number];
+    cv::Mat light(board.size(), CV_32F);
+    for (int v = 0; v < light.rows; ++v) {
+      for (int u = 0; u < light.cols; ++u) {
+        const double x = panel_at(u, v)[shown.axis == Axis::kColumn ? 0 : 1];
+        const int i = static_cast<int>(std::floor(x));
+        const auto value = [&](int k) { return shown.bright(k) ? 1.0 : 0.0; };
+        light.at<float>(v, u) = static_cast<float>((i + 1 - x) * value(i) + (x - i) * value(i + 1));
+      }
+    }
+    cv::Mat seen = light.mul(board) + 0.02;
+    cv::GaussianBlur(seen, seen, {}, 0.8);
+    return seen;
+  };
+  const GrayStack stack = make_gray_stack(kPanel, kPanel, true, image);
+  BoardFinder finder(kBoard);
+  finder.look(3, 1, stack.white);
+  finder.project(3, 1, 7, decode_gray_stack(stack));
+  const auto corners = finder.views();
+  const auto projected = finder.projected_views();
+  ASSERT_EQ(corners.size(), 63U);
+  ASSERT_EQ(projected.size(), 63U);
+  double worst = 0;
+  for (std::size_t i = 0; i < projected.size(); ++i) {
+    EXPECT_EQ(projected[i].board, 3U);
+    EXPECT_EQ(projected[i].view.device, 7U);
+    EXPECT_EQ(projected[i].position_mm, corners[i].position_mm);
+    const Vec2 pixel = corners[i].view.pixel;
+    worst = std::max(worst, (projected[i].view.pixel - panel_at(pixel.x(), pixel.y())).norm());
+  }
+  EXPECT_LT(worst, 0.1);
+}
+
 /// On a white margin of one square, inner corners at ((column + 2) cell - 0.5).
 cv::Mat with_margin(const cv::Mat& bytes, int cell) {
   cv::Mat image(bytes.rows + 2 * cell, bytes.cols + 2 * cell, CV_32F, cv::Scalar(0.8));
@@ -237,6 +282,35 @@ TEST_F(OnBoard, ABentBoardErrsWithinItsDeviations) {
     EXPECT_LT(std::abs(result.problem.devices[0].inner[i] - truth), 3 * sigma.devices[0].inner[i]);
   // Corners good to a tenth of a pixel would say 0.2 % if the board were flat.
   EXPECT_GT(sigma.devices[0].inner[kFx], 0.003 * 1500);
+}
+
+TEST_F(OnBoard, ABoardThatTheProjectorSeesTooTiesItToTheCamera) {
+  const RigidTransform board = placing(0.5, -0.5);
+  add_capture(board);
+  for (int i = 0; i < 500; ++i)  // a wall 100 mm behind the board
+    add_track(board * Vec3(random_.uniform(-100, 340), random_.uniform(-100, 280), -100), 0);
+  const auto judged = [&] {
+    const CalibrationResult result = calibrated();
+    EXPECT_TRUE(result.solved);
+    const Uncertainty sigma = uncertainty(result.problem, result.free_inner,
+                                          BundleOptions{}.loss_scale, result.extra_sigma_px);
+    return std::pair(result, sigma);
+  };
+  const Uncertainty without = judged().second;
+  for (int i = kBoard.columns * kBoard.rows; i-- > 0;) {
+    const Vec2 at = kBoard.square_mm * Vec2(i % kBoard.columns, i / kBoard.columns);
+    const int k = kBoard.columns * kBoard.rows - 1 - i;  // numbered from the other end
+    const Vec2 shown = kBoard.square_mm * Vec2(k % kBoard.columns, k / kBoard.columns);
+    const Vec3 x = board * Vec3(at.x(), at.y(), 0);
+    input_.projected_corners.push_back(
+        {0, shown, {1, *truth_.projectors[0].project(x) + noise(0.1), 0.1}});
+  }
+  const auto [result, sigma] = judged();
+  EXPECT_EQ(result.problem.board_views.size(), 126U);
+  EXPECT_LT(result.board_rms_px, 0.25);
+  EXPECT_NEAR(distance(result.rig) / distance(truth_), 1, 0.05);  // hangs on the focal lengths
+  EXPECT_LT(std::abs(result.rig.projectors[0].K(0, 0) - 1300), 3 * sigma.devices[1].inner[kFx]);
+  EXPECT_LT(sigma.volume_median, 0.7 * without.volume_median);
 }
 
 TEST_F(OnBoard, FivePosesGiveFocalLengthsAndScale) {

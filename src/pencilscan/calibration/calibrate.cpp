@@ -82,6 +82,7 @@ class Calibration {
     epipolar_outliers_ = before - views();
     candidates_ = result_.problem.tracks;
     if (!find_structure()) return finish(false);
+    add_projected_corners(input_, result_.problem);
     refine();
     keep_given_values();
     last_stage();

@@ -23,8 +23,9 @@ struct CalibrationInput {
   std::vector<GivenCalibration> known;  ///< per device, cameras first
   std::vector<Track> tracks;            ///< of all captures
   std::optional<KnownDistance> distance;
-  std::vector<BoardView> board_views;  ///< corners of a board; their mm give the scale
-  std::size_t boards = 0;              ///< placings of the board
+  std::vector<BoardView> board_views;        ///< corners of a board; their mm give the scale
+  std::vector<BoardView> projected_corners;  ///< the same of projectors, by what cameras see
+  std::size_t boards = 0;                    ///< placings of the board
 };
 
 struct CalibrateOptions {

@@ -68,6 +68,8 @@ DecodeSummary decode_pair(const CapturePair& pair, std::size_t capture, const Ri
   const std::size_t before = tracks.samples();
   tracks.add(capture, pair.camera, pair.projector, view);
   colors.add(pair, view);
+  if (boards != nullptr)
+    boards->project(capture, pair.camera, rig.cameras.size() + pair.projector, view);
   summary.samples = tracks.samples() - before;
   return summary;
 }
@@ -145,6 +147,7 @@ void run_calibrate(const CalibrateCommand& command) {
   input.tracks = tracks.tracks();
   if (boards) {
     input.board_views = boards->views();
+    input.projected_corners = boards->projected_views();
     input.boards = command.captures.size();
     if (boards->found() == 0)
       findings.push_back({Grade::kDoubtful,
