@@ -19,6 +19,7 @@ struct ConsistencyOptions {
 
 struct ConsistencyReport {
   double sigma_scale = 1;        ///< by which the cameras' disagreement exceeds what sigma says
+  double sigma_factor = 1;       ///< by which sigma was widened: errors that all share, too
   std::size_t contradicted = 0;  ///< nodes removed
   std::size_t unconfirmed = 0;   ///< nodes of one projector removed, as no one confirms them
   std::size_t islands = 0;       ///< nodes removed as small islands

@@ -79,6 +79,18 @@ void mark_saturated(const CameraLight& light, int half, DepthMap& map) {
   }
 }
 
+/// The tangent plane of a surface point as inverse depth around a pixel.
+Quadric tangent_plane(const Camera& camera, const Vec3& point, const Vec3& normal, int half) {
+  const Vec3 x = camera.device_from_world * point;
+  const Vec3 n = camera.device_from_world.rotation * normal;
+  const Vec3 w_of_ray = n / n.dot(x);  // w = w_of_ray . (x, y, 1)
+  Quadric q = Quadric::Zero();
+  q[0] = 1 / x.z();
+  q[1] = half * w_of_ray[0] / camera.K(0, 0);
+  q[2] = half * w_of_ray[1] / camera.K(1, 1);
+  return q;
+}
+
 double cost(const WindowFit& fit) { return static_cast<double>(fit.misfit); }
 
 }  // namespace
@@ -241,6 +253,31 @@ DepthMap dense_depth(const CameraLight& light, int camera, std::span<const Measu
   }
   mark_saturated(light, options.half, map);
   return map;
+}
+
+std::size_t complete_map(const CameraLight& light, const RayScene& surface, const Sphere& volume,
+                         double sigma_factor, const DepthOptions& options, DepthMap& map) {
+  constexpr float kConfidence = 0.9F;  // of rendered objects' nodes, 97 % or more are right
+  const Camera& camera = *light.camera;
+  WindowFitter fitter(light, options.half);
+  std::size_t found = 0;
+  for (std::size_t i = 0; i < map.nodes.size(); ++i) {
+    if (map.nodes[i].measured()) continue;
+    const Vec2 pixel = map.pixel(i);
+    const auto hit = surface.first_hit(camera.ray(pixel));
+    if (!hit) continue;
+    const Vec3 normal = face_normal(surface.mesh(), hit->face);
+    const Quadric start = tangent_plane(camera, hit->point, normal, options.half);
+    const auto fit = fitter.fit(pixel, start, 5);
+    if (!fit || !acceptable(light, pixel, *fit, volume, options.half, options)) continue;
+    const double move = (camera.point_at_depth(pixel, 1 / fit->q[0]) - hit->point).norm();
+    if (move > options.max_move_mm) continue;
+    map.nodes[i] = node_of(*fit, options.half);
+    map.nodes[i].sigma *= static_cast<float>(sigma_factor);
+    map.nodes[i].confidence = kConfidence;
+    ++found;
+  }
+  return found;
 }
 
 }  // namespace pencilscan

@@ -6,6 +6,7 @@
 #include "pencilscan/depth/depth_map.h"
 #include "pencilscan/depth/window_fit.h"
 #include "pencilscan/detection/color_family.h"
+#include "pencilscan/geometry/ray_scene.h"
 #include "pencilscan/io/point_file.h"
 
 namespace pencilscan {
@@ -18,6 +19,7 @@ struct DepthOptions {
   double max_relative_residual = 0.25;
   double max_sigma_lines = 0.08;  ///< of the best pattern
   double min_cosine = 0.2;        ///< of the incidence to the camera
+  double max_move_mm = 1;         ///< of a node that is started from the closed surface
 };
 
 /// Light as one camera sees it, blur and noise measured from the image itself at the seeds.
@@ -30,5 +32,11 @@ struct DepthOptions {
 [[nodiscard]] DepthMap dense_depth(const CameraLight& light, int camera,
                                    std::span<const MeasuredPoint> points, const Sphere& volume,
                                    const DepthOptions& options);
+
+/// Fits the windows of nodes without depth whose rays meet `surface`, starting from its tangent
+/// plane there, and keeps those that stay near it: a surface that is off by a line does not. Their
+/// sigma is widened by `sigma_factor`. Returns the number of nodes that found their depth.
+std::size_t complete_map(const CameraLight& light, const RayScene& surface, const Sphere& volume,
+                         double sigma_factor, const DepthOptions& options, DepthMap& map);
 
 }  // namespace pencilscan

@@ -50,16 +50,16 @@ DepthResult measure_depth(const Rig& rig, const std::vector<ColorFamily>& famili
   }
   const Sphere volume = working_volume(rig);
   result.maps.resize(cameras.size());
-  std::vector<double> blur(cameras.size());
+  result.lights.resize(cameras.size());
   parallel_for(cameras.size(), [&](std::size_t i) {
     const std::size_t c = cameras[i];
     const Camera& camera = rig.cameras[c];
     const cv::Mat rgb = projector_light(camera, linearized(images[c], camera.gamma), unmixings[c]);
     std::vector<cv::Mat> presence;
     for (const ColorFamily& family : families) presence.push_back(presence_image(rgb, family));
-    const CameraLight light = measure_light(rig, static_cast<int>(c), families, std::move(presence),
-                                            unsaturated(images[c]), points, options.depth);
-    blur[i] = static_cast<double>(light.blur_px);
+    CameraLight& light = result.lights[i];
+    light = measure_light(rig, static_cast<int>(c), families, std::move(presence),
+                          unsaturated(images[c]), points, options.depth);
     result.maps[i] = dense_depth(light, static_cast<int>(c), points, volume, options.depth);
   });
   result.report.seconds_depth = watch.seconds();
@@ -72,9 +72,25 @@ DepthResult measure_depth(const Rig& rig, const std::vector<ColorFamily>& famili
   result.report.consistency =
       check_consistency(rig, pattern_projector, result.maps, options.consistency);
   for (std::size_t i = 0; i < cameras.size(); ++i)
-    result.report.cameras.push_back(camera_report(result.maps[i], blur[i]));
+    result.report.cameras.push_back(
+        camera_report(result.maps[i], static_cast<double>(result.lights[i].blur_px)));
   result.report.seconds_consistency = consistency_watch.seconds();
   return result;
+}
+
+void complete_depth(const Rig& rig, const RayScene& surface, const DepthStageOptions& options,
+                    DepthResult& result) {
+  PENCILSCAN_CHECK(result.lights.size() == result.maps.size());
+  const Sphere volume = working_volume(rig);
+  std::vector<std::size_t> found(result.maps.size());
+  parallel_for(result.maps.size(), [&](std::size_t i) {
+    found[i] = complete_map(result.lights[i], surface, volume,
+                            result.report.consistency.sigma_factor, options.depth, result.maps[i]);
+  });
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    result.report.completed += found[i];
+    result.report.cameras[i].measured += found[i];
+  }
 }
 
 }  // namespace pencilscan

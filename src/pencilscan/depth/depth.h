@@ -8,6 +8,7 @@
 #include "pencilscan/depth/consistency.h"
 #include "pencilscan/depth/dense_depth.h"
 #include "pencilscan/detection/unmix.h"
+#include "pencilscan/geometry/ray_scene.h"
 
 namespace pencilscan {
 
@@ -28,13 +29,15 @@ struct CameraDepthReport {
 struct DepthReport {
   std::vector<CameraDepthReport> cameras;
   ConsistencyReport consistency;
+  std::size_t completed = 0;  ///< nodes found from the closed surface
   double seconds_depth = 0;
   double seconds_consistency = 0;
   std::vector<std::string> warnings;
 };
 
 struct DepthResult {
-  std::vector<DepthMap> maps;  ///< one per camera with an image, in the rig's order
+  std::vector<DepthMap> maps;       ///< one per camera with an image, in the rig's order
+  std::vector<CameraLight> lights;  ///< one per map; they point to the rig's cameras
   DepthReport report;
 };
 
@@ -47,5 +50,12 @@ struct DepthResult {
                                         std::span<const Unmixing> unmixings,
                                         std::span<const MeasuredPoint> points,
                                         const DepthStageOptions& options = {});
+
+/// Nodes without depth look once more where the closed surface says that they should: growth does
+/// not get there across a gap, and patches that nobody confirmed agree with it now or stay out.
+/// Adds to the maps of `result` what the images bear out (dense_depth.h); `surface`: mesh in mm,
+/// world.
+void complete_depth(const Rig& rig, const RayScene& surface, const DepthStageOptions& options,
+                    DepthResult& result);
 
 }  // namespace pencilscan

@@ -200,6 +200,38 @@ TEST(DenseDepth, BallIsDenseAndAccurate) {
   }
 }
 
+TEST(DenseDepth, ASurfaceNearbyGivesDepthBackAndOneThatIsOffDoesNot) {
+  const BallScene& scene = ball_scene();
+  DepthResult result = scene.measure();
+  DepthMap& map = result.maps[0];
+  std::vector<std::size_t> hole;
+  for (std::size_t i = 0; i < map.nodes.size(); ++i) {
+    if (!map.nodes[i].measured() || (map.pixel(i) - Vec2(125, 100)).norm() > 20) continue;
+    map.nodes[i] = DepthNode{};
+    hole.push_back(i);
+  }
+  ASSERT_GT(hole.size(), 30u);
+  const auto found_of_hole = [&](double radius_mm) {
+    DepthResult completed = result;
+    complete_depth(scene.rig, RayScene(make_sphere(radius_mm, 96)), {}, completed);
+    std::size_t found = 0;
+    for (const std::size_t i : hole) {
+      const DepthNode& node = completed.maps[0].nodes[i];
+      if (!node.measured()) continue;
+      ++found;
+      const Vec2 pixel = map.pixel(i);
+      const double z =
+          scene.truth[0].depth.at<double>(static_cast<int>(pixel[1]), static_cast<int>(pixel[0]));
+      EXPECT_NEAR(1 / static_cast<double>(node.w), z, 0.5);
+      EXPECT_GT(node.sigma, 0);
+      EXPECT_GT(node.confidence, 0);
+    }
+    return found;
+  };
+  EXPECT_GE(found_of_hole(42.3), hole.size() * 9 / 10);
+  EXPECT_EQ(found_of_hole(45), 0u);
+}
+
 TEST(DenseDepth, BlurIsFound) {
   const DepthResult result = ball_scene().measure();
   // Sensor 0.6 px and the pixel's own box, 0.29 px.

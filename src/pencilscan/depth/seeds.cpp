@@ -14,6 +14,7 @@ constexpr double kSteepest = 3.5;  // mm of depth per mm across: an incidence of
 struct Offset {
   double x, y;  ///< dx / half
   double w, sigma_w, distance;
+  double variance = 0, weight = 0;  ///< of w; its inverse, less with the distance
 };
 
 /// Plane through `points`, reweighted against outliers; clears those of another surface.
@@ -26,21 +27,32 @@ std::optional<Quadric> robust_plane(std::vector<Offset>& points, double mm_per_h
   const double steep = mm_per_half * w0 * w0;
   Vec3 c(w0, 0, 0);
   const double scale = 0.4 * w0 * w0;  // 0.4 mm
+  for (Offset& p : points) {
+    p.variance = p.sigma_w * p.sigma_w + 1e-2 * scale * scale;
+    p.weight = 1 / (p.variance * (0.1 + p.distance * p.distance));
+  }
   for (int round = 0; round < 4; ++round) {
-    Mat3 A = Mat3::Zero();
+    double xx = 0, xy = 0, yy = 0, x = 0, y = 0, n = 0;
     Vec3 b = Vec3::Zero();
     for (const Offset& p : points) {
-      const Vec3 row(1, p.x, p.y);
-      const double r = p.w - c.dot(row);
+      const double r = p.w - (c[0] + c[1] * p.x + c[2] * p.y);
       // At first a point may be as far off as a steep surface takes it, and no farther.
-      const double s2 = p.sigma_w * p.sigma_w + 1e-2 * scale * scale;
       if (std::abs(r) > kSteepest * steep * p.distance + 4 * scale + 4 * p.sigma_w) continue;
       const double wide = round == 0 ? steep * p.distance + scale : scale;
-      const double outlying = 1 + r * r / (wide * wide + 9 * s2);
-      const double weight = 1 / s2 / (outlying * outlying) / (0.1 + p.distance * p.distance);
-      A += weight * row * row.transpose();
-      b += weight * p.w * row;
+      const double share = wide * wide + 9 * p.variance;
+      const double inlying = share / (share + r * r);
+      const double weight = p.weight * inlying * inlying;
+      const double wx = weight * p.x, wy = weight * p.y;
+      n += weight;
+      x += wx;
+      y += wy;
+      xx += wx * p.x;
+      xy += wx * p.y;
+      yy += wy * p.y;
+      b += p.w * Vec3(weight, wx, wy);
     }
+    Mat3 A;
+    A << n, x, y, x, xx, xy, y, xy, yy;
     const double ridge = 1 / (steep * steep);
     A(1, 1) += ridge;
     A(2, 2) += ridge;

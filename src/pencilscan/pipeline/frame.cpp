@@ -204,8 +204,11 @@ ShapeResult measure_shape(const Rig& stated, const Frame& frame, const PointResu
       if (view.is_plain) continue;
       silhouettes.push_back(silhouette(view.camera, view.image, line_reach_px(rig, camera)));
     }
-    result.surface =
-        fuse_depth(rig, points.points, result.depth.maps, options.fusion, {}, silhouettes);
+    const std::vector<DepthMap>& maps = result.depth.maps;
+    result.surface = close_depth(rig, maps, options.fusion, silhouettes);
+    complete_depth(rig, RayScene(result.surface.mesh), options.depth, result.depth);
+    result.depth.lights.clear();
+    follow_depth(rig, points.points, maps, options.fusion, result.surface);
     result.times.push_back({"surface", surface_watch.seconds()});
     if (result.surface.report.status != SurfaceStatus::kTooFewPoints) {
       const Stopwatch hole_watch;

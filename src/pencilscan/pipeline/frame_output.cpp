@@ -98,6 +98,7 @@ ordered_json depth_report(const Rig& rig, const DepthReport& depth, const HoleRe
   ordered_json report;
   report["sigma_scale"] = number(depth.consistency.sigma_scale);
   report["nodes_unconfirmed"] = depth.consistency.unconfirmed;
+  report["nodes_completed"] = depth.completed;
   report["nodes_contradicted"] = depth.consistency.contradicted;
   report["nodes_in_small_islands"] = depth.consistency.islands;
   report["cameras"] = ordered_json::array();

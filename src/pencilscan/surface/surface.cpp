@@ -194,54 +194,59 @@ SurfaceResult reconstruct_surface(const Rig& rig, std::span<const MeasuredPoint>
   return result;
 }
 
-SurfaceResult fuse_depth(const Rig& rig, std::span<const MeasuredPoint> points,
-                         std::span<const DepthMap> maps, const FusionOptions& options,
-                         const Progress& progress, std::span<const Silhouette> silhouettes) {
+SurfaceResult close_depth(const Rig& rig, std::span<const DepthMap> maps,
+                          const FusionOptions& options, std::span<const Silhouette> silhouettes) {
   PENCILSCAN_CHECK(options.max_depth >= 5 && options.max_depth <= 10);
   PENCILSCAN_CHECK(options.cell_spacings > 0 && options.fit_spacings > 0);
-  const auto tell = [&](double fraction) {
-    if (progress) progress("surface", fraction);
-  };
   const Stopwatch watch;
   SurfaceResult result;
   SurfaceReport& report = result.report;
   std::vector<SurfaceSample> samples = dense_samples(rig, maps, report.spacing_mm);
-  report.points = points.size();
   report.samples = report.samples_used = samples.size();
-  result.used.assign(points.size(), 0);
   if (samples.size() < kLeastSamples) {
     report.status = SurfaceStatus::kTooFewPoints;
     report.warnings.push_back("too few depths for a surface: " + std::to_string(samples.size()));
     report.seconds = watch.seconds();
     return result;
   }
-  const double spacing = report.spacing_mm;
-  result.used = points_on_maps(rig, points, maps, spacing);
-  for (const char used : result.used) report.points_used += static_cast<std::size_t>(used);
-  fit_local_surfaces(samples, options.fit_spacings * spacing);
+  fit_local_surfaces(samples, options.fit_spacings * report.spacing_mm);
   report.seconds_filter = watch.seconds();
-  tell(0.3);
   const Stopwatch poisson_watch;
   ClosingOptions closing;
-  closing.spacing_mm = spacing;
-  closing.cell_mm = options.cell_spacings * spacing;
+  closing.spacing_mm = report.spacing_mm;
+  closing.cell_mm = options.cell_spacings * report.spacing_mm;
   closing.max_depth = options.max_depth;
   closing.reach_spacings = options.reach_spacings;
   closing.min_component_share = options.min_component_share;
   take(closed_surface(samples, closing), result);
   report.seconds_poisson = poisson_watch.seconds();
-  tell(0.8);
+  if (!result.mesh.faces.empty()) draw_in(rig, silhouettes, options.draw_in, result.mesh);
+  report.seconds = watch.seconds();
+  return result;
+}
+
+void follow_depth(const Rig& rig, std::span<const MeasuredPoint> points,
+                  std::span<const DepthMap> maps, const FusionOptions& options,
+                  SurfaceResult& result) {
+  const Stopwatch watch;
+  SurfaceReport& report = result.report;
+  report.points = points.size();
+  result.used.assign(points.size(), 0);
+  if (report.status == SurfaceStatus::kTooFewPoints) return;
+  std::vector<SurfaceSample> samples = dense_samples(rig, maps, report.spacing_mm);
+  const double spacing = report.spacing_mm;
+  report.samples = report.samples_used = samples.size();
+  result.used = points_on_maps(rig, points, maps, spacing);
+  for (const char used : result.used) report.points_used += static_cast<std::size_t>(used);
+  fit_local_surfaces(samples, options.fit_spacings * spacing);
   if (!result.mesh.faces.empty()) {
-    draw_in(rig, silhouettes, options.draw_in, result.mesh);
     for (int i = 0; i < options.subdivisions; ++i) result.mesh = subdivided(result.mesh);
     follow_nodes(rig, maps, options.follow, result.mesh);
     attribute_vertices(samples, options.reach_spacings, spacing, result.mesh);
   }
   result.measured = measured_part(result.mesh, options.least_island_spacings2 * spacing * spacing);
   note_quality(surface_area(result.mesh), result);
-  report.seconds = watch.seconds();
-  tell(1);
-  return result;
+  report.seconds += watch.seconds();
 }
 
 std::string to_string(SurfaceStatus status) {

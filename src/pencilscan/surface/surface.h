@@ -90,14 +90,18 @@ struct FusionOptions {
 };
 
 /// The nodes of all depth maps, each weighted by its variance, move onto local quadrics through the
-/// nodes of all cameras (local_fit.h); screened Poisson closes them; its triangles are cut finer
-/// and follow the nodes' quadrics where there is depth (node_surface.h). `points` only learn
-/// whether the surface bears them out.
-[[nodiscard]] SurfaceResult fuse_depth(const Rig& rig, std::span<const MeasuredPoint> points,
-                                       std::span<const DepthMap> maps,
-                                       const FusionOptions& options = {},
-                                       const Progress& progress = {},
-                                       std::span<const Silhouette> silhouettes = {});
+/// nodes of all cameras (local_fit.h); screened Poisson closes them; what was invented is drawn
+/// into the silhouettes. The mesh is as coarse as the octree.
+[[nodiscard]] SurfaceResult close_depth(const Rig& rig, std::span<const DepthMap> maps,
+                                        const FusionOptions& options = {},
+                                        std::span<const Silhouette> silhouettes = {});
+
+/// The triangles of a closed surface are cut finer and follow the nodes' quadrics where there is
+/// depth (node_surface.h). `points` only learn whether the surface bears them out. Nothing to do
+/// where the status is kTooFewPoints.
+void follow_depth(const Rig& rig, std::span<const MeasuredPoint> points,
+                  std::span<const DepthMap> maps, const FusionOptions& options,
+                  SurfaceResult& result);
 
 [[nodiscard]] std::string to_string(SurfaceStatus status);
 

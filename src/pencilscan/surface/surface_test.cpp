@@ -379,12 +379,20 @@ TEST(SelfIntersections, AreCounted) {
   EXPECT_GT(self_intersections(two), 10U);
 }
 
+/// Closed and followed, with no second look at the images in between.
+SurfaceResult surface_of(const Rig& rig, std::span<const MeasuredPoint> points,
+                         std::span<const DepthMap> maps, const FusionOptions& options = {}) {
+  SurfaceResult result = close_depth(rig, maps, options);
+  follow_depth(rig, points, maps, options, result);
+  return result;
+}
+
 TEST(FuseDepth, BallIsClosedAndAccurate) {
   const Rig rig = ball_rig();
   const std::vector<MeasuredPoint> points = ball_points(rig);
   FusionOptions options;
   options.cell_spacings = 2;  // the ball needs no finer cells
-  const SurfaceResult result = fuse_depth(rig, points, ball_maps(rig), options);
+  const SurfaceResult result = surface_of(rig, points, ball_maps(rig), options);
   expect_watertight(result);
   EXPECT_LT(worst_deviation(result.mesh), 0.3);  // three sigma of the noise
   EXPECT_LT(share_beyond(result.mesh, 0.1), 0.1);
@@ -442,7 +450,7 @@ TEST(FuseDepth, TooFewDepthsIsAStatus) {
   const Rig rig = ball_rig();
   std::vector<DepthMap> maps = ball_maps(rig);
   for (DepthMap& map : maps) map.nodes.assign(map.nodes.size(), DepthNode{});
-  const SurfaceResult result = fuse_depth(rig, ball_points(rig), maps);
+  const SurfaceResult result = surface_of(rig, ball_points(rig), maps);
   EXPECT_EQ(result.report.status, SurfaceStatus::kTooFewPoints);
 }
 
