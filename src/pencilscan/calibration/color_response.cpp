@@ -55,7 +55,8 @@ std::optional<double> root_of_light(double p, double q, double w, double b) {
 /// How much brighter an image's lit parts are than white's: the lamp's flicker.
 double flicker(const cv::Mat& image, const cv::Mat& other, const cv::Mat& white,
                const cv::Mat& black, float least) {
-  constexpr float kWhole = 0.97F;  // of the light is in `image`
+  // Of the light is in `image`: far enough below 1 that noise does not choose the bright ones.
+  constexpr float kWhole = 0.9F;
   std::vector<double> ratios;
   for (int v = 0; v < white.rows; v += kEvery) {
     for (int u = 0; u < white.cols; u += kEvery) {
@@ -64,7 +65,8 @@ double flicker(const cv::Mat& image, const cv::Mat& other, const cv::Mat& white,
       const float at = image.at<float>(v, u);
       if (contrast < least || w > kFullLight || at - other.at<float>(v, u) < kWhole * contrast)
         continue;
-      ratios.push_back(static_cast<double>(at / w));
+      ratios.push_back(
+          static_cast<double>((at + other.at<float>(v, u)) / (w + black.at<float>(v, u))));
     }
   }
   return ratios.size() < kLeastPixels ? 1 : upper_median(std::move(ratios));

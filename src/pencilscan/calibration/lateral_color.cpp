@@ -25,7 +25,7 @@ struct OffsetEquations {
   Eigen::Matrix<double, 2, kPerDevice> of_projector;
   Vec2 offset;
   Vec2 sigma;
-  std::size_t cluster = 0;
+  std::size_t part = 0;  ///< of an image: a ninth, under one projector
 
   [[nodiscard]] Vec2 predicted(const Eigen::VectorXd& p) const {
     return of_camera * p.segment<kPerDevice>(camera) +
@@ -49,7 +49,7 @@ Eigen::Matrix<double, 2, kPerDevice> displacement_rows(const Device& device, con
 std::vector<OffsetEquations> equations_of(const Rig& rig, std::span<const ColorSample> samples,
                                           std::size_t color, double edge_sigma) {
   std::vector<OffsetEquations> all;
-  std::map<std::tuple<std::size_t, std::size_t, int, int>, std::size_t> clusters;
+  std::map<std::tuple<std::size_t, std::size_t, int, int>, std::size_t> parts;
   for (const ColorSample& s : samples) {
     if (s.color != color) continue;
     const Camera& camera = rig.cameras[s.camera];
@@ -62,11 +62,11 @@ std::vector<OffsetEquations> equations_of(const Rig& rig, std::span<const ColorS
     e.offset = s.offset_px;
     e.sigma = (s.sigma_px.array().square() + edge_sigma * edge_sigma).sqrt();
     const auto third = [](double at, int size) { return static_cast<int>(3 * at / size); };
-    e.cluster = clusters
-                    .try_emplace({s.camera, s.projector, third(s.camera_pixel.x(), camera.width),
-                                  third(s.camera_pixel.y(), camera.height)},
-                                 clusters.size())
-                    .first->second;
+    e.part = parts
+                 .try_emplace({s.camera, s.projector, third(s.camera_pixel.x(), camera.width),
+                               third(s.camera_pixel.y(), camera.height)},
+                              parts.size())
+                 .first->second;
     all.push_back(e);
   }
   return all;
@@ -86,19 +86,35 @@ void add_segments(const OffsetEquations& e, const Vec6& v, Eigen::VectorXd& to) 
 
 struct ColorFit {
   Eigen::VectorXd parameters;
-  Eigen::VectorXd sigma;
+  Eigen::MatrixXd normal;     ///< equations, the prior with them
+  std::vector<Vec2> weights;  ///< per equation: of the loss, over the scatter squared
 };
 
-ColorFit fit_color(const std::vector<OffsetEquations>& equations, const Eigen::VectorXd& usual) {
-  const Eigen::Index n = usual.size();
-  const Eigen::VectorXd prior = usual.array().square().inverse();
-  ColorFit fit{Eigen::VectorXd::Zero(n), usual};
-  std::vector<Vec2> weights(equations.size(), Vec2(1, 1));
-  Eigen::MatrixXd N;
-  double scale = 1;
+/// Tukey's weights (95 % efficient) of what the parameters leave.
+void reweigh(const std::vector<OffsetEquations>& equations, ColorFit& fit) {
+  const auto left = [&](const OffsetEquations& e) -> Vec2 {
+    return (e.offset - e.predicted(fit.parameters)).cwiseQuotient(e.sigma);
+  };
+  std::vector<double> sizes;
+  for (const OffsetEquations& e : equations)
+    for (const double z : left(e)) sizes.push_back(std::abs(z));
+  const double scale = std::max(kDeviationPerMedian * upper_median(std::move(sizes)), 0.1);
+  for (std::size_t i = 0; i < equations.size(); ++i) {
+    const Vec2 t = left(equations[i]) / (4.685 * scale);
+    for (Eigen::Index k = 0; k < 2; ++k) {
+      const double rest = std::max(0.0, 1 - t[k] * t[k]);
+      fit.weights[i][k] = rest * rest / (scale * scale);
+    }
+  }
+}
+
+ColorFit fit_color(const std::vector<OffsetEquations>& equations, const Eigen::VectorXd& prior) {
+  const Eigen::Index n = prior.size();
+  ColorFit fit{Eigen::VectorXd::Zero(n), {}, {}};
+  fit.weights.assign(equations.size(), Vec2(1, 1));
   constexpr int kRounds = 6;
   for (int round = 0; round < kRounds; ++round) {
-    N = prior.asDiagonal();
+    fit.normal = prior.asDiagonal();
     Eigen::VectorXd right = Eigen::VectorXd::Zero(n);
     for (std::size_t i = 0; i < equations.size(); ++i) {
       const OffsetEquations& e = equations[i];
@@ -106,43 +122,61 @@ ColorFit fit_color(const std::vector<OffsetEquations>& equations, const Eigen::V
       Vec6 sum = Vec6::Zero();
       for (Eigen::Index k = 0; k < 2; ++k) {
         const Vec6 a = e.row(k);
-        const double weight = weights[i][k] / (scale * scale);
-        block += weight * a * a.transpose();
-        sum += weight * a * (e.offset[k] / e.sigma[k]);
+        block += fit.weights[i][k] * a * a.transpose();
+        sum += fit.weights[i][k] * a * (e.offset[k] / e.sigma[k]);
       }
-      add_block(e, block, N);
+      add_block(e, block, fit.normal);
       add_segments(e, sum, right);
     }
-    fit.parameters = solve_symmetric(N, Eigen::MatrixXd(right));
-    std::vector<double> sizes;
-    for (const OffsetEquations& e : equations) {
-      const Vec2 z = (e.offset - e.predicted(fit.parameters)).cwiseQuotient(e.sigma);
-      sizes.push_back(std::abs(z.x()));
-      sizes.push_back(std::abs(z.y()));
-    }
-    scale = std::max(kDeviationPerMedian * upper_median(sizes), 0.1);
-    for (std::size_t i = 0; i < sizes.size(); ++i) {
-      const double t = sizes[i] / (4.685 * scale);  // Tukey: 95 % efficient
-      weights[i / 2][static_cast<Eigen::Index>(i % 2)] = t < 1 ? (1 - t * t) * (1 - t * t) : 0;
-    }
+    fit.parameters = solve_symmetric(fit.normal, Eigen::MatrixXd(right));
+    reweigh(equations, fit);
   }
-  // Gradients of the cost, added up over each part of an image.
-  std::map<std::size_t, Eigen::VectorXd> gradients;
+  return fit;
+}
+
+/// What one part of an image, or one pair, says of the unknowns: the gradient of the cost, and how
+/// an error of one px that all its samples share would change it, per panel axis.
+struct SharedError {
+  Eigen::VectorXd gradient;
+  std::array<Eigen::VectorXd, 2> by_px;
+
+  explicit SharedError(Eigen::Index n)
+      : gradient(Eigen::VectorXd::Zero(n)),
+        by_px{Eigen::VectorXd::Zero(n), Eigen::VectorXd::Zero(n)} {}
+};
+
+/// One standard deviation of every unknown.
+Eigen::VectorXd deviations(const std::vector<OffsetEquations>& equations, const ColorFit& fit,
+                           const Eigen::VectorXd& prior, double shared_error_px) {
+  const Eigen::Index n = prior.size();
+  std::map<std::size_t, SharedError> of_parts;
+  std::map<std::pair<Eigen::Index, Eigen::Index>, SharedError> of_pairs;
   for (std::size_t i = 0; i < equations.size(); ++i) {
     const OffsetEquations& e = equations[i];
     const Vec2 z = (e.offset - e.predicted(fit.parameters)).cwiseQuotient(e.sigma);
-    Vec6 sum = Vec6::Zero();
-    for (Eigen::Index k = 0; k < 2; ++k) sum += weights[i][k] / (scale * scale) * z[k] * e.row(k);
-    auto [at, is_new] = gradients.try_emplace(e.cluster);
-    if (is_new) at->second = Eigen::VectorXd::Zero(n);
-    add_segments(e, sum, at->second);
+    SharedError& part = of_parts.try_emplace(e.part, n).first->second;
+    SharedError& pair = of_pairs.try_emplace({e.camera, e.projector}, n).first->second;
+    for (Eigen::Index k = 0; k < 2; ++k) {
+      const Vec6 pull = fit.weights[i][k] * e.row(k);
+      add_segments(e, pull * z[k], part.gradient);
+      add_segments(e, pull / e.sigma[k], part.by_px[static_cast<std::size_t>(k)]);
+      add_segments(e, pull / e.sigma[k], pair.by_px[static_cast<std::size_t>(k)]);
+    }
   }
-  const Eigen::MatrixXd C = solve_symmetric(N, Eigen::MatrixXd(Eigen::MatrixXd::Identity(n, n)));
   Eigen::MatrixXd scatter = prior.asDiagonal();
-  for (const auto& [cluster, g] : gradients) scatter += g * g.transpose();
+  const auto add_shared = [&](const SharedError& shared) {
+    for (const Eigen::VectorXd& g : shared.by_px)
+      scatter += shared_error_px * shared_error_px * g * g.transpose();
+  };
+  for (const auto& [key, part] : of_parts) {
+    scatter += part.gradient * part.gradient.transpose();
+    add_shared(part);
+  }
+  for (const auto& [key, pair] : of_pairs) add_shared(pair);
+  const Eigen::MatrixXd C =
+      solve_symmetric(fit.normal, Eigen::MatrixXd(Eigen::MatrixXd::Identity(n, n)));
   const Eigen::MatrixXd clustered = C * scatter * C;
-  fit.sigma = C.diagonal().cwiseMax(clustered.diagonal()).cwiseSqrt();
-  return fit;
+  return C.diagonal().cwiseMax(clustered.diagonal()).cwiseSqrt();
 }
 
 double rms(double squares, std::size_t count) {
@@ -167,13 +201,16 @@ std::vector<ColorSample> color_samples(std::size_t camera, std::size_t projector
     sample.projector = projector;
     sample.camera_pixel = Vec2(u, v);
     sample.panel_pixel = all->panel_from_camera(sample.camera_pixel);
-    sample.panel_per_camera = all->jacobian(sample.camera_pixel);
     for (std::size_t k = 0; k < 3; ++k) {
       const auto one = LocalMap::fit(channels[k], u, v);
       if (!one) continue;
       sample.color = k;
       sample.offset_px = one->panel_from_camera(sample.camera_pixel) - sample.panel_pixel;
       sample.sigma_px = one->sigma_panel_px();
+      // The channel shows the surface e beside the pixel: the mean of both ends is exact for what
+      // is quadratic between them.
+      sample.panel_per_camera =
+          (all->jacobian(sample.camera_pixel) + one->jacobian(sample.camera_pixel)) / 2;
       found[i][k] = sample;
     }
   });
@@ -195,21 +232,20 @@ LateralColor estimate_lateral_color(const Rig& rig, std::span<const ColorSample>
   for (std::size_t d = 0; d < devices; ++d)
     usual.segment<kPerDevice>(kPerDevice * static_cast<Eigen::Index>(d)) =
         Vec3(options.usual_shift_px, options.usual_shift_px, options.usual_scale);
+  const Eigen::VectorXd prior = usual.array().square().inverse();
   double measured = 0;
   double remaining = 0;
   double explained = 0;
   for (std::size_t k = 0; k < 3; ++k) {
     const auto equations = equations_of(rig, samples, k, options.edge_sigma_px);
-    const ColorFit fit = fit_color(equations, usual);
+    const ColorFit fit = fit_color(equations, prior);
+    const Eigen::VectorXd sigma = deviations(equations, fit, prior, options.shared_error_px);
     for (std::size_t d = 0; d < devices; ++d) {
       const auto at = kPerDevice * static_cast<Eigen::Index>(d);
       ColorDisplacementEstimate& estimate = result.devices[d][k];
       estimate.value = {fit.parameters.segment<2>(at), 1 + fit.parameters[at + 2]};
-      const double shared = options.shared_error_px;
-      const Vec2 quarter = image_center(device_at(rig, d)) / 2;
-      estimate.shift_sigma_px =
-          Vec2(std::hypot(fit.sigma[at], shared), std::hypot(fit.sigma[at + 1], shared));
-      estimate.scale_sigma = std::hypot(fit.sigma[at + 2], shared / quarter.norm());
+      estimate.shift_sigma_px = sigma.segment<2>(at);
+      estimate.scale_sigma = sigma[at + 2];
       estimate.is_determined =
           estimate.shift_sigma_px.maxCoeff() < options.determined_share * options.usual_shift_px;
     }

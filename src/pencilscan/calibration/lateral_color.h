@@ -42,8 +42,9 @@ struct LateralColorOptions {
   double usual_shift_px = 1;    ///< > 0
   double usual_scale = 2e-3;    ///< > 0
   double edge_sigma_px = 0.01;  ///< error of an offset beyond its own deviation
-  /// Errors that all samples share (shading, what colours leak), which residuals do not show.
-  double shared_error_px = 0.003;
+  /// Errors (shading, what colours leak) that all samples of a part of an image share, and others
+  /// that all of a pair do; residuals do not show them. Weakly known combinations magnify them.
+  double shared_error_px = 0.004;
   double determined_share = 0.3;  ///< of usual_shift_px, that a known one's deviation is below
 };
 

@@ -154,6 +154,16 @@ void check_povray_can_show(const Rig& rig, const Reflectance& surface, const fs:
       throw InputError(rig_path.string(), camera.name + ".color_matrix", "",
                        "must be absent for --export-povray: its lights have pure colours");
     }
+    if (!camera.color_registration.none()) {
+      throw InputError(rig_path.string(), camera.name + ".color_registration", "",
+                       "must be absent for --export-povray: it bends all colours alike");
+    }
+  }
+  for (const Projector& projector : rig.projectors) {
+    if (!projector.color_registration.none()) {
+      throw InputError(rig_path.string(), projector.name + ".color_registration", "",
+                       "must be absent for --export-povray: it bends all colours alike");
+    }
   }
   if (surface.texture.kind == TextureKind::kNoise) {
     throw InputError("--texture", "", "noise", "cannot be exported to POV-Ray; use another one");
