@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <memory>
 
 #include "pencilscan/calibration/board_corners.h"
@@ -136,7 +137,9 @@ class ProblemBuilder {
     solver.logging_type = ceres::SILENT;
     ceres::Solver::Summary summary;
     ceres::Solve(solver, problem_.get(), &summary);
-    return {summary.final_cost, static_cast<int>(summary.iterations.size()), views_,
+    const double cost =
+        summary.IsSolutionUsable() ? summary.final_cost : std::numeric_limits<double>::infinity();
+    return {cost, static_cast<int>(summary.iterations.size()), views_,
             summary.termination_type == ceres::CONVERGENCE};
   }
 

@@ -63,7 +63,7 @@ struct BundleOptions {
 };
 
 struct BundleSummary {
-  double cost = 0;  ///< half the robust sum of squares
+  double cost = 0;  ///< half the robust sum of squares; infinite where it could not be taken
   int iterations = 0;
   std::size_t views = 0;
   bool converged = false;

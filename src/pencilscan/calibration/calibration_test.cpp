@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "pencilscan/calibration/calibrate.h"
@@ -261,6 +262,23 @@ TEST(LoopClosure, AnArcHasNone) {
   const Rig truth = ring(2, 2);
   const auto loop = close_loop(exact_ring(tracks_of(truth, {.count = 500}), truth));
   EXPECT_TRUE(loop.devices.empty());
+}
+
+/// A start that cannot be adjusted must not look like the best one.
+TEST(Adjust, WhatCannotBeTakenCostsInfinitely) {
+  const Rig truth = ring(1, 1);
+  BundleProblem problem;
+  for (std::size_t d = 0; d < device_count(truth); ++d) {
+    problem.devices.push_back(bundle_device(device_at(truth, d)));
+    problem.devices.back().present = true;
+  }
+  problem.tracks = tracks_of(truth, {.count = 50});
+  triangulate_all(problem, 0.01);
+  EXPECT_TRUE(std::isfinite(adjust(problem, {}).cost));
+  const Device& camera = truth.cameras[0];
+  problem.points[0] = camera.center() - 100 * camera.forward();  // behind it
+  problem.used[0] = 1;
+  EXPECT_EQ(adjust(problem, {}).cost, std::numeric_limits<double>::infinity());
 }
 
 TEST(CalibrationReport, IsOnePageAndValidJson) {

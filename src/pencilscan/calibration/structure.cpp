@@ -295,25 +295,30 @@ double build_structure(BundleProblem& problem, unsigned free_inner,
   if (present_devices(problem) >= 2) {
     grow_from_present(problem, tracks, bundle, options);
   } else {
-    // A pair whose captures were exchanged looks sound by itself, but nothing joins it.
+    // A pair whose captures were exchanged looks sound by itself; what joins it contradicts it.
     constexpr std::size_t kMostSeeds = 4;
+    constexpr double kSoundCost = 0.1;  // per view, of kEarlySigmaPx: few contradict the rest
     std::vector<Seed> seeds = seeds_of(problem, tracks);
     if (seeds.empty()) return std::numeric_limits<double>::infinity();
     seeds.resize(std::min(seeds.size(), kMostSeeds));
     const Placement nothing = placement_of(problem);
     Placement best = nothing;
     std::size_t most = 0;
+    double least = std::numeric_limits<double>::infinity();
     for (const Seed& seed : seeds) {
       place(nothing, problem);
       set_pose(problem.devices[seed.a], Mat3::Identity(), Vec3::Zero());
       set_pose(problem.devices[seed.b], seed.rotation, seed.translation);
       problem.devices[seed.a].present = problem.devices[seed.b].present = true;
       grow_from_present(problem, tracks, bundle, options);
-      if (present_devices(problem) > most) {
-        most = present_devices(problem);
-        best = placement_of(problem);
-      }
-      if (most == problem.devices.size()) break;
+      const BundleSummary found = adjust(problem, bundle);
+      const double cost = found.cost / static_cast<double>(std::max<std::size_t>(found.views, 1));
+      const std::size_t placed = present_devices(problem);
+      if (placed < most || (placed == most && !(cost < least))) continue;
+      most = placed;
+      least = cost;
+      best = placement_of(problem);
+      if (most == problem.devices.size() && least < kSoundCost) break;
     }
     place(best, problem);
   }
