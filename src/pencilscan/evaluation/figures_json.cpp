@@ -37,14 +37,14 @@ void put_lines(Json& json, const LabelFigures& labels, const RecallFigures& reca
   json["line_error_p90_px"] = number(labels.line_error_p90_px);
 }
 
-void put_sigma(Json& json, const SigmaFigures& sigma) {
-  json["sigma_count"] = sigma.below_one.count;
-  json["sigma_below_1"] = number(sigma.below_one.value());
-  json["sigma_below_2"] = number(sigma.below_two.value());
-  json["sigma_rank_correlation"] = number(sigma.rank_correlation);
+void put_sigma(Json& json, const std::string& prefix, const SigmaFigures& sigma) {
+  json[prefix + "sigma_count"] = sigma.below_one.count;
+  json[prefix + "sigma_below_1"] = number(sigma.below_one.value());
+  json[prefix + "sigma_below_2"] = number(sigma.below_two.value());
+  json[prefix + "sigma_rank_correlation"] = number(sigma.rank_correlation);
   Json tenths = Json::array();
   for (const double t : sigma.tenths) tenths.push_back(number(t));
-  json["sigma_below_1_by_tenth"] = tenths;
+  json[prefix + "sigma_below_1_by_tenth"] = tenths;
 }
 
 std::string threshold_name(double mm) {
@@ -120,7 +120,9 @@ nlohmann::ordered_json figures_json(const Evaluation& evaluation, const Rig& rig
     put_distance(json, "mesh_", evaluation.surface->distance);
     put_surface(json, *evaluation.surface);
   }
-  if (evaluation.sigma) put_sigma(json, *evaluation.sigma);
+  if (evaluation.sigma) put_sigma(json, "", *evaluation.sigma);
+  if (evaluation.surface && evaluation.surface->sigma)
+    put_sigma(json, "mesh_", *evaluation.surface->sigma);
   if (evaluation.labels && evaluation.recall) {
     put_breakdown(json, *evaluation.labels, *evaluation.recall, rig);
   }

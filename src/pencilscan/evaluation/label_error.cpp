@@ -113,30 +113,14 @@ LabelFigures label_figures(const TruthScene& truth, std::span<const MeasuredPoin
 
 SigmaFigures sigma_figures(std::span<const MeasuredPoint> points,
                            std::span<const PointVerdict> verdicts) {
-  SigmaFigures figures;
   std::vector<double> sigmas;
   std::vector<double> errors;
   for (std::size_t i = 0; i < points.size(); ++i) {
     if (!verdicts[i].counted || !(points[i].sigma > 0)) continue;
     sigmas.push_back(static_cast<double>(points[i].sigma));
     errors.push_back(verdicts[i].ray_error_mm);
-    figures.below_one.add(errors.back() < sigmas.back());
-    figures.below_two.add(errors.back() < 2 * sigmas.back());
   }
-  figures.rank_correlation = rank_correlation(sigmas, errors);
-  std::vector<std::size_t> order(sigmas.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  std::stable_sort(order.begin(), order.end(),
-                   [&](std::size_t i, std::size_t j) { return sigmas[i] < sigmas[j]; });
-  constexpr std::size_t kTenths = 10;
-  for (std::size_t k = 0; k < kTenths; ++k) {
-    Share share;
-    for (std::size_t i = k * order.size() / kTenths; i < (k + 1) * order.size() / kTenths; ++i) {
-      share.add(errors[order[i]] < sigmas[order[i]]);
-    }
-    figures.tenths.push_back(share.value());
-  }
-  return figures;
+  return sigma_figures(sigmas, errors);
 }
 
 }  // namespace pencilscan

@@ -55,15 +55,8 @@ struct LabelFigures {
                                              std::span<const MeasuredPoint> points,
                                              std::span<const PointVerdict> verdicts);
 
-/// How well sigma predicts the error along the camera ray.
-struct SigmaFigures {
-  Share below_one;              ///< ideal 0.683
-  Share below_two;              ///< ideal 0.954
-  std::vector<double> tenths;   ///< below_one within each tenth of the vertices by sigma
-  double rank_correlation = 0;  ///< of sigma with the error
-};
-/// Counts every counted vertex with sigma > 0; a ray that misses the true surface is an error
-/// beyond any sigma.
+/// Of errors along the camera ray. Counts every counted vertex with sigma > 0; a ray that misses
+/// the true surface is an error beyond any sigma.
 [[nodiscard]] SigmaFigures sigma_figures(std::span<const MeasuredPoint> points,
                                          std::span<const PointVerdict> verdicts);
 

@@ -80,4 +80,27 @@ double Share::value() const {
   return count > 0 ? static_cast<double>(hits) / static_cast<double>(count) : kNothing;
 }
 
+SigmaFigures sigma_figures(std::span<const double> sigmas, std::span<const double> errors) {
+  PENCILSCAN_CHECK(sigmas.size() == errors.size());
+  SigmaFigures figures;
+  for (std::size_t i = 0; i < sigmas.size(); ++i) {
+    figures.below_one.add(errors[i] < sigmas[i]);
+    figures.below_two.add(errors[i] < 2 * sigmas[i]);
+  }
+  figures.rank_correlation = rank_correlation(sigmas, errors);
+  std::vector<std::size_t> order(sigmas.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t i, std::size_t j) { return sigmas[i] < sigmas[j]; });
+  constexpr std::size_t kTenths = 10;
+  for (std::size_t k = 0; k < kTenths; ++k) {
+    Share share;
+    for (std::size_t i = k * order.size() / kTenths; i < (k + 1) * order.size() / kTenths; ++i) {
+      share.add(errors[order[i]] < sigmas[order[i]]);
+    }
+    figures.tenths.push_back(share.value());
+  }
+  return figures;
+}
+
 }  // namespace pencilscan

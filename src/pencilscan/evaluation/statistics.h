@@ -34,4 +34,15 @@ struct Share {
   }
 };
 
+/// How well sigma predicts the error.
+struct SigmaFigures {
+  Share below_one;              ///< ideal 0.683
+  Share below_two;              ///< ideal 0.954
+  std::vector<double> tenths;   ///< below_one within each tenth of the values by sigma
+  double rank_correlation = 0;  ///< of sigma with the error
+};
+/// One error, >= 0, per sigma.
+[[nodiscard]] SigmaFigures sigma_figures(std::span<const double> sigmas,
+                                         std::span<const double> errors);
+
 }  // namespace pencilscan

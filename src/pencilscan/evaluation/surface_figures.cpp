@@ -67,6 +67,17 @@ std::vector<Nearest> nearest_facets(const RayScene& scene, const std::vector<Dra
   return nearest;
 }
 
+SigmaFigures vertex_sigma_figures(const RayScene& truth, const TriangleMesh& mesh) {
+  std::vector<Vec3> vertices;
+  std::vector<double> sigmas;
+  for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
+    if (!(mesh.sigma[v] > 0) || (!mesh.confidence.empty() && !(mesh.confidence[v] > 0))) continue;
+    vertices.push_back(mesh.vertices[v]);
+    sigmas.push_back(static_cast<double>(mesh.sigma[v]));
+  }
+  return sigma_figures(sigmas, distances_to(truth, vertices));
+}
+
 }  // namespace
 
 std::vector<DrawnPoint> sample_surface(const TriangleMesh& mesh, std::size_t count,
@@ -131,6 +142,7 @@ SurfaceFigures surface_figures(const TruthScene& truth, const TriangleMesh& meas
   auto distances = distances_to(truth.scene(), measured_points);
   for (double& d : distances) d *= mm_per_unit;
   figures.distance = distance_figures(distances);
+  if (!measured.sigma.empty()) figures.sigma = vertex_sigma_figures(truth.scene(), measured);
 
   // Completeness: from the truth to the measured surface.
   const auto samples = sample_surface(truth.scene().mesh(), options.sample_count, options.seed);

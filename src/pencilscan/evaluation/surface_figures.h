@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "pencilscan/evaluation/statistics.h"
@@ -63,6 +64,8 @@ struct SurfaceFigures {
   double lit_by_two_share = 0;
   double measurable_mm2 = 0;
   std::vector<CompletenessFigures> completeness;  ///< one per threshold
+  /// Of the distance of each measured vertex (confidence > 0); nothing for a mesh without sigma.
+  std::optional<SigmaFigures> sigma;
 };
 
 /// Compares a measured mesh with the truth. `mm_per_unit` is the length of the rig's unit in mm,

@@ -48,6 +48,25 @@ TEST(SurfaceFigures, SphereLargerByOneMillimetreIsOneMillimetreAway) {
   EXPECT_EQ(figures.completeness[2].f_score, 1);
 }
 
+TEST(SurfaceFigures, SigmaIsJudgedWhereTheMeshIsMeasured) {
+  const TruthScene truth(make_sphere(oracle::kRadiusMm, kSphereRings), oracle::ring(3));
+  TriangleMesh mesh = make_sphere(oracle::kRadiusMm + 1, kSphereRings);
+  EXPECT_FALSE(surface_figures(truth, mesh, few_samples()).sigma);
+  // A third of the vertices says 0.6 mm, a third 1.2 mm, and the last was not measured.
+  for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
+    mesh.sigma.push_back(v % 3 == 0 ? 0.6F : 1.2F);
+    mesh.confidence.push_back(v % 3 == 2 ? 0.0F : 1.0F);
+  }
+  const auto sigma = surface_figures(truth, mesh, few_samples()).sigma;
+  ASSERT_TRUE(sigma);
+  const double vertices = static_cast<double>(mesh.vertices.size());
+  EXPECT_NEAR(static_cast<double>(sigma->below_one.count), vertices * 2 / 3, 1);
+  EXPECT_NEAR(sigma->below_one.value(), 0.5, 0.01);
+  EXPECT_EQ(sigma->below_two.value(), 1);
+  EXPECT_EQ(sigma->tenths.front(), 0);
+  EXPECT_EQ(sigma->tenths.back(), 1);
+}
+
 TEST(SurfaceFigures, HalfASphereIsHalfComplete) {
   const TriangleMesh whole = make_sphere(oracle::kRadiusMm, kSphereRings);
   TriangleMesh half = whole;

@@ -56,7 +56,7 @@ void attribute_vertices(std::span<const SurfaceSample> samples, double reach_spa
     double nearest = radius;  // mm, to any sample of this side
     double best = 1;          // distance / reach of the best sample
     double weight_sum = 0;
-    double variance_sum = 0;
+    double information_sum = 0;
     double confidence_sum = 0;
     Vec3 pull = Vec3::Zero();  // sum of the offsets: cancels out where samples surround the vertex
     double pull_length = 0;
@@ -76,10 +76,12 @@ void attribute_vertices(std::span<const SurfaceSample> samples, double reach_spa
       best = std::min(best, distance / reach);
       pull += d;
       pull_length += distance;
+      // The neighbours' scatter about the surface holds their noise: the larger of both counts.
       const double across = s.sigma * std::max(std::abs(s.to_camera.dot(s.normal)), 0.2);
+      const double off = std::max(across, s.residual);
       const double w = std::exp(-2 * d2 / (spacing * spacing));
       weight_sum += w;
-      variance_sum += w * (across * across + s.residual * s.residual);
+      information_sum += w / std::max(off * off, 1e-9);
       confidence_sum += w * s.confidence;
       if (!seen[s.camera]) ++cameras;
       seen[s.camera] = true;
@@ -88,8 +90,8 @@ void attribute_vertices(std::span<const SurfaceSample> samples, double reach_spa
     // Samples that fill a half plane pull with 2 / pi of their summed distance.
     fringe[v] = pull.norm() > 0.55 * pull_length && best > kOutsideReach;
     if (weight_sum > 0) {
-      // Samples of one camera share their errors; cameras are independent.
-      variance += variance_sum / weight_sum / std::max(cameras, 1);
+      // Samples of one camera share their errors; cameras are independent, the surest counts most.
+      variance += weight_sum / information_sum / std::max(cameras, 1);
       const double certainty = confidence_sum / weight_sum * (1 - 0.5 * best * best);
       mesh.confidence[v] = static_cast<float>(std::clamp(certainty, 0.01, 1.0));
     } else {
