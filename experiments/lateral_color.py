@@ -102,8 +102,8 @@ def main():
     for name, scene, rig in cases:
         path = common.write_rig(args.out / "used.json", rig)
         out = args.out / "out" / name.replace(" ", "_").replace(",", "")
-        program("reconstruct", "--rig", path, "--frames", scenes[scene] / "frames", "--out", out, "--overwrite",
-                "--no-pictures")
+        shutil.rmtree(out, ignore_errors=True)  # of another program, perhaps
+        program("reconstruct", "--rig", path, "--frames", scenes[scene] / "frames", "--out", out, "--no-pictures")
         mesh = scenes[scene] / "truth/mesh.ply"
         figures = program("evaluate", "--truth", mesh, "--rig", path, "--result", out / "000000")
         rows.append([name, *[common.number(figures.get(k), 4) for k in FIGURES]])
