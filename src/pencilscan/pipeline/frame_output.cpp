@@ -192,6 +192,7 @@ nlohmann::ordered_json frame_report(const Rig& rig, const Frame& frame, const Po
                        {"faces", s.faces},
                        {"boundary_edges", s.edges.boundary},
                        {"non_manifold_edges", s.edges.non_manifold},
+                       {"self_intersections", s.self_intersections},
                        {"measured_share", number(s.measured_share)}};
   if (!shape.holes.vertices.empty()) {
     ordered_json& area = report["surface"]["area_mm2"];

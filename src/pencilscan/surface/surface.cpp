@@ -14,6 +14,7 @@
 #include "pencilscan/surface/mesh_parts.h"
 #include "pencilscan/surface/node_surface.h"
 #include "pencilscan/surface/sample.h"
+#include "pencilscan/surface/untangle.h"
 
 namespace pencilscan {
 namespace {
@@ -220,7 +221,9 @@ SurfaceResult close_depth(const Rig& rig, std::span<const DepthMap> maps,
   closing.min_component_share = options.min_component_share;
   take(closed_surface(samples, closing), result);
   report.seconds_poisson = poisson_watch.seconds();
-  if (!result.mesh.faces.empty()) draw_in(rig, silhouettes, options.draw_in, result.mesh);
+  const std::vector<Vec3> closed = result.mesh.vertices;
+  draw_in(rig, silhouettes, options.draw_in, result.mesh);
+  untangle(closed, result.mesh);
   report.seconds = watch.seconds();
   return result;
 }
@@ -241,7 +244,9 @@ void follow_depth(const Rig& rig, std::span<const MeasuredPoint> points,
   fit_local_surfaces(samples, options.fit_spacings * spacing);
   if (!result.mesh.faces.empty()) {
     for (int i = 0; i < options.subdivisions; ++i) result.mesh = subdivided(result.mesh);
+    const std::vector<Vec3> closed = result.mesh.vertices;
     follow_nodes(rig, maps, options.follow, result.mesh);
+    report.self_intersections = untangle(closed, result.mesh);
     attribute_vertices(samples, options.reach_spacings, spacing, result.mesh);
   }
   result.measured = measured_part(result.mesh, options.least_island_spacings2 * spacing * spacing);

@@ -55,8 +55,9 @@ struct SurfaceReport {
   std::size_t components_removed = 0;
   std::size_t vertices = 0;
   std::size_t faces = 0;
-  EdgeCounts edges;           ///< of the closed mesh; all zero when it is watertight
-  double measured_share = 0;  ///< area of mesh_measured / area of mesh
+  EdgeCounts edges;                    ///< of the closed mesh; all zero when it is watertight
+  std::size_t self_intersections = 0;  ///< faces that cut another one (dense depth)
+  double measured_share = 0;           ///< area of mesh_measured / area of mesh
   double seconds_filter = 0;
   double seconds_poisson = 0;
   double seconds = 0;

@@ -18,6 +18,7 @@
 #include "pencilscan/surface/mesh_parts.h"
 #include "pencilscan/surface/node_surface.h"
 #include "pencilscan/surface/point_grid.h"
+#include "pencilscan/surface/untangle.h"
 #include "pencilscan/surface/vertex_color.h"
 
 namespace pencilscan {
@@ -317,66 +318,31 @@ std::vector<DepthMap> ball_maps(const Rig& rig, double noise = kNoise) {
   return maps;
 }
 
-/// True when segment pq passes through the inside of the triangle abc.
-bool pierces(const Vec3& p, const Vec3& q, const Vec3& a, const Vec3& b, const Vec3& c) {
-  const auto volume = [](const Vec3& o, const Vec3& x, const Vec3& y, const Vec3& z) {
-    return (x - o).cross(y - o).dot(z - o);
-  };
-  if (volume(p, a, b, c) * volume(q, a, b, c) >= 0) return false;
-  const double ab = volume(p, q, a, b);
-  const double bc = volume(p, q, b, c);
-  const double ca = volume(p, q, c, a);
-  return (ab > 0 && bc > 0 && ca > 0) || (ab < 0 && bc < 0 && ca < 0);
-}
-
-/// Number of (edge, face) pairs without a common vertex that intersect, by brute force within
-/// cells.
-std::size_t self_intersections(const TriangleMesh& mesh) {
-  double longest = 0;
-  for (const auto& face : mesh.faces) {
-    for (std::size_t k = 0; k < 3; ++k)
-      longest = std::max(longest, (mesh.vertices[static_cast<std::size_t>(face[k])] -
-                                   mesh.vertices[static_cast<std::size_t>(face[(k + 1) % 3])])
-                                      .norm());
-  }
-  std::vector<Vec3> centers;
-  for (const auto& face : mesh.faces)
-    centers.push_back((mesh.vertices[static_cast<std::size_t>(face[0])] +
-                       mesh.vertices[static_cast<std::size_t>(face[1])] +
-                       mesh.vertices[static_cast<std::size_t>(face[2])]) /
-                      3);
-  const double reach = 1.4 * longest;  // centres of triangles that touch are no farther apart
-  const PointGrid grid(centers, reach);
-  std::size_t count = 0;
-  for (const auto& face : mesh.faces) {
-    const auto at = [&](int v) -> const Vec3& {
-      return mesh.vertices[static_cast<std::size_t>(v)];
-    };
-    for (std::size_t k = 0; k < 3; ++k) {
-      const int p = face[k];
-      const int q = face[(k + 1) % 3];
-      if (p > q) continue;  // the other face of this edge asks
-      grid.for_each_within(0.5 * (at(p) + at(q)), reach, [&](std::size_t j, double) {
-        const auto& other = mesh.faces[j];
-        for (const int v : other) {
-          if (v == p || v == q) return;
-        }
-        count += pierces(at(p), at(q), at(other[0]), at(other[1]), at(other[2])) ? 1 : 0;
-      });
-    }
-  }
-  return count;
-}
-
-TEST(SelfIntersections, AreCounted) {
-  EXPECT_EQ(self_intersections(make_sphere(20, 16)), 0U);
+TEST(SelfIntersections, AreFound) {
+  EXPECT_TRUE(self_intersections(make_sphere(20, 16)).empty());
   TriangleMesh two = make_sphere(20, 16);
   const TriangleMesh other = make_sphere(20, 16, Vec3(15, 1, 2));
   const int shift = static_cast<int>(two.vertices.size());
   two.vertices.insert(two.vertices.end(), other.vertices.begin(), other.vertices.end());
   for (const auto& face : other.faces)
     two.faces.push_back({face[0] + shift, face[1] + shift, face[2] + shift});
-  EXPECT_GT(self_intersections(two), 10U);
+  EXPECT_GT(self_intersections(two).size(), 10U);
+}
+
+TEST(SelfIntersections, AreTakenBackAndNothingElse) {
+  TriangleMesh mesh = make_sphere(20, 24);
+  const std::vector<Vec3> before = mesh.vertices;
+  // A dent that comes out on the other side, and a small bulge far from it.
+  std::size_t bulge = 0;
+  for (std::size_t v = 0; v < before.size(); ++v) {
+    if (before[v].x() > 19) mesh.vertices[v].x() -= 45;
+    if (before[v].z() > before[bulge].z()) bulge = v;
+  }
+  mesh.vertices[bulge].z() += 1;
+  ASSERT_FALSE(self_intersections(mesh).empty());
+  EXPECT_EQ(untangle(before, mesh), 0U);
+  EXPECT_TRUE(self_intersections(mesh).empty());
+  EXPECT_NEAR(mesh.vertices[bulge].z(), before[bulge].z() + 1, 1e-5);
 }
 
 /// Closed and followed, with no second look at the images in between.
@@ -397,7 +363,7 @@ TEST(FuseDepth, BallIsClosedAndAccurate) {
   EXPECT_LT(worst_deviation(result.mesh), 0.3);  // three sigma of the noise
   EXPECT_LT(share_beyond(result.mesh, 0.1), 0.1);
   EXPECT_GT(result.report.measured_share, 0.97);
-  EXPECT_EQ(self_intersections(result.mesh), 0U);
+  EXPECT_TRUE(self_intersections(result.mesh).empty());
   EXPECT_GT(result.report.points_used, points.size() * 9 / 10);
 }
 
@@ -512,13 +478,13 @@ TEST(Silhouettes, InventedBulgeIsDrawnIn) {
   }
   mesh.sigma.assign(mesh.vertices.size(), 0.1F);
   const TriangleMesh bulged = mesh;
-  ASSERT_EQ(self_intersections(bulged), 0U);
+  ASSERT_TRUE(self_intersections(bulged).empty());
   EXPECT_GT(draw_in(rig, silhouettes, {}, mesh), 100U);
   EXPECT_EQ(count_edges(mesh).boundary, 0U);
   const double excess = signed_volume(bulged) - signed_volume(ball);
   EXPECT_LT(signed_volume(mesh) - signed_volume(ball), 0.35 * excess);
   EXPECT_GT(signed_volume(mesh), 0.9 * signed_volume(ball));
-  EXPECT_EQ(self_intersections(mesh), 0U);
+  EXPECT_TRUE(self_intersections(mesh).empty());
   for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
     if (mesh.confidence[v] > 0) {
       EXPECT_EQ((mesh.vertices[v] - bulged.vertices[v]).norm(), 0);
