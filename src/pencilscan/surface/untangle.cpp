@@ -213,15 +213,13 @@ std::size_t untangle(std::span<const Vec3> before, TriangleMesh& mesh) {
   for (Vec3& x : mesh.vertices) as_in_files(x);
   std::vector<std::size_t> faces = self_intersections(mesh);
   if (faces.empty()) return 0;
-  // What follows looks at the faces around only.
-  TriangleMesh near;
-  const std::vector<char> within = vertices_around(mesh, faces, 2 * kFarthest);
-  near.faces = faces_near(mesh, faces_at(mesh, within));
+  TriangleMesh near;  // fewer and fewer faces: those around what is left
   near.vertices.swap(mesh.vertices);
-  faces = self_intersections(near);
+  near.faces = mesh.faces;
   for (int round = 0; round < kRounds && !faces.empty(); ++round) {
     const std::vector<char> marked =
         vertices_around(near, faces, 1 + std::max(0, round - kSmoothings) / 2);
+    near.faces = faces_near(near, faces_at(near, vertices_around(near, faces, 2 * kFarthest)));
     if (round < kSmoothings) even_out(before, marked, near);
     for (std::size_t v = 0; v < marked.size(); ++v) {
       if (marked[v] == 0) continue;
