@@ -7,6 +7,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "pencilscan/core/median.h"
+#include "pencilscan/io/linear_light.h"
 #include "pencilscan/pattern/gray_code.h"
 
 namespace pencilscan {
@@ -29,13 +30,6 @@ cv::Mat channel(const cv::Mat& image, int c) {
   cv::Mat result;
   cv::extractChannel(image, result, c);
   return result;
-}
-
-cv::Mat linear_light(const cv::Mat& image, double gamma) {
-  if (gamma == 1) return image;
-  cv::Mat linear;
-  cv::pow(cv::max(image, 0.0), gamma, linear);
-  return linear;
 }
 
 /// One row of the unmixing matrix applied to a stack of colour images.
@@ -102,7 +96,7 @@ void ColorCollector::measure_channels(const CapturePair& pair, const DecodedView
   const Projector& projector = rig_.projectors[pair.projector];
   const double gamma = gamma_of(pair.camera, color.gamma);
   const auto read = [&](const std::filesystem::path& path) {
-    return linear_light(read_color_image(path, camera), gamma);
+    return linearized(read_color_image(path, camera), gamma);
   };
   GrayStack stack = make_gray_stack(projector.width, projector.height, pair.inverses,
                                     [&](std::size_t i) { return read(pair.files[i]); });

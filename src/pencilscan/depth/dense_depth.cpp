@@ -79,15 +79,11 @@ void mark_saturated(const CameraLight& light, int half, DepthMap& map) {
   }
 }
 
-/// The tangent plane of a surface point as inverse depth around a pixel.
-Quadric tangent_plane(const Camera& camera, const Vec3& point, const Vec3& normal, int half) {
-  const Vec3 x = camera.device_from_world * point;
-  const Vec3 n = camera.device_from_world.rotation * normal;
-  const Vec3 w_of_ray = n / n.dot(x);  // w = w_of_ray . (x, y, 1)
+/// A tangent plane as the start of a window's fit.
+Quadric quadric_of(const TangentView& at, int half) {
   Quadric q = Quadric::Zero();
-  q[0] = 1 / x.z();
-  q[1] = half * w_of_ray[0] / camera.K(0, 0);
-  q[2] = half * w_of_ray[1] / camera.K(1, 1);
+  q[0] = at.w;
+  q.segment<2>(1) = half * at.slope.cast<double>();
   return q;
 }
 
@@ -268,7 +264,7 @@ std::size_t complete_map(const CameraLight& light, const RayScene& surface, cons
     const auto hit = surface.first_hit(camera.ray(pixel));
     if (!hit) continue;
     const Vec3 normal = face_normal(surface.mesh(), hit->face);
-    const Quadric start = tangent_plane(camera, hit->point, normal, options.half);
+    const Quadric start = quadric_of(TangentView(camera, hit->point, normal), options.half);
     const auto fit = fitter.fit(pixel, start, 5);
     if (!fit || !acceptable(light, pixel, *fit, volume, options.half, options)) continue;
     const double move = (camera.point_at_depth(pixel, 1 / fit->q[0]) - hit->point).norm();

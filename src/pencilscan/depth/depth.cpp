@@ -6,6 +6,7 @@
 #include "pencilscan/core/median.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/core/stopwatch.h"
+#include "pencilscan/io/linear_light.h"
 
 namespace pencilscan {
 namespace {

@@ -7,6 +7,7 @@
 
 #include "pencilscan/core/check.h"
 #include "pencilscan/core/parallel.h"
+#include "pencilscan/io/linear_light.h"
 
 namespace pencilscan {
 namespace {

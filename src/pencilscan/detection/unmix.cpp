@@ -166,13 +166,6 @@ Unmixing estimate_unmixing(const Camera& camera, const Rig& rig,
   return result;
 }
 
-cv::Mat linearized(const cv::Mat& image, double gamma) {
-  if (gamma == 1) return image;
-  cv::Mat linear;
-  cv::pow(cv::max(image, 0.0), gamma, linear);
-  return linear;
-}
-
 cv::Mat projector_light(const Camera& camera, const cv::Mat& linear, const Unmixing& unmixing,
                         cv::Point corner) {
   cv::Matx33f matrix;

@@ -21,9 +21,6 @@ struct Unmixing {
                                          const std::vector<ColorFamily>& families,
                                          const cv::Mat& image);
 
-/// linear = value^gamma.
-[[nodiscard]] cv::Mat linearized(const cv::Mat& image, double gamma);
-
 /// Red, green and blue each where the camera's K, distortion and pose say (color_registration of
 /// the rig), CV_32FC3. `corner`: pixel of the camera that is the image's first. The image itself
 /// where the rig states nothing.

@@ -9,6 +9,7 @@
 #include "pencilscan/core/median.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/core/stopwatch.h"
+#include "pencilscan/io/linear_light.h"
 #include "pencilscan/pipeline/line_naming.h"
 #include "pencilscan/surface/vertex_color.h"
 

@@ -104,6 +104,24 @@ TriangleMesh subdivided(const TriangleMesh& mesh) {
   return fine;
 }
 
+std::vector<char> grown(const TriangleMesh& mesh, std::vector<char> marked, int edges,
+                        const std::function<bool(std::size_t)>& may_join) {
+  for (int edge = 0; edge < edges; ++edge) {
+    const std::vector<char> before = marked;
+    for (const auto& face : mesh.faces) {
+      const bool touched = std::any_of(face.begin(), face.end(), [&](int v) {
+        return before[static_cast<std::size_t>(v)] != 0;
+      });
+      if (!touched) continue;
+      for (const int vertex : face) {
+        const auto v = static_cast<std::size_t>(vertex);
+        if (marked[v] == 0 && (!may_join || may_join(v))) marked[v] = 1;
+      }
+    }
+  }
+  return marked;
+}
+
 TriangleMesh with_caps(TriangleMesh mesh) {
   PENCILSCAN_CHECK(mesh.sigma.empty() && mesh.confidence.empty() && mesh.hole.empty() &&
                    mesh.color.empty());

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -18,6 +19,11 @@ namespace pencilscan {
 
 /// Every face cut into four at the middles of its edges; properties are averaged.
 [[nodiscard]] TriangleMesh subdivided(const TriangleMesh& mesh);
+
+/// The marked vertices and those within `edges` edges of them, on paths of vertices that may join
+/// (all, where the function is empty).
+[[nodiscard]] std::vector<char> grown(const TriangleMesh& mesh, std::vector<char> marked, int edges,
+                                      const std::function<bool(std::size_t)>& may_join = {});
 
 /// The mesh with a fan over every loop of boundary edges, from a new vertex at the loop's mean.
 /// Only for meshes without vertex properties.

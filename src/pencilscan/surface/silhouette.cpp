@@ -9,6 +9,7 @@
 
 #include "pencilscan/core/chunks.h"
 #include "pencilscan/geometry/ray_scene.h"
+#include "pencilscan/surface/mesh_parts.h"
 #include "pencilscan/surface/sight.h"
 
 namespace pencilscan {
@@ -100,21 +101,6 @@ void smooth(std::span<const char> which, TriangleMesh& mesh) {
   }
 }
 
-/// Invented vertices within `edges` edges of those that moved.
-std::vector<char> around(const TriangleMesh& mesh, std::vector<char> moved, int edges) {
-  for (int edge = 0; edge < edges; ++edge) {
-    const std::vector<char> before = moved;
-    for (const auto& face : mesh.faces) {
-      for (std::size_t k = 0; k < 3; ++k) {
-        const auto a = static_cast<std::size_t>(face[k]);
-        const auto b = static_cast<std::size_t>(face[(k + 1) % 3]);
-        if (before[b] && !(mesh.confidence[a] > 0)) moved[a] = 1;
-      }
-    }
-  }
-  return moved;
-}
-
 }  // namespace
 
 double line_reach_px(const Rig& rig, const Camera& camera) {
@@ -183,7 +169,8 @@ std::size_t draw_in(const Rig& rig, std::span<const Silhouette> silhouettes,
       moves[v] = 1;
     });
     if (std::find(moves.begin(), moves.end(), 1) == moves.end()) break;
-    const std::vector<char> along = around(mesh, moves, 4);
+    const std::vector<char> along =
+        grown(mesh, moves, 4, [&](std::size_t v) { return !(mesh.confidence[v] > 0); });
     for (int pass = 0; pass < kSmoothings; ++pass) smooth(along, mesh);
     for (std::size_t v = 0; v < ever.size(); ++v) ever[v] = ever[v] || moves[v];
   }

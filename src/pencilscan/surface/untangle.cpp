@@ -8,6 +8,7 @@
 
 #include "pencilscan/core/check.h"
 #include "pencilscan/core/chunks.h"
+#include "pencilscan/surface/mesh_parts.h"
 
 namespace pencilscan {
 namespace {
@@ -123,26 +124,15 @@ std::vector<std::array<int, 3>> faces_near(const TriangleMesh& mesh, std::span<c
   return faces;
 }
 
-/// Vertices of the faces and those within `edges` edges of them.
-std::vector<char> vertices_around(const TriangleMesh& mesh, std::span<const std::size_t> faces,
-                                  int edges) {
+std::vector<char> vertices_of(const TriangleMesh& mesh, std::span<const std::size_t> faces) {
   std::vector<char> marked(mesh.vertices.size(), 0);
   for (const std::size_t f : faces) {
     for (const int v : mesh.faces[f]) marked[static_cast<std::size_t>(v)] = 1;
   }
-  for (int edge = 0; edge < edges; ++edge) {
-    const std::vector<char> before = marked;
-    for (const auto& face : mesh.faces) {
-      const bool touched = std::any_of(face.begin(), face.end(), [&](int v) {
-        return before[static_cast<std::size_t>(v)] != 0;
-      });
-      if (!touched) continue;
-      for (const int v : face) marked[static_cast<std::size_t>(v)] = 1;
-    }
-  }
   return marked;
 }
 
+/// Faces with such a vertex.
 std::vector<char> faces_at(const TriangleMesh& mesh, std::span<const char> vertices) {
   std::vector<char> marked(mesh.faces.size(), 0);
   for (std::size_t f = 0; f < marked.size(); ++f) {
@@ -217,9 +207,9 @@ std::size_t untangle(std::span<const Vec3> before, TriangleMesh& mesh) {
   near.vertices.swap(mesh.vertices);
   near.faces = mesh.faces;
   for (int round = 0; round < kRounds && !faces.empty(); ++round) {
-    const std::vector<char> marked =
-        vertices_around(near, faces, 1 + std::max(0, round - kSmoothings) / 2);
-    near.faces = faces_near(near, faces_at(near, vertices_around(near, faces, 2 * kFarthest)));
+    const std::vector<char> cut = vertices_of(near, faces);
+    const std::vector<char> marked = grown(near, cut, 1 + std::max(0, round - kSmoothings) / 2);
+    near.faces = faces_near(near, faces_at(near, grown(near, cut, 2 * kFarthest)));
     if (round < kSmoothings) even_out(before, marked, near);
     for (std::size_t v = 0; v < marked.size(); ++v) {
       if (marked[v] == 0) continue;
