@@ -56,6 +56,17 @@ WindowFitter::WindowFitter(const CameraLight& light, int half) : light_(&light),
   xx_ = x_ * x_;
   xy_ = x_ * y_;
   yy_ = y_ * y_;
+  const auto zero_or_one = [](const auto& condition) -> Column {
+    return condition.template cast<float>();
+  };
+  middle_ = zero_or_one(xx_ + yy_ < kMiddle2);
+  for (std::size_t k = 0; k < beyond_.size(); ++k) {
+    const double angle =
+        2 * std::numbers::pi * static_cast<double>(k) / static_cast<double>(beyond_.size());
+    beyond_[k] = zero_or_one(x_ * static_cast<float>(std::cos(angle)) +
+                                 y_ * static_cast<float>(std::sin(angle)) >
+                             kSideStart);
+  }
   const std::size_t families = light.families.size();
   image_.assign(families, Column::Zero(padded_));
   offset_.assign(families, 0.F);
@@ -262,16 +273,24 @@ double WindowFitter::step(Quadric& q, bool last, WindowFit& fit) {
   const Eigen::LDLT<Dense> solver(H);
   if (last) {
     fit.misfit = static_cast<float>(chi2 / degrees);
-    const Dense columns = solver.solve(Dense::Identity(unknowns, unknowns));
     const double inflate = std::max(1.0, chi2 / degrees);
-    fit.covariance = (columns.topLeftCorner<3, 3>() * (inflate * q[0] * q[0])).cast<float>().eval();
-    fit.variance = columns(0, 0) * inflate * q[0] * q[0];
-    int at = 0;
+    // Of the inverse, what is read: the depth's column, and an element for each line.
     std::vector<int> next = first;
+    std::vector<int> unknown_of_lit;
+    for (const Lit& lit : lit_) {
+      if (lit.on) unknown_of_lit.push_back(next[static_cast<std::size_t>(lit.family)]++);
+    }
+    Dense columns = Dense::Zero(unknowns, 1 + static_cast<Eigen::Index>(unknown_of_lit.size()));
+    columns(0, 0) = 1;
+    for (std::size_t k = 0; k < unknown_of_lit.size(); ++k)
+      columns(unknown_of_lit[k], 1 + static_cast<Eigen::Index>(k)) = 1;
+    solver.solveInPlace(columns);
+    fit.variance = columns(0, 0) * inflate * q[0] * q[0];
+    Eigen::Index k = 0;
     for (Lit& lit : lit_) {
       if (!lit.on) continue;
-      at = next[static_cast<std::size_t>(lit.family)]++;
-      lit.amplitude_variance = static_cast<float>(inflate * columns(at, at));
+      const int at = unknown_of_lit[static_cast<std::size_t>(k)];
+      lit.amplitude_variance = static_cast<float>(inflate * columns(at, ++k));
     }
     return 0;
   }
@@ -322,9 +341,8 @@ bool WindowFitter::iterate(Quadric& q, int rounds, WindowFit& fit) {
   return true;
 }
 
-float WindowFitter::light_share(const Column& mask, float& energy) {
-  float seen = 0;
-  energy = 0;
+void WindowFitter::compare_light() {
+  seen_ = predicted_ = Column::Zero(padded_);
   thread_local Column light;
   for (std::size_t f = 0; f < image_.size(); ++f) {
     light = Column::Zero(padded_);
@@ -333,28 +351,27 @@ float WindowFitter::light_share(const Column& mask, float& energy) {
         light += lit_[k].amplitude * profile_[k];
     }
     light *= 1.F + ex_[f] * x_ + ey_[f] * y_;
-    seen += inverse_variance_[f] * (mask * light * (image_[f] - offset_[f])).sum();
-    energy += inverse_variance_[f] * (mask * light.square()).sum();
+    seen_ += inverse_variance_[f] * weight_ * light * (image_[f] - offset_[f]);
+    predicted_ += inverse_variance_[f] * weight_ * light.square();
   }
-  return energy > 0 ? seen / energy : 1.F;
 }
 
-std::optional<Vec2> WindowFitter::dark_side() {
-  std::optional<Vec2> darkest;
+std::optional<std::size_t> WindowFitter::dark_side() const {
+  std::optional<std::size_t> darkest;
   float least = kLeastLight;
-  for (int k = 0; k < 8; ++k) {
-    const double angle = 0.25 * std::numbers::pi * k;
-    const Vec2 side(std::cos(angle), std::sin(angle));
-    const Column beyond = x_ * static_cast<float>(side[0]) + y_ * static_cast<float>(side[1]);
-    const Column mask = (beyond > kSideStart).select(weight_, Column::Zero(padded_));
-    float energy = 0;
-    const float share = light_share(mask, energy);
-    if (share < least && energy > kLeastEnergy) {
-      least = share;
-      darkest = side;
-    }
+  for (std::size_t side = 0; side < beyond_.size(); ++side) {
+    const float energy = (beyond_[side] * predicted_).sum();
+    const float seen = (beyond_[side] * seen_).sum();
+    if (!(energy > kLeastEnergy && seen < least * energy)) continue;
+    least = seen / energy;
+    darkest = side;
   }
   return darkest;
+}
+
+bool WindowFitter::is_middle_dark() const {
+  const float energy = (middle_ * predicted_).sum();
+  return energy > kLeastEnergy && (middle_ * seen_).sum() < kLeastLight * energy;
 }
 
 std::optional<WindowFit> WindowFitter::fit(const Vec2& pixel, const Quadric& start, int rounds) {
@@ -380,21 +397,20 @@ std::optional<WindowFit> WindowFitter::fit(const Vec2& pixel, const Quadric& sta
   WindowFit fit;
   if (!iterate(q, rounds, fit)) return std::nullopt;
   // Where the surface ends within the window, fit what is left of it.
+  compare_light();
   if (const auto side = dark_side()) {
-    const Column beyond = x_ * static_cast<float>((*side)[0]) + y_ * static_cast<float>((*side)[1]);
-    weight_ = (beyond > kSideStart).select(0.F, weight_);
+    weight_ *= 1.F - beyond_[*side];
     choose_patterns(m, jacobian, q);
     if (lit_.empty()) return std::nullopt;
     render(q);
     solve_amplitudes();
     if (!iterate(q, rounds, fit)) return std::nullopt;
+    compare_light();
     if (dark_side()) return std::nullopt;
     fit.cut = true;
   }
   // The centre itself must show the light that is predicted there.
-  float energy = 0;
-  const Column middle = (xx_ + yy_ < kMiddle2).select(weight_, Column::Zero(padded_));
-  if (light_share(middle, energy) < kLeastLight && energy > kLeastEnergy) return std::nullopt;
+  if (is_middle_dark()) return std::nullopt;
   step(q, true, fit);
   fit.q = q;
   float residual = 0;

@@ -34,8 +34,7 @@ using Quadric = Eigen::Matrix<double, 6, 1>;
 
 struct WindowFit {
   Quadric q = Quadric::Zero();
-  double variance = 0;                                   ///< of q[0], 1/mm^2, misfit included
-  Eigen::Matrix3f covariance = Eigen::Matrix3f::Zero();  ///< of q[0..2], misfit included
+  double variance = 0;                     ///< of q[0], 1/mm^2, misfit included
   float misfit = 0;                        ///< chi^2 per degree of freedom against the noise model
   float relative_residual = 0;             ///< root mean square over the largest amplitude
   std::uint64_t lit = 0;                   ///< patterns found
@@ -79,8 +78,11 @@ class WindowFitter {
   void solve_amplitudes();
   double step(Quadric& q, bool last, WindowFit& fit);
   [[nodiscard]] bool iterate(Quadric& q, int rounds, WindowFit& fit);
-  [[nodiscard]] std::optional<Vec2> dark_side();
-  [[nodiscard]] float light_share(const Column& mask, float& energy);
+  /// Light that the fit predicts at each pixel, and what is seen of it.
+  void compare_light();
+  /// The side that shows too little of the predicted light: of beyond_.
+  [[nodiscard]] std::optional<std::size_t> dark_side() const;
+  [[nodiscard]] bool is_middle_dark() const;
 
   const CameraLight* light_;
   int half_;
@@ -88,7 +90,10 @@ class WindowFitter {
   int padded_ = 0;  ///< rounded up to a multiple of eight; weight 0 beyond count_
   std::vector<int> du_, dv_;
   Column x_, y_, xx_, xy_, yy_, taper_, weight_, w_;
-  std::vector<Column> image_;  ///< per family
+  Column middle_;                 ///< 1 near the centre, 0 elsewhere
+  std::array<Column, 8> beyond_;  ///< 1 on one side of the centre, 0 elsewhere
+  Column seen_, predicted_;       ///< weighted by what a pixel says
+  std::vector<Column> image_;     ///< per family
   std::vector<Lit> lit_;
   std::vector<Column> profile_, slope_;  ///< per lit: P, dP/dw
   std::vector<float> offset_, ex_, ey_, inverse_variance_, mean_;

@@ -53,11 +53,11 @@ CameraDetection detect_curves(const Camera& camera, const Rig& rig,
                               const DetectionOptions& options) {
   PENCILSCAN_CHECK(image.type() == CV_32FC3);
   CameraDetection result;
-  result.saturated_pixels = count_saturated(image);
   // Unmix the colour families where there is light.
   const cv::Mat whole = linearized(image, camera.gamma);
   const cv::Rect area = lit_area(whole);
   const cv::Mat linear = whole(area);
+  result.saturated_pixels = count_saturated(image(area));
   result.unmixing = estimate_unmixing(camera, rig, families, registered(camera, linear, area.tl()));
   const cv::Mat rgb = projector_light(camera, linear, result.unmixing, area.tl());
   // Find and trace the curves of each family, then fit them together.

@@ -14,20 +14,30 @@ struct TableMinima {
   std::vector<float> of_rows;     ///< out[i] = min_j cavity_b[j] + table[i, j]
 };
 
-/// Both directions at once, so that the table is read once; >= kLanes columns. The last block of a
-/// row overlaps the one before: for a minimum that does no harm.
+/// Both directions at once, so that the table is read once; >= kLanes columns. The last columns of
+/// a row are read together with some before them, which does a minimum no harm; their minima stay
+/// in a register: what is written in one block and read in another stalls.
 PENCILSCAN_CLONES
 void scan_wide_table(const float* table, const float* cavity_a, const float* cavity_b, int rows,
                      int columns, float* of_rows, float* of_columns) {
   Lanes worst;
   fill(std::numeric_limits<float>::max(), worst);
+  const int whole = columns / kLanes * kLanes;
+  const int last = columns - kLanes;
+  Lanes last_b;
+  load(cavity_b + last, last_b);
+  Lanes last_column = worst;
   for (int i = 0; i < rows; ++i) {
     const float* row = table + static_cast<std::ptrdiff_t>(i) * columns;
     const float a = cavity_a[i];
-    Lanes best = worst;
-    for (int block = 0; block < columns; block += kLanes) {
-      const int j = std::min(block, columns - kLanes);
-      Lanes value;
+    __builtin_prefetch(row + 512);
+    __builtin_prefetch(row + 528);
+    Lanes value;
+    load(row + last, value);
+    const Lanes last_from_a = value + a;
+    last_column = last_from_a < last_column ? last_from_a : last_column;
+    Lanes best = value + last_b;
+    for (int j = 0; j < whole; j += kLanes) {
       Lanes column;
       Lanes b;
       load(row + j, value);
@@ -42,6 +52,9 @@ void scan_wide_table(const float* table, const float* cavity_a, const float* cav
     for (int k = 1; k < kLanes; ++k) lowest = std::min(lowest, best[k]);
     of_rows[i] = lowest;
   }
+  Lanes column;
+  load(of_columns + last, column);
+  store(last_column < column ? last_column : column, of_columns + last);
 }
 
 void scan_narrow_table(const float* table, const float* cavity_a, const float* cavity_b, int rows,

@@ -47,7 +47,16 @@ void attribute_vertices(std::span<const SurfaceSample> samples, double reach_spa
   std::vector<Vec3> positions;
   positions.reserve(samples.size());
   for (const SurfaceSample& s : samples) positions.push_back(s.position);
-  const PointGrid grid(positions, radius);
+  std::vector<double> reach;
+  for (const SurfaceSample& s : samples) {
+    const double tilt = s.sheet_normal.dot(s.normal);
+    const double stretch = 1 / std::sqrt(std::max(1 - tilt * tilt, 1e-6));
+    reach.push_back(reach_spacings * s.spacing * std::min(stretch, kMaxStretch));
+  }
+  // Nearly all vertices are within reach of a sample; only the others look farther.
+  const double near_radius =
+      std::min(radius, samples.empty() ? radius : *std::max_element(reach.begin(), reach.end()));
+  const PointGrid grid(positions, near_radius);
   const std::vector<Vec3> normals = vertex_normals(mesh);
   std::vector<char> fringe(mesh.vertices.size(), 0);
   mesh.sigma.assign(mesh.vertices.size(), 0.0F);
@@ -62,18 +71,15 @@ void attribute_vertices(std::span<const SurfaceSample> samples, double reach_spa
     double pull_length = 0;
     std::array<bool, 256> seen{};
     int cameras = 0;
-    grid.for_each_within(mesh.vertices[v], radius, [&](std::size_t i, double d2) {
+    const auto visit = [&](std::size_t i, double d2) {
       const SurfaceSample& s = samples[i];
       const Vec3 d = s.position - mesh.vertices[v];
       if (s.normal.dot(normals[v]) < 0.5) return;
       if (std::abs(d.dot(normals[v])) > 0.5 * spacing) return;
       const double distance = std::sqrt(d2);
       nearest = std::min(nearest, distance);
-      const double tilt = s.sheet_normal.dot(s.normal);
-      const double stretch = 1 / std::sqrt(std::max(1 - tilt * tilt, 1e-6));
-      const double reach = reach_spacings * s.spacing * std::min(stretch, kMaxStretch);
-      if (distance > reach) return;
-      best = std::min(best, distance / reach);
+      if (distance > reach[i]) return;
+      best = std::min(best, distance / reach[i]);
       pull += d;
       pull_length += distance;
       // The neighbours' scatter about the surface holds their noise: the larger of both counts.
@@ -85,7 +91,9 @@ void attribute_vertices(std::span<const SurfaceSample> samples, double reach_spa
       confidence_sum += w * s.confidence;
       if (!seen[s.camera]) ++cameras;
       seen[s.camera] = true;
-    });
+    };
+    grid.for_each_within(mesh.vertices[v], near_radius, visit);
+    if (nearest == radius) grid.for_each_within(mesh.vertices[v], radius, visit);
     double variance = kInterpolation * kInterpolation * nearest * nearest;
     // Samples that fill a half plane pull with 2 / pi of their summed distance.
     fringe[v] = pull.norm() > 0.55 * pull_length && best > kOutsideReach;

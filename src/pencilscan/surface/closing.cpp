@@ -10,17 +10,44 @@
 namespace pencilscan {
 namespace {
 
-/// Depth at which the octree's cells have the wished size.
-int octree_depth(std::span<const SurfaceSample> samples, const ClosingOptions& options,
-                 double scale) {
+struct Cube {
+  Vec3 center;
+  double half_side;
+};
+
+Cube bounding_cube(std::span<const SurfaceSample> samples) {
   Vec3 low = samples[0].position;
   Vec3 high = low;
   for (const SurfaceSample& s : samples) {
     low = low.cwiseMin(s.position);
     high = high.cwiseMax(s.position);
   }
-  const double extent = scale * (high - low).maxCoeff();
-  const double cells = extent / (options.cell_mm);
+  return {0.5 * (low + high), 0.5 * (high - low).maxCoeff()};
+}
+
+/// Side of a cube that the closed surface does not leave, relative to the samples' bounding cube:
+/// the smaller, the finer the octree. A coarse surface tells. What few cameras saw may leave any
+/// cube: it is cut by the smallest one and capped there.
+double cube_scale(std::span<const SurfaceSample> samples, const Cube& cube) {
+  constexpr int kProbeDepth = 6;
+  constexpr double kSmallest = 1.5;
+  constexpr double kWide = 2;
+  constexpr double kWidest = 3;
+  constexpr double kRoom = 1.25;  // a surface moves outwards with the faces of its cube near by
+  const TriangleMesh probe = poisson_surface(samples, kProbeDepth, kWide);
+  if (count_edges(probe).boundary == 0) {
+    double reach = 0;
+    for (const Vec3& x : probe.vertices)
+      reach = std::max(reach, (x - cube.center).cwiseAbs().maxCoeff());
+    return kRoom * reach < kSmallest * cube.half_side ? kSmallest : kWide;
+  }
+  const bool is_inside = count_edges(poisson_surface(samples, kProbeDepth, kWidest)).boundary == 0;
+  return is_inside ? kWidest : kSmallest;
+}
+
+/// Depth at which the octree's cells have the wished size.
+int octree_depth(const Cube& cube, const ClosingOptions& options, double scale) {
+  const double cells = 2 * scale * cube.half_side / options.cell_mm;
   return std::clamp(static_cast<int>(std::ceil(std::log2(std::max(cells, 1.0)) - 0.25)), 5,
                     options.max_depth);
 }
@@ -54,20 +81,11 @@ TriangleMesh without_floaters(const TriangleMesh& mesh, double min_share, std::s
 
 ClosedSurface closed_surface(std::span<const SurfaceSample> samples,
                              const ClosingOptions& options) {
-  constexpr int kProbeDepth = 6;  // half a second, against several at the full depth
-  // The smallest cube that the surface does not leave. A coarse surface leaves it where a fine one
-  // does. What few cameras saw may leave any cube: it is cut by the smallest one and capped there.
-  constexpr double kSmallest = 1.5;
-  double scale = kSmallest;
-  for (const double wider : {kSmallest, 2.0, 3.0}) {
-    if (count_edges(poisson_surface(samples, kProbeDepth, wider)).boundary > 0) continue;
-    scale = wider;
-    break;
-  }
+  const Cube cube = bounding_cube(samples);
   ClosedSurface result;
-  result.scale = scale;
-  result.depth = octree_depth(samples, options, scale);
-  result.mesh = with_caps(poisson_surface(samples, result.depth, scale));
+  result.scale = cube_scale(samples, cube);
+  result.depth = octree_depth(cube, options, result.scale);
+  result.mesh = with_caps(poisson_surface(samples, result.depth, result.scale));
   attribute_vertices(samples, options.reach_spacings, options.spacing_mm, result.mesh);
   result.mesh =
       without_floaters(result.mesh, options.min_component_share, result.components_removed);

@@ -14,7 +14,7 @@ constexpr double kLeastCosine = 0.15;  // of the incidence of a vertex to the ca
 constexpr double kGrazing = 0.2;       // keeps grazing views from looking exact
 /// What the quadric misses within its window, mm at a right angle: relief that no sigma knows.
 constexpr double kRelief = 0.04;
-constexpr double kLeastBell = 0.04;
+constexpr double kReach = 2.5;  // of a node's say, widths
 
 struct Prediction {
   double height = 0;  ///< along the vertex normal, mm
@@ -30,16 +30,18 @@ class NodeView {
         eye_(camera_->center()),
         map_(&map),
         farthest_(options.farthest_mm),
+        fx_(camera_->K(0, 0)),
+        fy_(camera_->K(1, 1)),
         inverse_width2_(0.5 / (options.width_nodes * options.width_nodes)),
-        reach_(static_cast<int>(std::ceil(2.5 * options.width_nodes))) {}
+        reach2_(kReach * kReach * options.width_nodes * options.width_nodes),
+        reach_(static_cast<int>(std::ceil(kReach * options.width_nodes))) {}
 
   /// What the nodes around the pixel of x say of the surface there; n: its normal, world.
   void predict(const Vec3& x, const Vec3& n, std::vector<Prediction>& predictions) const {
     if ((eye_ - x).normalized().dot(n) < kLeastCosine) return;
     const auto pixel = camera_->project(x);
     if (!pixel || !camera_->contains(*pixel)) return;
-    const Vec3 local = camera_->device_from_world * x;
-    const Vec3 normal = camera_->device_from_world.rotation * n;
+    const Place place(*camera_, x, n);
     const Vec2 at = *pixel / map_->stride;
     const int row0 = static_cast<int>(std::lround(at[1]));
     const int column0 = static_cast<int>(std::lround(at[0]));
@@ -47,40 +49,57 @@ class NodeView {
          ++row) {
       for (int column = std::max(0, column0 - reach_);
            column <= std::min(map_->columns - 1, column0 + reach_); ++column) {
+        const double right = at[0] - column;
+        const double down = at[1] - row;
+        const double apart2 = right * right + down * down;
+        if (apart2 > reach2_) continue;
         const DepthNode& node = map_->nodes[map_->index(row, column)];
         if (!node.measured()) continue;
-        const Vec2 apart(at[0] - column, at[1] - row);
-        const double bell = std::exp(-apart.squaredNorm() * inverse_width2_);
-        if (bell < kLeastBell) continue;
-        const auto height = node_height(node, apart * map_->stride, local, normal);
+        const auto height = node_height(node, right * map_->stride, down * map_->stride, place);
         if (!height) continue;
+        const double bell = std::exp(-apart2 * inverse_width2_);
         predictions.push_back({height->first, bell * height->second, bell});
       }
     }
   }
 
  private:
-  /// Height of the node's quadric over a point (camera frame) whose pixel is d beyond the node,
-  /// along `normal`, and the inverse of its variance.
+  /// A point and its normal in the camera's frame.
+  struct Place {
+    Place(const Camera& camera, const Vec3& x, const Vec3& n)
+        : normal(camera.device_from_world.rotation * n) {
+      const Vec3 local = camera.device_from_world * x;
+      depth = local.z();
+      ray = local / depth;
+      ray_length = ray.norm();
+    }
+    Vec3 normal;
+    Vec3 ray;  ///< of depth 1
+    double depth, ray_length;
+  };
+
+  /// Height of the node's quadric over a place whose pixel is (dx, dy) beyond the node, along the
+  /// place's normal, and the inverse of its variance. In scalars: vectors made of them stall.
   [[nodiscard]] std::optional<std::pair<double, double>> node_height(const DepthNode& node,
-                                                                     const Vec2& d,
-                                                                     const Vec3& point,
-                                                                     const Vec3& normal) const {
+                                                                     double dx, double dy,
+                                                                     const Place& at) const {
     const double wxx = node.wxx, wxy = node.wxy, wyy = node.wyy;
-    const Vec2 slope(node.wx + wxx * d[0] + wxy * d[1], node.wy + wxy * d[0] + wyy * d[1]);
-    const double w = node.w + node.wx * d[0] + node.wy * d[1] +
-                     0.5 * (wxx * d[0] * d[0] + wyy * d[1] * d[1]) + wxy * d[0] * d[1];
+    const double wx = node.wx, wy = node.wy;
+    const double w =
+        node.w + wx * dx + wy * dy + 0.5 * (wxx * dx * dx + wyy * dy * dy) + wxy * dx * dy;
     if (!(w > 0)) return std::nullopt;
     // w = omega . (x, y, 1) over normalised pixels: the normal towards the camera is -omega.
-    const Vec3 ray = point / point.z();
-    const Vec2 per_ray(slope[0] * camera_->K(0, 0), slope[1] * camera_->K(1, 1));
-    const Vec3 surface_normal =
-        -Vec3(per_ray[0], per_ray[1], w - per_ray.dot(ray.head<2>())).normalized();
-    const double agreement = surface_normal.dot(normal);
-    if (agreement < 0.5) return std::nullopt;
-    const double height = (1 / w - point.z()) * ray.dot(surface_normal) / agreement;
+    const double x = (wx + wxx * dx + wxy * dy) * fx_;
+    const double y = (wy + wxy * dx + wyy * dy) * fy_;
+    const double z = w - x * at.ray.x() - y * at.ray.y();
+    const double length = std::sqrt(x * x + y * y + z * z);
+    // Cosine to the place's normal times the length.
+    const double along = -(x * at.normal.x() + y * at.normal.y() + z * at.normal.z());
+    if (along < 0.5 * length) return std::nullopt;
+    // The ray meets the surface at 1 / w: omega . ray = w.
+    const double height = (w * at.depth - 1) / along;
     if (!(std::abs(height) < farthest_)) return std::nullopt;
-    const double cosine = std::max(-ray.normalized().dot(surface_normal), kGrazing);
+    const double cosine = std::max(w / (at.ray_length * length), kGrazing);
     const double sigma = static_cast<double>(node.sigma) * cosine;
     const double relief = kRelief / cosine;  // a window covers more of a slanted surface
     return std::pair(height, 1 / (sigma * sigma + relief * relief));
@@ -90,7 +109,9 @@ class NodeView {
   Vec3 eye_;
   const DepthMap* map_;
   double farthest_;
+  double fx_, fy_;
   double inverse_width2_;
+  double reach2_;  ///< squared, nodes
   int reach_;
 };
 

@@ -86,18 +86,22 @@ class Verdict {
 
 /// Half-way to the mean of the neighbours, for vertices where `which` is set.
 void smooth(std::span<const char> which, TriangleMesh& mesh) {
-  std::vector<Vec3> sum(mesh.vertices.size(), Vec3::Zero());
-  std::vector<int> count(mesh.vertices.size(), 0);
+  struct Sum {
+    Vec3 of = Vec3::Zero();
+    double count = 0;
+  };
+  std::vector<Sum> neighbors(mesh.vertices.size());
   for (const auto& face : mesh.faces) {
     for (std::size_t k = 0; k < 3; ++k) {
       const auto a = static_cast<std::size_t>(face[k]);
       if (!which[a]) continue;
-      sum[a] += mesh.vertices[static_cast<std::size_t>(face[(k + 1) % 3])];
-      ++count[a];
+      neighbors[a].of += mesh.vertices[static_cast<std::size_t>(face[(k + 1) % 3])];
+      ++neighbors[a].count;
     }
   }
-  for (std::size_t v = 0; v < count.size(); ++v) {
-    if (count[v] > 0) mesh.vertices[v] = 0.5 * (mesh.vertices[v] + sum[v] / count[v]);
+  for (std::size_t v = 0; v < neighbors.size(); ++v) {
+    const Sum& sum = neighbors[v];
+    if (sum.count > 0) mesh.vertices[v] = 0.5 * (mesh.vertices[v] + sum.of / sum.count);
   }
 }
 
@@ -149,31 +153,39 @@ Silhouette silhouette(int camera, const cv::Mat& image, double reach_px) {
 std::size_t draw_in(const Rig& rig, std::span<const Silhouette> silhouettes,
                     const DrawInOptions& options, TriangleMesh& mesh) {
   if (silhouettes.empty() || mesh.confidence.empty()) return 0;
+  const auto is_invented = [&](std::size_t v) { return !(mesh.confidence[v] > 0); };
+  TriangleMesh loose;  // the faces that may move
+  loose.vertices = mesh.vertices;
+  for (const auto& face : mesh.faces) {
+    if (std::any_of(face.begin(), face.end(),
+                    [&](int v) { return is_invented(static_cast<std::size_t>(v)); }))
+      loose.faces.push_back(face);
+  }
   std::vector<char> ever(mesh.vertices.size(), 0);
   std::optional<Verdict> verdict;
-  std::vector<Vec3> then;  // when the scene was made
-  std::vector<Vec3> then_normals;
+  std::vector<Vec3> then_normals;  // when the scene was made
   for (int round = 0; round < options.rounds; ++round) {
+    const std::vector<Vec3> normals = vertex_normals(loose);
     if (round % kRoundsPerScene == 0) {
+      mesh.vertices = loose.vertices;
       verdict.emplace(rig, silhouettes, mesh, options.least_cosine);
-      then = mesh.vertices;
-      then_normals = vertex_normals(mesh);
+      then_normals = normals;
     }
-    const std::vector<Vec3> normals = vertex_normals(mesh);
+    const std::vector<Vec3>& then = mesh.vertices;
     std::vector<char> moves(mesh.vertices.size(), 0);
     parallel_chunks(mesh.vertices.size(), [&](std::size_t v) {
-      if (mesh.confidence[v] > 0 || !(normals[v].squaredNorm() > 0.5)) return;
-      if (!verdict->is_outside(mesh.vertices[v], then[v], then_normals[v])) return;
+      if (!is_invented(v) || !(normals[v].squaredNorm() > 0.5)) return;
+      if (!verdict->is_outside(loose.vertices[v], then[v], then_normals[v])) return;
       const double room = verdict->thickness(then[v], then_normals[v]);
-      mesh.vertices[v] -= std::min(options.step_mm, 0.25 / kRoundsPerScene * room) * normals[v];
+      loose.vertices[v] -= std::min(options.step_mm, 0.25 / kRoundsPerScene * room) * normals[v];
       moves[v] = 1;
     });
     if (std::find(moves.begin(), moves.end(), 1) == moves.end()) break;
-    const std::vector<char> along =
-        grown(mesh, moves, 4, [&](std::size_t v) { return !(mesh.confidence[v] > 0); });
-    for (int pass = 0; pass < kSmoothings; ++pass) smooth(along, mesh);
+    const std::vector<char> along = grown(loose, moves, 4, is_invented);
+    for (int pass = 0; pass < kSmoothings; ++pass) smooth(along, loose);
     for (std::size_t v = 0; v < ever.size(); ++v) ever[v] = ever[v] || moves[v];
   }
+  mesh.vertices = std::move(loose.vertices);
   return static_cast<std::size_t>(std::count(ever.begin(), ever.end(), 1));
 }
 

@@ -2,12 +2,13 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstdint>
 #include <unordered_set>
 
 #include "pencilscan/core/check.h"
-#include "pencilscan/core/chunks.h"
+#include "pencilscan/core/parallel.h"
 #include "pencilscan/surface/mesh_parts.h"
 
 namespace pencilscan {
@@ -40,9 +41,11 @@ bool pierces(const Vec3& p, const Vec3& q, const std::array<Vec3, 3>& t) {
   return (ab > 0 && bc > 0 && ca > 0) || (ab < 0 && bc < 0 && ca < 0);
 }
 
+bool boxes_touch(const Triangle& a, const Triangle& b) {
+  return (a.low.array() <= b.high.array()).all() && (b.low.array() <= a.high.array()).all();
+}
+
 bool cut_each_other(const Triangle& a, const Triangle& b) {
-  if ((a.low.array() > b.high.array()).any() || (b.low.array() > a.high.array()).any())
-    return false;
   for (std::size_t k = 0; k < 3; ++k) {
     if (pierces(a.x[k], a.x[(k + 1) % 3], b.x) || pierces(b.x[k], b.x[(k + 1) % 3], a.x))
       return true;
@@ -55,13 +58,6 @@ bool have_common_vertex(const std::array<int, 3>& a, const std::array<int, 3>& b
 }
 
 using Cell = std::array<std::int32_t, 3>;
-
-/// A face in one of the cubes that its bounding box touches.
-struct CellEntry {
-  Cell cell;
-  std::uint32_t face;
-  friend auto operator<=>(const CellEntry&, const CellEntry&) = default;
-};
 
 template <class Visit>
 void for_each_cell(const Triangle& t, double size, Visit&& visit) {
@@ -93,18 +89,33 @@ struct CellHash {
   }
 };
 
-/// All faces by cells, sorted.
-std::vector<CellEntry> cells_of(const TriangleMesh& mesh) {
-  const double size = cell_size(mesh);
-  std::vector<CellEntry> entries;
-  for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
-    for_each_cell(triangle(mesh, f), size, [&](const Cell& cell) {
-      entries.push_back({cell, static_cast<std::uint32_t>(f)});
-    });
+/// Faces whose bounding boxes touch the same cube, and at times those of another one.
+struct Buckets {
+  std::vector<std::size_t> starts;  ///< of each bucket in `faces`, and the end of the last
+  std::vector<std::uint32_t> faces;
+
+  explicit Buckets(const TriangleMesh& mesh) : starts(std::bit_ceil(mesh.faces.size()) + 1, 0) {
+    const double size = cell_size(mesh);
+    const std::size_t mask = starts.size() - 2;
+    std::vector<std::uint32_t> bucket_of;
+    std::vector<std::size_t> ends;  // of each face in bucket_of
+    for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
+      for_each_cell(triangle(mesh, f), size, [&](const Cell& cell) {
+        const std::size_t bucket = CellHash()(cell) & mask;
+        bucket_of.push_back(static_cast<std::uint32_t>(bucket));
+        ++starts[bucket + 1];
+      });
+      ends.push_back(bucket_of.size());
+    }
+    for (std::size_t k = 1; k < starts.size(); ++k) starts[k] += starts[k - 1];
+    faces.resize(bucket_of.size());
+    std::vector<std::size_t> next(starts.begin(), starts.end() - 1);
+    std::size_t i = 0;
+    for (std::size_t f = 0; f < ends.size(); ++f) {
+      for (; i < ends[f]; ++i) faces[next[bucket_of[i]]++] = static_cast<std::uint32_t>(f);
+    }
   }
-  std::sort(entries.begin(), entries.end());
-  return entries;
-}
+};
 
 /// The marked faces and all that share a cell with one of them.
 std::vector<std::array<int, 3>> faces_near(const TriangleMesh& mesh, std::span<const char> marked) {
@@ -164,31 +175,34 @@ void even_out(std::span<const Vec3> before, std::span<const char> marked, Triang
 }  // namespace
 
 std::vector<std::size_t> self_intersections(const TriangleMesh& mesh) {
+  constexpr std::size_t kBucketsPerRun = 1024;
   if (mesh.faces.empty()) return {};
-  const std::vector<CellEntry> entries = cells_of(mesh);
-  std::vector<std::size_t> starts;  // of the cells
-  for (std::size_t i = 0; i < entries.size(); ++i) {
-    if (i == 0 || entries[i].cell != entries[i - 1].cell) starts.push_back(i);
-  }
-  starts.push_back(entries.size());
-  std::vector<std::vector<std::size_t>> found(starts.size() - 1);
-  parallel_chunks(found.size(), [&](std::size_t c) {
-    thread_local std::vector<Triangle> triangles;
-    triangles.clear();
-    for (std::size_t i = starts[c]; i < starts[c + 1]; ++i)
-      triangles.push_back(triangle(mesh, entries[i].face));
-    for (std::size_t a = 0; a < triangles.size(); ++a) {
-      for (std::size_t b = a + 1; b < triangles.size(); ++b) {
-        const std::size_t face_a = entries[starts[c] + a].face;
-        const std::size_t face_b = entries[starts[c] + b].face;
-        if (have_common_vertex(mesh.faces[face_a], mesh.faces[face_b])) continue;
-        if (cut_each_other(triangles[a], triangles[b]))
-          found[c].insert(found[c].end(), {face_a, face_b});
+  const Buckets buckets(mesh);
+  std::vector<std::vector<std::size_t>> found((buckets.starts.size() + kBucketsPerRun - 2) /
+                                              kBucketsPerRun);
+  parallel_for(found.size(), [&](std::size_t run) {
+    std::vector<Triangle> triangles;
+    const std::size_t end = std::min((run + 1) * kBucketsPerRun, buckets.starts.size() - 1);
+    for (std::size_t k = run * kBucketsPerRun; k < end; ++k) {
+      const std::span faces =
+          std::span(buckets.faces)
+              .subspan(buckets.starts[k], buckets.starts[k + 1] - buckets.starts[k]);
+      triangles.clear();
+      for (const std::uint32_t f : faces) triangles.push_back(triangle(mesh, f));
+      for (std::size_t a = 0; a < faces.size(); ++a) {
+        for (std::size_t b = a + 1; b < faces.size(); ++b) {
+          if (!boxes_touch(triangles[a], triangles[b]) ||
+              have_common_vertex(mesh.faces[faces[a]], mesh.faces[faces[b]]))
+            continue;
+          if (!cut_each_other(triangles[a], triangles[b])) continue;
+          found[run].push_back(faces[a]);
+          found[run].push_back(faces[b]);
+        }
       }
     }
   });
   std::vector<std::size_t> faces;
-  for (const auto& of_cell : found) faces.insert(faces.end(), of_cell.begin(), of_cell.end());
+  for (const auto& of_run : found) faces.insert(faces.end(), of_run.begin(), of_run.end());
   std::sort(faces.begin(), faces.end());
   faces.erase(std::unique(faces.begin(), faces.end()), faces.end());
   return faces;
