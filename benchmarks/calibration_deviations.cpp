@@ -28,7 +28,6 @@ namespace {
 using namespace pencilscan;
 
 constexpr Eigen::Index kPose = 6;
-constexpr double kLossScale = 2;
 
 /// Small changes of all poses, as their deviations are reported: rotation in the device's frame,
 /// shift over `distance`.
@@ -76,6 +75,7 @@ Rig with_drawn_lenses(Rig rig, std::uint64_t seed) {
     device.K(1, 1) = device.K(0, 0) * (1 + random.normal(0, is_camera ? 0.002 : 0.02));
     device.distortion[1] += random.normal(0, 0.5);
     for (const std::size_t i : {2, 3}) device.distortion[i] = random.normal(0, 0.002);
+    device.distortion[4] = random.normal(0, unmodelled_k3(device));
   }
   return rig;
 }
@@ -165,8 +165,7 @@ int main(int argc, char** argv) {
     }
     input.distance.reset();
     const CalibrationResult result = calibrate(input);
-    all[i].sigma =
-        uncertainty(result.problem, result.free_inner, kLossScale, result.extra_sigma_px);
+    all[i].sigma = uncertainty(result.problem, result.adjustment);
     all[i].devices = result.problem.devices;
   });
 

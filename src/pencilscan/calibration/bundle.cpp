@@ -59,6 +59,8 @@ class ProblemBuilder {
     settings.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
     problem_ = std::make_unique<ceres::Problem>(settings);
     loss_ = std::make_unique<ceres::CauchyLoss>(options.loss_scale);
+    track_loss_ = std::make_unique<ceres::ScaledLoss>(loss_.get(), options.track_weight,
+                                                      ceres::DO_NOT_TAKE_OWNERSHIP);
     ordering_ = std::make_shared<ceres::ParameterBlockOrdering>();
   }
 
@@ -164,8 +166,8 @@ class ProblemBuilder {
       const bool is_hub = &view == from_.tracks[t].views.data();
       const double deviation = is_hub ? view.sigma_px : sigma(view);
       // The hub's pixel is no measurement but the place where the others were taken.
-      add(new Cost(new ReprojectionCost{view.pixel, deviation}), is_hub ? nullptr : loss_.get(),
-          view.device, from_.points[t].data());
+      add(new Cost(new ReprojectionCost{view.pixel, deviation}),
+          is_hub ? nullptr : track_loss_.get(), view.device, from_.points[t].data());
     }
     ordering_->AddElementToGroup(from_.points[t].data(), 0);
   }
@@ -181,6 +183,7 @@ class ProblemBuilder {
   BundleProblem& from_;
   const BundleOptions& options_;
   std::unique_ptr<ceres::LossFunction> loss_;
+  std::unique_ptr<ceres::LossFunction> track_loss_;
   std::unique_ptr<ceres::Problem> problem_;
   std::shared_ptr<ceres::ParameterBlockOrdering> ordering_;
   std::vector<char> in_use_;

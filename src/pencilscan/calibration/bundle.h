@@ -57,6 +57,9 @@ struct BundleOptions {
   bool free_poses = true;
   double loss_scale = 2;      ///< of Cauchy's loss, in deviations, > 0
   double extra_sigma_px = 0;  ///< added to every view's deviation in squares, >= 0
+  /// What a correspondence counts against priors and boards, in (0, 1]. Neighbours that share an
+  /// error are no independent measurements (Uncertainty::track_weight).
+  double track_weight = 1;
   int max_iterations = 50;
   double function_tolerance = 1e-6;  ///< relative change of the cost to stop at
   std::size_t max_tracks = 0;        ///< 0: all; else an even choice of these
@@ -70,10 +73,10 @@ struct BundleSummary {
 };
 
 /// Minimises, over poses, chosen inner parameters and points,
-///   sum_views rho(|pi(X) - u|^2 / sigma^2) + sum_priors ((p - p0) / sigma_p)^2,
-/// rho Cauchy's loss, by Levenberg-Marquardt with the points eliminated (Ceres). The first present
-/// device's pose is held, and one coordinate of another for the scale. One thread: sums of more
-/// differ from run to run.
+///   sum_views w rho(|pi(X) - u|^2 / sigma^2) + sum_priors ((p - p0) / sigma_p)^2,
+/// rho Cauchy's loss, w the track weight (1 for boards), by Levenberg-Marquardt with the points
+/// eliminated (Ceres). The first present device's pose is held, and one coordinate of another for
+/// the scale. One thread: sums of more differ from run to run.
 BundleSummary adjust(BundleProblem& problem, const BundleOptions& options);
 
 /// Reprojection error of a view, pixels; nothing when the point is behind the device.

@@ -186,7 +186,7 @@ class Calibration {
     return {std::move(problem), cost};
   }
 
-  void stage(unsigned free_inner, std::size_t tracks, int iterations) {
+  void stage(unsigned free_inner, std::size_t tracks, int iterations, double track_weight = 1) {
     BundleProblem& problem = result_.problem;
     const double scale = error_scale(problem);
     const double own = median_sigma(problem);
@@ -196,10 +196,16 @@ class Calibration {
     bundle.max_tracks = tracks;
     bundle.max_iterations = iterations;
     bundle.function_tolerance = tracks == 0 ? 1e-11 : 1e-6;
+    bundle.track_weight = track_weight;
     weigh_corners(problem);
     adjust(problem, bundle);
-    result_.free_inner = free_inner;
-    result_.extra_sigma_px = bundle.extra_sigma_px;
+    result_.adjustment = bundle;
+    expect_unmodelled(input_.rig, problem);
+  }
+
+  /// What correspondences should count at the solution so far, whose weights may be others.
+  [[nodiscard]] double fair_track_weight() const {
+    return uncertainty(result_.problem, result_.adjustment).track_weight;
   }
 
   void drop() {
@@ -231,8 +237,7 @@ class Calibration {
     if (std::none_of(input_.known.begin(), input_.known.end(),
                      [](const GivenCalibration& k) { return k.K; }))
       return agrees;
-    const Uncertainty sigma =
-        uncertainty(result_.problem, kAll, BundleOptions{}.loss_scale, result_.extra_sigma_px);
+    const Uncertainty sigma = uncertainty(result_.problem, result_.adjustment);
     for (std::size_t d = 0; d < agrees.size(); ++d) {
       const BundleDevice& found = result_.problem.devices[d];
       if (!input_.known[d].K) continue;
@@ -277,7 +282,7 @@ class Calibration {
         is_plausible = is_plausible && (held[d] == 0 || agrees[d] != 0);
       if (!is_plausible) continue;
       std::swap(trial, result_.problem);
-      const double extra = result_.extra_sigma_px;
+      const BundleOptions before = result_.adjustment;
       // Twice: the weights of the first round are those of errors not yet adapted to.
       for (int round = 0; round < 2; ++round) {
         stage(kAll, options_.stage_tracks, 50);
@@ -289,7 +294,7 @@ class Calibration {
         return;
       }
       std::swap(trial, result_.problem);
-      result_.extra_sigma_px = extra;
+      result_.adjustment = before;
     }
   }
 
@@ -303,7 +308,9 @@ class Calibration {
       }
       triangulate_all(result_.problem, kLeastAngle);
       if (round > 0) drop();
-      stage(kAll, round < 2 ? options_.stage_tracks : 0, round == 3 ? 200 : 50);
+      const bool is_last = round == 3;
+      stage(kAll, round < 2 ? options_.stage_tracks : 0, is_last ? 200 : 50,
+            is_last ? fair_track_weight() : 1);
     }
   }
 
@@ -357,7 +364,7 @@ class Calibration {
     const double limit = std::max(options_.outlier_deviations * error_scale(result_.problem), 0.3);
     BundleOptions points_only;
     points_only.free_poses = false;
-    points_only.extra_sigma_px = result_.extra_sigma_px;
+    points_only.extra_sigma_px = result_.adjustment.extra_sigma_px;
     points_only.max_iterations = 20;
     adjust(check, points_only);
     drop_outliers(check, limit);  // as for the others: wrong codes are no error of the rig

@@ -55,10 +55,9 @@ struct CalibrationResult {
   std::vector<Track> held_out;
   std::vector<PairGeometry> pairs;
   std::vector<char> inner_held;  ///< per device: given inner parameters fit the data and were kept
-  unsigned free_inner = 0;
-  double extra_sigma_px = 0;  ///< scatter beyond the views' own deviations
-  double board_rms_px = 0;    ///< of the corners of boards; 0 without
-  double rms_px = 0;          ///< over all views of used tracks but the hubs, which are exact
+  BundleOptions adjustment;      ///< of the last stage
+  double board_rms_px = 0;       ///< of the corners of boards; 0 without
+  double rms_px = 0;             ///< over all views of used tracks but the hubs, which are exact
   double held_out_rms_px = 0;
   std::size_t views = 0;
   std::size_t views_dropped = 0;

@@ -212,8 +212,7 @@ TEST(Verdict, SwappedFoldersAreNamed) {
 TEST(Uncertainty, CoversTheErrorsOfTheResult) {
   const Rig truth = ring(3, 3);
   const auto result = calibrate(input_of(truth, tracks_of(truth, {.count = 600}), true), kQuick);
-  const Uncertainty sigma =
-      uncertainty(result.problem, result.free_inner, 2, result.extra_sigma_px);
+  const Uncertainty sigma = uncertainty(result.problem, result.adjustment);
   for (std::size_t d = 3; d < 6; ++d) {
     const double error = device_at(result.rig, d).K(0, 0) - device_at(truth, d).K(0, 0);
     EXPECT_GT(sigma.devices[d].inner[kFx], 0);
@@ -281,12 +280,42 @@ TEST(Adjust, WhatCannotBeTakenCostsInfinitely) {
   EXPECT_EQ(adjust(problem, {}).cost, std::numeric_limits<double>::infinity());
 }
 
+/// Against priors, a quarter of the weight is twice the deviation.
+TEST(Adjust, AQuarterOfTheWeightIsTwiceTheDeviation) {
+  const Rig truth = ring(2, 2);
+  const auto adjusted = [&](double noise_factor, double weight) {
+    BundleProblem problem;
+    for (std::size_t d = 0; d < device_count(truth); ++d) {
+      problem.devices.push_back(bundle_device(device_at(truth, d)));
+      BundleDevice& device = problem.devices.back();
+      device.present = true;
+      device.prior_sigma.fill(0);
+      device.prior_sigma[kFx] = 30;
+      device.prior_sigma[kFy] = 1e-6;
+      device.prior[kFx] += 30;  // data and prior disagree
+    }
+    problem.tracks = tracks_of(truth, {.count = 60, .noise_px = 0.5});
+    triangulate_all(problem, 0.01);
+    for (Track& track : problem.tracks)
+      for (std::size_t i = 1; i < track.views.size(); ++i) track.views[i].sigma_px *= noise_factor;
+    adjust(problem, {.free_inner = 1U << kFx | 1U << kFy,
+                     .loss_scale = 1e3,  // squares: the loss itself has no scale
+                     .track_weight = weight,
+                     .max_iterations = 200,
+                     .function_tolerance = 1e-14});
+    return problem.devices[0].inner[kFx];
+  };
+  const double truth_fx = truth.cameras[0].K(0, 0);
+  EXPECT_NEAR(adjusted(2, 1), adjusted(1, 0.25), 0.01);
+  EXPECT_GT(adjusted(2, 1), truth_fx + 1);  // not decided by the data alone
+  EXPECT_GT(std::abs(adjusted(2, 1) - adjusted(1, 1)), 0.1);
+}
+
 TEST(CalibrationReport, IsOnePageAndValidJson) {
   const Rig truth = ring(2, 2);
   const CalibrationInput input = input_of(truth, tracks_of(truth, {.count = 400}), true);
   const auto result = calibrate(input, kQuick);
-  const Uncertainty sigma =
-      uncertainty(result.problem, result.free_inner, 2, result.extra_sigma_px);
+  const Uncertainty sigma = uncertainty(result.problem, result.adjustment);
   const Verdict verdict = judge(input, result, sigma, {});
   const LoopClosure loop = close_loop(result);
   const CalibrationReport report{input, result, sigma, verdict, {}, loop, {}};

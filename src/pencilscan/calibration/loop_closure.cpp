@@ -89,7 +89,7 @@ std::optional<RingStep> make_step(const CalibrationResult& result, std::size_t f
   if (two.tracks.size() < least_matches) return std::nullopt;
   two.used.assign(two.tracks.size(), 1);
   BundleOptions options;
-  options.extra_sigma_px = result.extra_sigma_px;
+  options.extra_sigma_px = result.adjustment.extra_sigma_px;
   adjust(two, options);
   const RigidTransform from_world = transform_from(two.devices[0].pose);
   step.to_from_from = transform_from(two.devices[1].pose) * from_world.inverse();

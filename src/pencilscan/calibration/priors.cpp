@@ -77,6 +77,23 @@ void hold_given(const GivenCalibration& known, BundleDevice& bundle) {
     for (const std::size_t i : {kK1, kK2, kP1, kP2, kK3}) bundle.prior_sigma[i] = 0;
 }
 
+double unmodelled_k3(const Device& device) {
+  constexpr double kShare = 5e-4;
+  const double x = std::max(device.K(0, 2), device.width - 1 - device.K(0, 2)) / device.K(0, 0);
+  const double y = std::max(device.K(1, 2), device.height - 1 - device.K(1, 2)) / device.K(1, 1);
+  return kShare / std::pow(x * x + y * y, 3);
+}
+
+void expect_unmodelled(const Rig& sizes, BundleProblem& problem) {
+  for (std::size_t d = 0; d < problem.devices.size(); ++d) {
+    BundleDevice& bundle = problem.devices[d];
+    if (!bundle.present || bundle.prior_sigma[kK1] == 0) continue;
+    Device device = device_at(sizes, d);
+    set_device(bundle, device);
+    bundle.prior_sigma[kK3] = unmodelled_k3(device);
+  }
+}
+
 void move_solution(double scale, const RigidTransform& new_from_old, BundleProblem& problem) {
   const auto moved = [&](const Vec3& x) -> Vec3 {
     return scale * (new_from_old.rotation * x) + new_from_old.translation;

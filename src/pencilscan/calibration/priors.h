@@ -12,6 +12,13 @@ void set_priors(const GivenCalibration& known, bool is_camera, const Device& dev
 /// Holds what was given at its value.
 void hold_given(const GivenCalibration& known, BundleDevice& bundle);
 
+/// One standard deviation of k3, which nobody estimates: what the model's polynomial leaves out
+/// displaces the corner of the image that lies farthest from the principal point by half a
+/// thousandth of its distance (lenses: a few tenths of a pixel).
+[[nodiscard]] double unmodelled_k3(const Device& device);
+/// Sets it for devices whose distortion is not held, from their focal lengths so far.
+void expect_unmodelled(const Rig& sizes, BundleProblem& problem);
+
 /// Moves the solution by a similarity: x_new = scale * rotation * x + translation.
 void move_solution(double scale, const RigidTransform& new_from_old, BundleProblem& problem);
 /// Puts the solution into the frame of the given poses; without these, into one of its own: origin

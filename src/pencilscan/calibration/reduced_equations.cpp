@@ -48,39 +48,79 @@ class BoardShape {
 
 }  // namespace
 
-ReducedEquations::ReducedEquations(const BundleProblem& problem, unsigned free_inner,
-                                   double loss_scale, double extra_sigma_px)
+ReducedEquations::ReducedEquations(const BundleProblem& problem, const BundleOptions& adjusted)
     : problem_(problem),
-      loss_scale_(loss_scale),
-      extra_(extra_sigma_px),
+      adjusted_(adjusted),
       H_(Eigen::MatrixXd::Zero(kBlock * count(), kBlock * count())),
       patches_(Eigen::MatrixXd::Zero(kBlock * count(), 2 * kPatches * kPatches * count())),
-      shapes_(Eigen::MatrixXd::Zero(kBlock * count(), kBoardShapes)) {
+      shapes_(Eigen::MatrixXd::Zero(kBlock * count(), kBoardShapes)),
+      patch_views_(Eigen::VectorXd::Zero(patches_.cols())) {
   for (const BundleDevice& device : problem.devices) rotations_.push_back(rotation_of(device));
   for (std::size_t t = 0; t < problem.tracks.size(); ++t)
     if (problem.used[t] != 0) add_track(t);
+  of_tracks_ = H_;
   if (!problem.board_views.empty()) add_boards();
-  add_priors(free_inner);
+  add_priors();
 }
 
 double ReducedEquations::variance_factor() const {
-  return loss_.weight * loss_.influence / (loss_.slope * loss_.slope);
+  constexpr double kLeast = 0.05;
+  if (loss_.slope == 0) return 1;
+  return std::max(loss_.weight * loss_.influence / (loss_.slope * loss_.slope), kLeast);
+}
+
+Eigen::MatrixXd ReducedEquations::random() const {
+  // Boards count three times their scatter and priors are deviations: these are as they are.
+  const double of_tracks = adjusted_.track_weight * variance_factor();
+  return H_ + (of_tracks - 1) * of_tracks_;
 }
 
 Eigen::MatrixXd ReducedEquations::systematic(double shared_px) const {
-  Eigen::MatrixXd all(H_.rows(), patches_.cols() + shapes_.cols());
-  all << shared_px * patches_, shapes_;
+  Eigen::MatrixXd lenses = Eigen::MatrixXd::Zero(H_.rows(), count());
+  for (Eigen::Index d = 0; d < count(); ++d) {
+    const Eigen::Index k3 = kBlock * d + kPose + kK3;
+    if (!is_free(k3))
+      lenses.col(d) = problem_.devices[static_cast<std::size_t>(d)].prior_sigma[kK3] * H_.col(k3);
+  }
+  Eigen::MatrixXd all(H_.rows(), patches_.cols() + shapes_.cols() + lenses.cols());
+  all << shared_px * patches_, shapes_, lenses;
   return all;
+}
+
+double ReducedEquations::shared_error(double visible_px, const Eigen::MatrixXd& root) const {
+  constexpr double kLeastShare = 0.05;
+  constexpr double kLeastFreedom = 3;
+  if (patch_views_.isZero()) return visible_px;
+  Eigen::MatrixXd free_rows(root.rows(), patches_.cols());
+  Eigen::Index row = 0;
+  for (Eigen::Index i = 0; i < patches_.rows(); ++i)
+    if (is_free(i)) free_rows.row(row++) = patches_.row(i);
+  const double fitted = (root.transpose() * free_rows).squaredNorm();
+  const double all = patch_views_.sum();
+  const double share =
+      std::max((after_points_ - fitted) / (adjusted_.track_weight * all), kLeastShare);
+  const double numbers = all * all / patch_views_.squaredNorm();
+  const double freedom = std::max(share * numbers, kLeastFreedom);
+  return visible_px * std::sqrt(freedom / (share * (freedom - 2)));
+}
+
+double ReducedEquations::fair_track_weight(double shared_px) const {
+  if (patch_views_.isZero()) return 1;
+  const double by_square_px = patch_views_.squaredNorm() / patch_views_.sum();
+  return 1 / (1 + by_square_px * shared_px * shared_px / variance_factor());
 }
 
 ReducedEquations::ViewRow ReducedEquations::row_of(const ViewLinearization& view,
                                                    const TrackView& seen, const Vec3& point,
-                                                   bool is_hub) const {
+                                                   Counts counts) const {
   // Derivatives by the point in the device's frame give those by the pose.
   const Mat3& R = rotations_[seen.device];
   const Eigen::Matrix<double, 2, 3> by_local = view.point * R.transpose();
-  const double weight =
-      is_hub ? 1 : 1 / (1 + view.residual.squaredNorm() / (loss_scale_ * loss_scale_));
+  const bool is_hub = counts == Counts::kExactly;
+  double weight = 1;
+  if (!is_hub)
+    weight /= 1 + view.residual.squaredNorm() / (adjusted_.loss_scale * adjusted_.loss_scale);
+  if (counts == Counts::kAsTrack) weight *= adjusted_.track_weight;
   ViewRow row;
   row.device = static_cast<Eigen::Index>(seen.device);
   row.device_part.leftCols<3>() = -by_local * cross_matrix(R * point);
@@ -88,7 +128,7 @@ ReducedEquations::ViewRow ReducedEquations::row_of(const ViewLinearization& view
   row.device_part.rightCols<kIntrinsics>() = view.inner;
   row.device_part *= std::sqrt(weight);
   row.point_part = std::sqrt(weight) * view.point;
-  row.by_px = std::sqrt(weight) / std::hypot(seen.sigma_px, is_hub ? 0 : extra_);
+  row.by_px = std::sqrt(weight) / std::hypot(seen.sigma_px, is_hub ? 0 : adjusted_.extra_sigma_px);
   row.patch = -1;
   if (is_hub) return row;
   // Priors are centred on the image: it gives its size. Rows beyond count with the last ones.
@@ -102,7 +142,7 @@ ReducedEquations::ViewRow ReducedEquations::row_of(const ViewLinearization& view
 }
 
 void ReducedEquations::add_to_loss(double squared, double freedom) {
-  const double c2 = loss_scale_ * loss_scale_;
+  const double c2 = adjusted_.loss_scale * adjusted_.loss_scale;
   const double weight = 1 / (1 + squared / c2);
   const double influence = weight * weight * squared;
   loss_.weight += freedom * weight;
@@ -118,10 +158,11 @@ void ReducedEquations::add_track(std::size_t t) {
     const BundleDevice& device = problem_.devices[views[i].device];
     if (!device.present || !view_error(device, problem_.points[t], views[i])) continue;
     const ViewLinearization view =
-        linearize(device, problem_.points[t], views[i], i == 0 ? 0 : extra_);
+        linearize(device, problem_.points[t], views[i], i == 0 ? 0 : adjusted_.extra_sigma_px);
     // The point takes one degree of freedom of all its views: its place on the hub's ray.
     if (i > 0) add_to_loss(view.residual.squaredNorm(), (2 * n - 1) / n);
-    rows.push_back(row_of(view, views[i], problem_.points[t], i == 0));
+    rows.push_back(
+        row_of(view, views[i], problem_.points[t], i == 0 ? Counts::kExactly : Counts::kAsTrack));
   }
   if (rows.size() < 2) return;
   Mat3 V = Mat3::Zero();
@@ -139,7 +180,12 @@ void ReducedEquations::add_track(std::size_t t) {
       if (b.patch < 0) continue;
       auto by_patch = patches_.block<kBlock, 2>(kBlock * a.device, b.patch);
       by_patch -= b.by_px * WaV * b.point_part.transpose();
-      if (&a == &b) by_patch += b.by_px * b.device_part.transpose();
+      if (&a != &b) continue;
+      by_patch += b.by_px * b.device_part.transpose();
+      const double square = b.by_px * b.by_px;
+      patch_views_.segment<2>(b.patch).array() += square / adjusted_.track_weight;
+      const Eigen::Matrix2d taken = b.point_part * V_inverse * b.point_part.transpose();
+      after_points_ += square * (2 - taken.trace());
     }
   }
 }
@@ -160,8 +206,8 @@ void ReducedEquations::add_boards() {
     const RigidTransform world_from_board = transform_from(problem_.board_poses[seen.board]);
     const Vec3 arm = point - world_from_board.translation;
     if (!device.present || !view_error(device, point, seen.view)) continue;
-    const ViewRow row =
-        row_of(linearize(device, point, seen.view, extra_), seen.view, point, false);
+    const ViewRow row = row_of(linearize(device, point, seen.view, adjusted_.extra_sigma_px),
+                               seen.view, point, Counts::kAsCorner);
     Eigen::Matrix<double, 2, 6> by_board;
     by_board << -row.point_part * cross_matrix(arm), row.point_part;
     const Eigen::Matrix<double, 2, kBoardShapes> by_shape =
@@ -185,7 +231,7 @@ void ReducedEquations::add_boards() {
   }
 }
 
-void ReducedEquations::add_priors(unsigned free_inner) {
+void ReducedEquations::add_priors() {
   free_.assign(static_cast<std::size_t>(H_.rows()), false);
   for (Eigen::Index d = 0; d < count(); ++d) {
     const BundleDevice& device = problem_.devices[static_cast<std::size_t>(d)];
@@ -194,7 +240,7 @@ void ReducedEquations::add_priors(unsigned free_inner) {
     for (std::size_t i = 0; i < kIntrinsics; ++i) {
       const Eigen::Index at = kBlock * d + kPose + static_cast<Eigen::Index>(i);
       const double sigma = device.prior_sigma[i];
-      if (sigma == 0 || (free_inner >> i & 1U) == 0) continue;
+      if (sigma == 0 || (adjusted_.free_inner >> i & 1U) == 0) continue;
       free_[static_cast<std::size_t>(at)] = true;
       if (!std::isfinite(sigma)) continue;
       if (i != kFy) {

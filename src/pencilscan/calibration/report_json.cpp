@@ -137,7 +137,7 @@ nlohmann::ordered_json calibration_json(const CalibrationReport& report) {
   if (!result.problem.board_views.empty())
     json["board"] = {{"corners", result.problem.board_views.size()},
                      {"rms_px", result.board_rms_px}};
-  json["extra_sigma_px"] = result.extra_sigma_px;
+  json["extra_sigma_px"] = result.adjustment.extra_sigma_px;
   json["shared_error_px"] = report.uncertainty.shared_px;
   json["volume"] = {{"radius", report.uncertainty.volume_radius},
                     {"point_sigma_median", report.uncertainty.volume_median},

@@ -40,10 +40,11 @@ Eigen::MatrixXd gauge(const BundleProblem& problem, const Vec3& middle) {
   return G;
 }
 
-/// Error that neighbours in an image share, px: what the means of cells scatter beyond what as many
-/// independent errors would. Lenses unlike the model, texture and light from elsewhere make
-/// neighbours err alike. 0 where chance explains the means (to one standard error).
-double shared_error(const BundleProblem& problem) {
+/// Error that neighbours in an image share, px, as far as residuals show it: what the means of
+/// cells scatter beyond what as many independent errors would. Lenses unlike the model, texture and
+/// light from elsewhere make neighbours err alike. 0 where chance explains the means (to one
+/// standard error).
+double visible_shared_error(const BundleProblem& problem) {
   constexpr int kCells = 8;  // along an image's width
   constexpr double kFewest = 5;
   struct Cell {
@@ -75,7 +76,13 @@ double shared_error(const BundleProblem& problem) {
   if (count < 2) return 0;
   const double mean = sum / count;
   const double error = std::sqrt(std::max(0.0, squares / count - mean * mean) / count);
-  return std::sqrt(std::max(0.0, mean - error));
+  return mean > error ? std::sqrt(mean) : 0;
+}
+
+/// R with R R' = a symmetric positive semi-definite matrix.
+Eigen::MatrixXd square_root(const Eigen::MatrixXd& matrix) {
+  const SymmetricEigen eigen = symmetric_eigen(matrix);
+  return eigen.vectors * eigen.values.cwiseMax(0).cwiseSqrt().asDiagonal();
 }
 
 struct Covariance {
@@ -84,9 +91,9 @@ struct Covariance {
   Eigen::MatrixXd root;  ///< matrix = root * root'
 };
 
-/// Of random errors, scaled by `variance_factor`, and of systematic ones.
+/// Of random errors and of systematic ones; `found.shared_px` and its weight are found on the way.
 Covariance invert(const ReducedEquations& normal, const BundleProblem& problem, const Vec3& middle,
-                  double distance, double variance_factor, double shared_px) {
+                  double distance, Uncertainty& found) {
   Covariance result;
   for (Eigen::Index i = 0; i < normal.H().rows(); ++i)
     if (normal.is_free(i)) result.at.push_back(i);
@@ -94,6 +101,8 @@ Covariance invert(const ReducedEquations& normal, const BundleProblem& problem, 
   // Scaled to comparable units: radians, shifts over the distance, focal lengths over themselves...
   Eigen::VectorXd unit(n);
   Eigen::MatrixXd H(n, n);
+  Eigen::MatrixXd noise(n, n);
+  const Eigen::MatrixXd noise_of_all = normal.random();
   const Eigen::MatrixXd full_gauge = gauge(problem, middle);
   Eigen::MatrixXd G(n, full_gauge.cols());
   for (Eigen::Index i = 0; i < n; ++i) {
@@ -102,11 +111,14 @@ Covariance invert(const ReducedEquations& normal, const BundleProblem& problem, 
     unit[i] = kind < 3 ? 1 : kind < 6 ? distance : kind < kPose + kK1 ? 1000 : 1;
     G.row(i) = full_gauge.row(at) / unit[i];
   }
-  for (Eigen::Index i = 0; i < n; ++i)
-    for (Eigen::Index j = 0; j < n; ++j)
-      H(i, j) = normal.H()(result.at[static_cast<std::size_t>(i)],
-                           result.at[static_cast<std::size_t>(j)]) *
-                unit[i] * unit[j];
+  for (Eigen::Index i = 0; i < n; ++i) {
+    for (Eigen::Index j = 0; j < n; ++j) {
+      const Eigen::Index row = result.at[static_cast<std::size_t>(i)];
+      const Eigen::Index column = result.at[static_cast<std::size_t>(j)];
+      H(i, j) = normal.H()(row, column) * unit[i] * unit[j];
+      noise(i, j) = noise_of_all(row, column) * unit[i] * unit[j];
+    }
+  }
   const Eigen::MatrixXd Q = orthonormal_basis(G);
   const Eigen::MatrixXd P = Eigen::MatrixXd::Identity(n, n) - Q * Q.transpose();
   const double weight = H.diagonal().mean();
@@ -116,12 +128,15 @@ Covariance invert(const ReducedEquations& normal, const BundleProblem& problem, 
   const double least = 1e-14 * values.maxCoeff();
   for (double& v : values) v = 1 / std::max(v, least);
   const Eigen::MatrixXd root = P * eigen.vectors * values.cwiseSqrt().asDiagonal();
-  const Eigen::MatrixXd of_all = normal.systematic(shared_px);
+  found.shared_px = normal.shared_error(visible_shared_error(problem), unit.asDiagonal() * root);
+  found.track_weight = normal.fair_track_weight(found.shared_px);
+  const Eigen::MatrixXd of_all = normal.systematic(found.shared_px);
   Eigen::MatrixXd systematic(n, of_all.cols());
   for (Eigen::Index i = 0; i < n; ++i)
     systematic.row(i) = unit[i] * of_all.row(result.at[static_cast<std::size_t>(i)]);
   result.root.resize(n, n + of_all.cols());
-  result.root << std::sqrt(variance_factor) * root, root * (root.transpose() * systematic);
+  result.root << root * (root.transpose() * square_root(noise)),
+      root * (root.transpose() * systematic);
   result.root = unit.asDiagonal() * result.root;
   result.matrix = result.root * result.root.transpose();
   return result;
@@ -212,8 +227,8 @@ void measure_volume(const BundleProblem& problem, const Covariance& covariance, 
 
 }  // namespace
 
-Uncertainty uncertainty(const BundleProblem& problem, unsigned free_inner, double loss_scale,
-                        double extra_sigma_px, std::uint64_t seed) {
+Uncertainty uncertainty(const BundleProblem& problem, const BundleOptions& adjusted,
+                        std::uint64_t seed) {
   Uncertainty result;
   result.devices.resize(problem.devices.size());
   Vec3 middle = Vec3::Zero();
@@ -233,11 +248,9 @@ Uncertainty uncertainty(const BundleProblem& problem, unsigned free_inner, doubl
   for (const BundleDevice& device : problem.devices)
     if (device.present) distance = std::max(distance, (center_of(device) - middle).norm());
 
-  const ReducedEquations normal(problem, free_inner, loss_scale, extra_sigma_px);
-  result.shared_px = shared_error(problem);
-  result.variance_factor = std::max(normal.variance_factor(), 0.05);
-  const Covariance covariance =
-      invert(normal, problem, middle, distance, result.variance_factor, result.shared_px);
+  const ReducedEquations normal(problem, adjusted);
+  result.variance_factor = normal.variance_factor();
+  const Covariance covariance = invert(normal, problem, middle, distance, result);
   for (std::size_t i = 0; i < covariance.at.size(); ++i) {
     const auto row = static_cast<Eigen::Index>(i);
     const auto d = static_cast<std::size_t>(covariance.at[i] / kBlock);

@@ -18,8 +18,9 @@ struct DeviceUncertainty {
 
 struct Uncertainty {
   std::vector<DeviceUncertainty> devices;
-  double variance_factor = 1;  ///< of the whitened residuals; random sd are multiplied by its root
+  double variance_factor = 1;  ///< of the whitened residuals of correspondences
   double shared_px = 0;        ///< error that neighbours in an image share
+  double track_weight = 1;     ///< what a correspondence should count, therefore
   /// Errors of points of the working volume, from the rig's own errors alone, after the similarity
   /// that fits best (poses of the whole rig and its scale mean nothing): root mean square per point
   /// over random rigs, then median and 95th percentile over points; rig units.
@@ -33,8 +34,9 @@ struct Uncertainty {
 /// (Triggs et al., "Bundle adjustment - a modern synthesis", 2000, section 9). Loss weights count.
 /// Systematic errors widen it: those that neighbours share, as far as the residuals show them, over
 /// a ninth of an image each; and where a board is used, its shape (reduced_equations.h).
-[[nodiscard]] Uncertainty uncertainty(const BundleProblem& problem, unsigned free_inner,
-                                      double loss_scale, double extra_sigma_px,
+/// Residuals show shared errors only in part (ReducedEquations::shared_error), which is made up
+/// for.
+[[nodiscard]] Uncertainty uncertainty(const BundleProblem& problem, const BundleOptions& adjusted,
                                       std::uint64_t seed = 1);
 
 }  // namespace pencilscan

@@ -163,8 +163,7 @@ void run_calibrate(const CalibrateCommand& command) {
   Uncertainty sigma;
   sigma.devices.resize(device_count(input.rig));
   if (result.solved) {
-    sigma = uncertainty(result.problem, result.free_inner, BundleOptions{}.loss_scale,
-                        result.extra_sigma_px, command.common.seed);
+    sigma = uncertainty(result.problem, result.adjustment, command.common.seed);
   }
   const LoopClosure loop = close_loop(result);
   if (const auto finding = judge_loop(result, loop)) findings.push_back(*finding);
