@@ -11,6 +11,7 @@
 #include "pencilscan/core/stopwatch.h"
 #include "pencilscan/io/linear_light.h"
 #include "pencilscan/pipeline/line_naming.h"
+#include "pencilscan/solution/surface_check.h"
 #include "pencilscan/surface/vertex_color.h"
 
 namespace pencilscan {
@@ -53,6 +54,37 @@ double plane_error_px(const CrossingDisagreement& crossings) {
   const double noise2 = crossings.expected_px * crossings.expected_px;
   const double devices2 = crossings.median_px * crossings.median_px - noise2;
   return kDeviationPerMedian * std::sqrt(std::max(0.0, devices2) / 2);
+}
+
+/// Of all cameras; they share their pixels with the detections.
+std::vector<std::vector<cv::Mat>> presence_images(std::span<const CameraDetection> detections) {
+  std::vector<std::vector<cv::Mat>> presence;
+  for (const CameraDetection& detection : detections) presence.push_back(detection.presence);
+  return presence;
+}
+
+/// The nodes of all depth maps.
+std::vector<MeasuredPoint> dense_points(const Rig& rig, std::span<const DepthMap> maps) {
+  std::vector<MeasuredPoint> points;
+  for (const DepthMap& map : maps) {
+    const Camera& camera = rig.cameras[static_cast<std::size_t>(map.camera)];
+    for (std::size_t i = 0; i < map.nodes.size(); ++i) {
+      if (!map.nodes[i].measured()) continue;
+      const Vec3 x = node_point(rig, map, i);
+      const Vec2 pixel = map.pixel(i);
+      MeasuredPoint p;
+      p.x = static_cast<float>(x.x());
+      p.y = static_cast<float>(x.y());
+      p.z = static_cast<float>(x.z());
+      p.u = static_cast<float>(pixel.x());
+      p.v = static_cast<float>(pixel.y());
+      p.camera = static_cast<std::uint8_t>(map.camera);
+      const double length = camera.normalized_from_pixel(pixel).homogeneous().norm();
+      p.sigma = map.nodes[i].sigma * static_cast<float>(length);
+      points.push_back(p);
+    }
+  }
+  return points;
 }
 
 /// `linear` with NaN where the image as read is overexposed.
@@ -159,15 +191,13 @@ PointResult measure_points(const Rig& stated, const Frame& frame, const PointOpt
   result.crossings = naming.crossings;
   if (!naming.warning.empty()) result.warnings.push_back(std::move(naming.warning));
   const std::optional<Rig>& corrected = naming.corrected;
+  result.rig_is_off = corrected.has_value();
   result.times.push_back({"solution", solution_watch.seconds()});
 
   const Stopwatch second_look_watch;
-  std::vector<std::vector<cv::Mat>> presence;
-  for (CameraDetection& detection : result.detections)
-    presence.push_back(std::move(detection.presence));
   std::vector<LocalSurface> surfaces =
-      second_look(corrected ? *corrected : rig, result.families, presence, result.graphs,
-                  result.labeling, options.second_look);
+      second_look(corrected ? *corrected : rig, result.families, presence_images(result.detections),
+                  result.graphs, result.labeling, options.second_look);
   result.times.push_back({"second look", second_look_watch.seconds()});
 
   const Stopwatch triangulation_watch;
@@ -213,13 +243,14 @@ ShapeResult measure_shape(const Rig& stated, const Frame& frame, const PointResu
     result.times.push_back({"surface", surface_watch.seconds()});
     if (result.surface.report.status != SurfaceStatus::kTooFewPoints) {
       const Stopwatch hole_watch;
-      result.holes = explain_holes(rig, result.surface.mesh, result.depth.maps);
+      result.scene = std::make_shared<RayScene>(result.surface.mesh);
+      result.holes = explain_holes(rig, *result.scene, result.depth.maps);
       for (const HoleReason reason : result.holes.vertices)
         result.surface.mesh.hole.push_back(static_cast<std::uint8_t>(reason));
       result.times.push_back({"holes", hole_watch.seconds()});
       const Stopwatch color_watch;
       TriangleMesh& mesh = result.surface.mesh;
-      mesh.color = vertex_colors(rig, mesh, views);
+      mesh.color = vertex_colors(rig, *result.scene, views);
       if (!mesh.color.empty()) copy_colors(mesh, result.surface.measured);
       result.times.push_back({"color", color_watch.seconds()});
       return result;
@@ -233,6 +264,29 @@ ShapeResult measure_shape(const Rig& stated, const Frame& frame, const PointResu
         "dense depth found too little: the surface rests on the labelled curves alone");
   }
   return result;
+}
+
+void look_again(const Rig& stated, const PointOptions& options, PointResult& points,
+                ShapeResult& shape) {
+  if (options.solution.method != Method::kJoint || points.rig_is_off || !shape.scene) return;
+  const Stopwatch watch;
+  const Rig rig = with_registered_patterns(stated);
+  points.contradicted = drop_contradicted(rig, *shape.scene, points.graphs, points.labeling);
+  const std::vector<LocalSurface> surfaces =
+      second_look(rig, points.families, presence_images(points.detections), points.graphs,
+                  points.labeling, options.second_look, dense_points(rig, shape.depth.maps));
+  const std::vector<MeasuredPoint> triangulated =
+      triangulate(rig, points.graphs, points.labeling, options.triangulation);
+  SettledPoints settled = settle_on_surface(
+      rig, *shape.scene, settle_points(rig, triangulated, surfaces, options.settle));
+  points.points = std::move(settled.points);
+  points.contradicted += settled.contradicted;
+  SurfaceReport& report = shape.surface.report;
+  shape.surface.used = std::move(settled.on_surface);
+  report.points = points.points.size();
+  report.points_used =
+      static_cast<std::size_t>(std::count(shape.surface.used.begin(), shape.surface.used.end(), 1));
+  points.times.push_back({"look again", watch.seconds()});
 }
 
 }  // namespace pencilscan

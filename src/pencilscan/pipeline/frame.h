@@ -1,5 +1,6 @@
 #pragma once
 
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -55,6 +56,8 @@ struct PointResult {
   std::vector<GridGraph> graphs;            ///< per camera
   Labeling labeling;
   CrossingDisagreement crossings;  ///< joint only: the paper's two have none by construction
+  bool rig_is_off = false;         ///< lines were named with the devices as the frame corrects them
+  std::size_t contradicted = 0;    ///< labelled curve points that the dense surface contradicted
   std::vector<MeasuredPoint> points;
   std::vector<StageTime> times;
   std::vector<std::string> warnings;
@@ -77,6 +80,8 @@ struct ShapeResult {
   DepthResult depth;  ///< empty where it is off
   HoleReport holes;   ///< empty without dense depth
   SurfaceResult surface;
+  std::shared_ptr<const RayScene>
+      scene;  ///< of surface.mesh before its colours; null without dense depth
   std::vector<StageTime> times;
 };
 
@@ -85,5 +90,11 @@ struct ShapeResult {
 [[nodiscard]] ShapeResult measure_shape(const Rig& rig, const Frame& frame,
                                         const PointResult& points,
                                         const ShapeOptions& options = {});
+
+/// What the dense surface says of the labels (joint): those that it contradicts go, lines that it
+/// lets expect are looked for once more, and the points settle on it. Replaces the points; those of
+/// the paper's methods, and all where the rig is off, stay as they are.
+void look_again(const Rig& rig, const PointOptions& options, PointResult& points,
+                ShapeResult& shape);
 
 }  // namespace pencilscan

@@ -125,6 +125,39 @@ TEST_F(PipelineTest, JointAndMultiviewLabelTheBallAndLinearWorksWithOneCamera) {
   EXPECT_LT(label_figures(one_truth, linear.points, linear_verdicts).wrong.value(), 0.5);
 }
 
+TEST_F(PipelineTest, TheSurfaceTakesWrongLabelsAwayAndFindsTheirLinesAgain) {
+  const TruthScene truth(ball(), *rig_);
+  std::vector<TrueLinePixel> lines;
+  for (int c = 0; c < 2; ++c) {
+    const auto part = true_line_pixels(truth, c);
+    lines.insert(lines.end(), part.begin(), part.end());
+  }
+  const auto wrong = [&](const PointResult& result) {
+    return label_figures(truth, result.points, judge_points(truth, result.points)).wrong.value();
+  };
+  const auto recall = [&](const PointResult& result) {
+    return line_recall(*rig_, lines, result.points).recall.value();
+  };
+  const ShapeOptions shape_options = quick().shape;
+  PointResult result = measure_points(*rig_, *frame_);
+  ShapeResult shape = measure_shape(*rig_, *frame_, result, shape_options);
+  const double recall_before = recall(result);
+  // Every tenth run gets its neighbour's line.
+  for (auto& runs : result.labeling.runs) {
+    for (std::size_t k = 0; k < runs.size(); k += 10) {
+      ++runs[k].label.line;
+      runs[k].label.plane = runs[k].label.line;
+    }
+  }
+  result.points = triangulate(*rig_, result.graphs, result.labeling);
+  ASSERT_GT(wrong(result), 0.03);
+  look_again(*rig_, {}, result, shape);
+  EXPECT_LT(wrong(result), 0.003);
+  EXPECT_GT(recall(result), recall_before - 0.01);
+  EXPECT_GT(result.contradicted, 100U);
+  EXPECT_EQ(shape.surface.used.size(), result.points.size());
+}
+
 TEST_F(PipelineTest, LinesWithoutACodeAreToldApartWhereFourProjectorsShareAColour) {
   Rig rig = *rig_;
   for (const auto& [eye, axis] : {std::pair(Vec3(450, -225, 45), Axis::kColumn),

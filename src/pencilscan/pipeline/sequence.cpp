@@ -120,10 +120,11 @@ void reconstruct_frame(const Rig& rig, const FrameFiles& files, const fs::path& 
   if (points.points.empty()) {
     throw StageError("no curve could be given its projector line");
   }
-  const ShapeResult shape =
+  ShapeResult shape =
       options.meshes ? measure_shape(rig, frame, points, options.shape) : ShapeResult{};
-  const SurfaceResult& surface = shape.surface;
   points.times.insert(points.times.end(), shape.times.begin(), shape.times.end());
+  look_again(rig, options.points, points, shape);
+  const SurfaceResult& surface = shape.surface;
   write_points(folder / "points.ply", points.points);
   write_curves(folder / "curves.ply", describe_curves(points));
   if (options.meshes) {

@@ -50,7 +50,8 @@ class CameraLook {
  public:
   CameraLook(const Rig& rig, const std::vector<ColorFamily>& families,
              const std::vector<cv::Mat>& presence, GridGraph& graph, std::vector<LabeledRun>& runs,
-             std::span<const LabeledRun> tentative, const SecondLookOptions& options);
+             std::span<const LabeledRun> tentative, const SecondLookOptions& options,
+             std::span<const MeasuredPoint> dense);
 
   /// Predicts all lines on the surface of what is labelled; keeps those that no labelled point
   /// shows.
@@ -99,6 +100,7 @@ class CameraLook {
   std::vector<PatternRef> patterns_;  ///< that the camera can see
   std::vector<cv::Mat> unexplained_;  ///< per family; empty without images
   LocalSurface surface_;
+  std::vector<MeasuredPoint> dense_;        ///< more points, not on the surface yet
   std::vector<LabeledRun> not_on_surface_;  ///< runs whose points it does not hold yet
   Places<KnownPoint> known_;
   std::vector<PredictedPoint> missing_;  ///< predicted points that no label explains
@@ -108,7 +110,7 @@ class CameraLook {
 CameraLook::CameraLook(const Rig& rig, const std::vector<ColorFamily>& families,
                        const std::vector<cv::Mat>& presence, GridGraph& graph,
                        std::vector<LabeledRun>& runs, std::span<const LabeledRun> tentative,
-                       const SecondLookOptions& options)
+                       const SecondLookOptions& options, std::span<const MeasuredPoint> dense)
     : rig_(rig),
       families_(families),
       camera_(rig.cameras[static_cast<std::size_t>(graph.camera)]),
@@ -130,6 +132,9 @@ CameraLook::CameraLook(const Rig& rig, const std::vector<ColorFamily>& families,
       if (curve.family == static_cast<int>(f)) subtract_curve(curve, rest);
     }
     unexplained_.push_back(std::move(rest));
+  }
+  for (const MeasuredPoint& p : dense) {
+    if (p.camera == graph.camera) dense_.push_back(p);
   }
   accept(std::exchange(runs, {}));
 }
@@ -171,7 +176,10 @@ void CameraLook::grow_surface() {
   Labeling labeling;
   labeling.runs.resize(rig_.cameras.size());
   labeling.runs[static_cast<std::size_t>(graph_.camera)] = std::exchange(not_on_surface_, {});
-  surface_.add(triangulate(rig_, {&graph_, 1}, labeling));
+  std::vector<MeasuredPoint> points = triangulate(rig_, {&graph_, 1}, labeling);
+  points.insert(points.end(), dense_.begin(), dense_.end());
+  dense_.clear();
+  surface_.add(points);
 }
 
 LocalSurface CameraLook::take_surface() {
@@ -395,12 +403,13 @@ void CameraLook::find_missing() {
 std::vector<LocalSurface> second_look(const Rig& rig, const std::vector<ColorFamily>& families,
                                       std::span<const std::vector<cv::Mat>> presence,
                                       std::span<GridGraph> graphs, Labeling& labeling,
-                                      const SecondLookOptions& options) {
+                                      const SecondLookOptions& options,
+                                      std::span<const MeasuredPoint> dense) {
   std::vector<std::optional<LocalSurface>> surfaces(graphs.size());
   parallel_for(graphs.size(), [&](std::size_t g) {
     const auto camera = static_cast<std::size_t>(graphs[g].camera);
     CameraLook look(rig, families, presence[g], graphs[g], labeling.runs[camera],
-                    labeling.tentative[camera], options);
+                    labeling.tentative[camera], options, dense);
     for (int pass = 0; pass < options.passes; ++pass) {
       look.predict();
       look.confirm_tentative();

@@ -24,7 +24,7 @@ struct SecondLookOptions {
   double support_px = 16;         ///< within which lines around must be known ...
   double support_lines = 1.5;     ///< ... or so many line spacings, if those are more
   int min_support = 3;            ///< points of them
-  int passes = 3;
+  int passes = 2;
   float confidence = 0.99F;
 };
 
@@ -35,9 +35,11 @@ struct SecondLookOptions {
 /// to the graphs, new runs to the labelling. Returns the surface that all labelled points show, per
 /// graph.
 /// `presence`: per graph and colour family the presence image, CV_32FC1, of the whole camera image.
+/// `dense`: more points of the surface, of all cameras; what they are on is not read.
 std::vector<LocalSurface> second_look(const Rig& rig, const std::vector<ColorFamily>& families,
                                       std::span<const std::vector<cv::Mat>> presence,
                                       std::span<GridGraph> graphs, Labeling& labeling,
-                                      const SecondLookOptions& options = {});
+                                      const SecondLookOptions& options = {},
+                                      std::span<const MeasuredPoint> dense = {});
 
 }  // namespace pencilscan

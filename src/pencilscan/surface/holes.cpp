@@ -14,8 +14,8 @@ namespace {
 /// What a camera could have measured at a place of the closed mesh.
 class Visibility {
  public:
-  Visibility(const Rig& rig, const TriangleMesh& mesh, const HoleOptions& options)
-      : rig_(rig), scene_(mesh), options_(options) {
+  Visibility(const Rig& rig, const RayScene& surface, const HoleOptions& options)
+      : rig_(rig), scene_(surface), options_(options) {
     for (const Camera& camera : rig.cameras) {
       std::vector<PatternView> views;
       for (std::size_t p = 0; p < rig.projectors.size(); ++p) {
@@ -64,7 +64,7 @@ class Visibility {
 
  private:
   const Rig& rig_;
-  RayScene scene_;
+  const RayScene& scene_;
   HoleOptions options_;
   std::vector<std::vector<PatternView>> views_;  ///< per camera
 };
@@ -134,12 +134,13 @@ HoleReason explain_vertex(const Rig& rig, const Visibility& visibility,
 
 }  // namespace
 
-HoleReport explain_holes(const Rig& rig, const TriangleMesh& mesh, std::span<DepthMap> maps,
+HoleReport explain_holes(const Rig& rig, const RayScene& surface, std::span<DepthMap> maps,
                          const HoleOptions& options) {
   HoleReport report;
   report.nodes.resize(maps.size());
+  const TriangleMesh& mesh = surface.mesh();
   if (mesh.faces.empty()) return report;
-  const Visibility visibility(rig, mesh, options);
+  const Visibility visibility(rig, surface, options);
   std::vector<Vec3> face_normals(mesh.faces.size());
   for (std::size_t f = 0; f < mesh.faces.size(); ++f) face_normals[f] = face_normal(mesh, f);
   for (std::size_t m = 0; m < maps.size(); ++m) {

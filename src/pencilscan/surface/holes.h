@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "pencilscan/depth/depth_map.h"
-#include "pencilscan/geometry/mesh.h"
+#include "pencilscan/geometry/ray_scene.h"
 #include "pencilscan/rig/rig.h"
 
 namespace pencilscan {
@@ -23,8 +23,9 @@ struct HoleReport {
   std::vector<HoleReason> vertices;  ///< per vertex of the mesh
 };
 
-/// Why is there no depth? Nodes without depth whose camera rays meet the closed mesh, and vertices
-/// that nobody measured (confidence 0), get the first reason that holds:
+/// Why is there no depth on `surface`, the closed mesh? Nodes without depth whose camera rays meet
+/// the closed mesh, and vertices that nobody measured (confidence 0), get the first reason that
+/// holds:
 ///   contradicted, saturated   as the depth stage found in that camera,
 ///   no projector              nothing lights the place: shadow, or turned away,
 ///   too compressed            its lines are too close together in the image, or it is seen at a
@@ -34,7 +35,7 @@ struct HoleReport {
 /// A vertex takes the most hopeful reason (the last in this order) of the cameras that see it;
 /// kNotSeen when none does. The mesh casts the shadows: where it was invented it may be wrong, and
 /// so may the reason.
-[[nodiscard]] HoleReport explain_holes(const Rig& rig, const TriangleMesh& mesh,
+[[nodiscard]] HoleReport explain_holes(const Rig& rig, const RayScene& surface,
                                        std::span<DepthMap> maps, const HoleOptions& options = {});
 
 [[nodiscard]] const char* to_string(HoleReason reason);

@@ -433,7 +433,7 @@ TEST(Holes, ReasonsFollowFromWhoSeesAndWhoLights) {
   map.nodes.resize(160 * 160);
   map.nodes[map.index(80, 80)].reason = HoleReason::kContradicted;
   std::vector<DepthMap> maps = {map};
-  const HoleReport report = explain_holes(rig, ball, maps);
+  const HoleReport report = explain_holes(rig, RayScene(ball), maps);
   double total = 0;
   for (const double area : report.area_mm2) total += area;
   EXPECT_NEAR(total, surface_area(ball), 1e-6 * total);
@@ -576,7 +576,7 @@ TEST(VertexColors, AlbedoFromPatternLight) {
   const Rig rig = color_rig();
   const TriangleMesh mesh = make_sphere(kRadius, 48);
   const auto colors =
-      vertex_colors(rig, mesh, ball_images(rig, two_colors, Vec3(0.01, 0.02, 0.03)));
+      vertex_colors(rig, RayScene(mesh), ball_images(rig, two_colors, Vec3(0.01, 0.02, 0.03)));
   ASSERT_EQ(colors.size(), mesh.vertices.size());
   // Each channel falls on a third of the surface: the rest is filled in from neighbours.
   EXPECT_LT(color_error(mesh, colors), 0.06);
@@ -589,16 +589,16 @@ TEST(VertexColors, TextureCamerasCountAlone) {
   const TriangleMesh mesh = make_sphere(kRadius, 48);
   std::vector<ColorView> views = ball_images(rig, two_colors, Vec3::Ones());
   views[0].image.setTo(0.5);  // would spoil it
-  EXPECT_LT(color_error(mesh, vertex_colors(rig, mesh, views)), 0.01);
+  EXPECT_LT(color_error(mesh, vertex_colors(rig, RayScene(mesh), views)), 0.01);
 }
 
 TEST(VertexColors, NothingSeenGivesNone) {
   const Rig rig = color_rig();
   const TriangleMesh mesh = make_sphere(kRadius, 12);
-  EXPECT_TRUE(vertex_colors(rig, mesh, {}).empty());
+  EXPECT_TRUE(vertex_colors(rig, RayScene(mesh), {}).empty());
   std::vector<ColorView> views = ball_images(rig, two_colors, Vec3::Zero());
   for (ColorView& view : views) view.image.setTo(std::nanf(""));
-  EXPECT_TRUE(vertex_colors(rig, mesh, views).empty());
+  EXPECT_TRUE(vertex_colors(rig, RayScene(mesh), views).empty());
 }
 
 TEST(MeshParts, CapsCloseEveryLoop) {

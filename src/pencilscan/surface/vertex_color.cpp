@@ -52,9 +52,9 @@ Channels bilinear(const cv::Mat& image, const Vec2& pixel) {
 
 class Light {
  public:
-  Light(const Rig& rig, const TriangleMesh& mesh, std::span<const ColorView> views,
+  Light(const Rig& rig, const RayScene& surface, std::span<const ColorView> views,
         const ColorOptions& options)
-      : rig_(rig), scene_(mesh), options_(options), reference_mm_(rig.projectors.size()) {
+      : rig_(rig), scene_(surface), options_(options), reference_mm_(rig.projectors.size()) {
     const Sphere volume = working_volume(rig);
     for (std::size_t p = 0; p < rig.projectors.size(); ++p)
       reference_mm_[p] = (rig.projectors[p].center() - volume.center).norm();
@@ -113,16 +113,17 @@ class Light {
 
  private:
   const Rig& rig_;
-  RayScene scene_;
+  const RayScene& scene_;
   ColorOptions options_;
   std::vector<double> reference_mm_;
   std::vector<std::vector<PatternView>> patterns_;  ///< per view
 };
 
-std::vector<Sample> collect(const Rig& rig, const TriangleMesh& mesh,
+std::vector<Sample> collect(const Rig& rig, const RayScene& surface,
                             std::span<const ColorView> views, const ColorOptions& options,
                             bool has_plain) {
-  const Light light(rig, mesh, views, options);
+  const TriangleMesh& mesh = surface.mesh();
+  const Light light(rig, surface, views, options);
   const std::vector<Vec3> normals = vertex_normals(mesh);
   std::vector<Sample> samples(mesh.vertices.size() * views.size());
   parallel_chunks(mesh.vertices.size(), [&](std::size_t v) {
@@ -272,13 +273,14 @@ std::vector<Channels> solve(const Neighbors& neighbors, std::span<const Evidence
 
 }  // namespace
 
-std::vector<std::array<float, 3>> vertex_colors(const Rig& rig, const TriangleMesh& mesh,
+std::vector<std::array<float, 3>> vertex_colors(const Rig& rig, const RayScene& surface,
                                                 std::span<const ColorView> views,
                                                 const ColorOptions& options) {
+  const TriangleMesh& mesh = surface.mesh();
   if (mesh.faces.empty() || views.empty()) return {};
   const bool has_plain =
       std::any_of(views.begin(), views.end(), [](const ColorView& view) { return view.is_plain; });
-  const std::vector<Sample> samples = collect(rig, mesh, views, options, has_plain);
+  const std::vector<Sample> samples = collect(rig, surface, views, options, has_plain);
   std::vector<Channels> ambient(views.size(), Channels::Zero());
   std::vector<Evidence> sums = evidence(samples, views.size(), ambient);
   const Neighbors neighbors(mesh);

@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "pencilscan/geometry/mesh.h"
+#include "pencilscan/geometry/ray_scene.h"
 #include "pencilscan/rig/rig.h"
 
 namespace pencilscan {
@@ -37,7 +37,7 @@ struct ColorView {
 /// Empty when no camera gives a colour. All projectors are taken as
 /// equally bright at the centre of the volume.
 [[nodiscard]] std::vector<std::array<float, 3>> vertex_colors(const Rig& rig,
-                                                              const TriangleMesh& mesh,
+                                                              const RayScene& surface,
                                                               std::span<const ColorView> views,
                                                               const ColorOptions& options = {});
 
