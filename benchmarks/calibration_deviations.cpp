@@ -196,7 +196,7 @@ int main(int argc, char** argv) {
         const DeviceUncertainty& u = all[i].sigma.devices[d];
         const double unit = k < 3 ? 1 : kDistance;
         e.errors.push_back(unit * changes[i][kPose * static_cast<Eigen::Index>(d) + k]);
-        e.sigmas.push_back(k < 3 ? u.rotation_rad : u.position[k - 3]);
+        e.sigmas.push_back(k < 3 ? u.rotation[k] : u.position[k - 3]);
       }
       add(e, kinds[k < 3 ? "rotation" : "position"]);
     }

@@ -129,8 +129,7 @@ def compare(truth, report):
     distance = max(np.linalg.norm(t) for _, t in pose)
     x = in_least_gauge(pose, found, distance).reshape(-1, 6)
     for change, r in zip(x, report["devices"]):
-        sigma = math.radians(r["rotation_sigma_deg"])
-        z.setdefault("rotation", []).extend(change[:3] / sigma)
+        z.setdefault("rotation", []).extend(change[:3] / np.radians(r["rotation_sigma_axes_deg"]))
         z.setdefault("position", []).extend(change[3:] * distance / r["position_sigma"])
     everything = np.abs(np.concatenate(list(z.values())))
     worst = {k: float(np.abs(v).max()) for k, v in z.items()}

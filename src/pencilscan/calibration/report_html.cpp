@@ -180,7 +180,7 @@ std::string parameters_part(const CalibrationReport& report) {
                                (u.inner[i] > 0 ? " &plusmn; " + number(u.inner[i], 2) : " (held)");
       html += u.is_prior[i] ? "<td class='held'>" + text + "*</td>" : cell(text);
     }
-    html += cell(number(u.rotation_rad * 180 / std::numbers::pi, 2)) +
+    html += cell(number(u.rotation.norm() / std::sqrt(3.0) * 180 / std::numbers::pi, 2)) +
             cell(number(u.position.x(), 2) + ", " + number(u.position.y(), 2) + ", " +
                  number(u.position.z(), 2)) +
             "</tr>";

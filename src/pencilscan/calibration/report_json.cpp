@@ -70,7 +70,9 @@ Json device_json(const CalibrationReport& report, std::size_t d) {
   const RigidTransform& pose = device_at(result.rig, d).device_from_world;
   for (int row = 0; row < 3; ++row) json["R"].push_back(list(pose.rotation.row(row).transpose()));
   json["t"] = list(pose.translation);
-  json["rotation_sigma_deg"] = u.rotation_rad * 180 / std::numbers::pi;
+  const Vec3 rotation_deg = u.rotation * 180 / std::numbers::pi;
+  json["rotation_sigma_axes_deg"] = list(rotation_deg);
+  json["rotation_sigma_deg"] = rotation_deg.norm() / std::sqrt(3.0);
   json["position_sigma"] = list(u.position);
   json["residuals"] = residuals_json(report, d);
   return json;

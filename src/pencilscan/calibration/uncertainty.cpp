@@ -257,7 +257,7 @@ Uncertainty uncertainty(const BundleProblem& problem, const BundleOptions& adjus
     const auto kind = covariance.at[i] % kBlock;
     const double sigma = std::sqrt(covariance.matrix(row, row));
     DeviceUncertainty& device = result.devices[d];
-    if (kind < 3) device.rotation_rad = std::hypot(device.rotation_rad, sigma / std::sqrt(3.0));
+    if (kind < 3) device.rotation[kind] = sigma;
     if (kind >= 3 && kind < kPose) device.position[kind - 3] = sigma;
     if (kind >= kPose) device.inner[static_cast<std::size_t>(kind - kPose)] = sigma;
   }

@@ -12,7 +12,7 @@ struct DeviceUncertainty {
   std::array<double, kIntrinsics> inner{};  ///< px, or as kIntrinsicNames; 0: held
   /// The data say little more than was known before: the value is that of the prior.
   std::array<bool, kIntrinsics> is_prior{};
-  double rotation_rad = 0;       ///< root mean square per axis
+  Vec3 rotation = Vec3::Zero();  ///< rad, about each axis of the device's frame
   Vec3 position = Vec3::Zero();  ///< of the centre per axis of the device's frame, rig units
 };
 
