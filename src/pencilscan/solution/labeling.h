@@ -101,7 +101,7 @@ struct JointOptions {
   int passes = 2;                    ///< message passing, then what the cameras say of each other
   int rounds = 4;                    ///< of messages in a pass
   double damping = 0.3;              ///< share of the old message kept, [0, 1)
-  double min_confidence = 0.935;     ///< pieces below stay undecided
+  double min_confidence = 0.955;     ///< pieces below stay undecided
 
   /// Cost of a crossing whose planes do not meet.
   [[nodiscard]] float disagreement_cost() const;
