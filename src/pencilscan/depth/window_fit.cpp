@@ -6,6 +6,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "pencilscan/depth/gram.h"
+
 namespace pencilscan {
 namespace {
 
@@ -90,6 +92,7 @@ bool WindowFitter::gather(int u, int v) {
     }
   }
   if (used * 2 < count_) return false;
+  root_ = weight_.sqrt();
   const float sum = weight_.sum();
   for (std::size_t f = 0; f < image_.size(); ++f) {
     for (int i = 0; i < count_; ++i) {
@@ -158,31 +161,31 @@ void WindowFitter::render(const Quadric& q) {
   }
 }
 
+WindowFitter::Gram WindowFitter::gram_of(int columns) const {
+  Gram products(columns, columns);
+  gram(J_.data(), padded_, columns, products.data());
+  return products;
+}
+
 void WindowFitter::solve_amplitudes() {
+  thread_local std::vector<std::size_t> mine;
   for (std::size_t f = 0; f < image_.size(); ++f) {
     ex_[f] = ey_[f] = 0;
     while (true) {
-      std::vector<std::size_t> mine;
+      mine.clear();
       for (std::size_t k = 0; k < lit_.size(); ++k) {
         if (lit_[k].on && lit_[k].family == static_cast<int>(f)) mine.push_back(k);
       }
-      const auto n = static_cast<Eigen::Index>(mine.size() + 1);
-      Dense A = Dense::Zero(n, n);
-      DenseVector b = DenseVector::Zero(n);
-      for (Eigen::Index i = 0; i < n; ++i) {
-        const bool last_i = i + 1 == n;
-        const Column wi =
-            last_i ? weight_ : Column(weight_ * profile_[mine[static_cast<std::size_t>(i)]]);
-        for (Eigen::Index j = 0; j <= i; ++j) {
-          A(i, j) = A(j, i) =
-              j + 1 == n
-                  ? static_cast<double>(wi.sum())
-                  : static_cast<double>((wi * profile_[mine[static_cast<std::size_t>(j)]]).sum());
-        }
-        b[i] = static_cast<double>((wi * image_[f]).sum());
-      }
-      for (Eigen::Index i = 0; i < n; ++i) A(i, i) *= 1 + 1e-4;
-      const DenseVector c = A.ldlt().solve(b);
+      const auto n = static_cast<int>(mine.size() + 1);
+      for (int i = 0; i + 1 < n; ++i)
+        J_.col(i) = (root_ * profile_[mine[static_cast<std::size_t>(i)]]).matrix();
+      J_.col(n - 1) = root_.matrix();
+      J_.col(n) = (root_ * image_[f]).matrix();
+      const Gram products = gram_of(n + 1);
+      Dense A = products.topLeftCorner(n, n).cast<double>();
+      const DenseVector b = products.col(n).head(n).cast<double>();
+      for (Eigen::Index i = 0; i < n; ++i) A(i, i) += 1e-4 * A(i, i) + 1e-9;
+      const DenseVector c = A.llt().solve(b);
       offset_[f] = static_cast<float>(c[n - 1]);
       Eigen::Index worst = -1;
       for (Eigen::Index i = 0; i + 1 < n; ++i) {
@@ -208,7 +211,6 @@ double WindowFitter::step(Quadric& q, bool last, WindowFit& fit) {
   double chi2 = 0;
   double degrees = 0;
   const float weight_sum = weight_.sum();
-  const Column root = weight_.sqrt();
   thread_local Column envelope, sum, geometry, residual;
   // Inverse depth in units of the present one: unknowns of like size.
   const auto unit = static_cast<float>(q[0]);
@@ -220,12 +222,12 @@ double WindowFitter::step(Quadric& q, bool last, WindowFit& fit) {
       if (!lit_[k].on || lit_[k].family != static_cast<int>(f)) continue;
       sum += lit_[k].amplitude * profile_[k];
       geometry += lit_[k].amplitude * slope_[k];
-      J_.col(columns++) = (root * envelope * profile_[k]).matrix();
+      J_.col(columns++) = (root_ * envelope * profile_[k]).matrix();
     }
-    residual = root * (image_[f] - offset_[f] - envelope * sum);
-    J_.col(columns++) = root.matrix();
-    J_.col(columns++) = (root * x_ * sum).matrix();
-    J_.col(columns++) = (root * y_ * sum).matrix();
+    residual = root_ * (image_[f] - offset_[f] - envelope * sum);
+    J_.col(columns++) = root_.matrix();
+    J_.col(columns++) = (root_ * x_ * sum).matrix();
+    J_.col(columns++) = (root_ * y_ * sum).matrix();
     const double rss = static_cast<double>(residual.square().sum());
     if (f < 4) {
       fit.family_variance[f] = static_cast<float>(rss) / weight_sum;
@@ -237,22 +239,19 @@ double WindowFitter::step(Quadric& q, bool last, WindowFit& fit) {
       for (int i = 0; i < 3; ++i) H(first[f] + i, first[f] + i) = 1;
       continue;
     }
-    geometry *= root * envelope * unit;
+    geometry *= root_ * envelope * unit;
     J_.col(0) = geometry.matrix();
     J_.col(1) = (geometry * x_).matrix();
     J_.col(2) = (geometry * y_).matrix();
     J_.col(3) = (geometry * xx_).matrix();
     J_.col(4) = (geometry * xy_).matrix();
     J_.col(5) = (geometry * yy_).matrix();
-    const auto J = J_.leftCols(columns);
-    Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, 0, 24, 24> local(columns, columns);
-    local.noalias() = J.transpose() * J;
-    const Eigen::Matrix<float, Eigen::Dynamic, 1, 0, 24, 1> right =
-        J.transpose() * residual.matrix();
+    J_.col(columns) = residual.matrix();
+    const Gram local = gram_of(columns + 1);
     const auto iv = static_cast<double>(inverse_variance_[f]);
     const auto place = [&](int c) { return c < 6 ? c : first[f] + c - 6; };
     for (int i = 0; i < columns; ++i) {
-      g[place(i)] += iv * static_cast<double>(right[i]);
+      g[place(i)] += iv * static_cast<double>(local(i, columns));
       for (int j = 0; j < columns; ++j)
         H(place(i), place(j)) += iv * static_cast<double>(local(i, j));
     }
@@ -270,7 +269,8 @@ double WindowFitter::step(Quadric& q, bool last, WindowFit& fit) {
     g[c] -= q[c] / q[0] / (bow * bow);
   }
   for (int i = 0; i < unknowns; ++i) H(i, i) *= 1 + 1e-6;
-  const Eigen::LDLT<Dense> solver(H);
+  const Eigen::LLT<Dense> solver(H);
+  if (solver.info() != Eigen::Success) return 1e9;
   if (last) {
     fit.misfit = static_cast<float>(chi2 / degrees);
     const double inflate = std::max(1.0, chi2 / degrees);
@@ -400,6 +400,7 @@ std::optional<WindowFit> WindowFitter::fit(const Vec2& pixel, const Quadric& sta
   compare_light();
   if (const auto side = dark_side()) {
     weight_ *= 1.F - beyond_[*side];
+    root_ *= 1.F - beyond_[*side];
     choose_patterns(m, jacobian, q);
     if (lit_.empty()) return std::nullopt;
     render(q);

@@ -71,10 +71,13 @@ class WindowFitter {
     bool on = true;
   };
   using Column = Eigen::ArrayXf;
+  using Gram = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, 0, 24, 24>;
 
   [[nodiscard]] bool gather(int u, int v);
   void choose_patterns(const Vec2& m, const Eigen::Matrix2d& jacobian, const Quadric& q);
   void render(const Quadric& q);
+  /// Products of the first columns of J_ with each other.
+  [[nodiscard]] Gram gram_of(int columns) const;
   void solve_amplitudes();
   double step(Quadric& q, bool last, WindowFit& fit);
   [[nodiscard]] bool iterate(Quadric& q, int rounds, WindowFit& fit);
@@ -89,8 +92,8 @@ class WindowFitter {
   int count_ = 0;   ///< pixels in the window
   int padded_ = 0;  ///< rounded up to a multiple of eight; weight 0 beyond count_
   std::vector<int> du_, dv_;
-  Column x_, y_, xx_, xy_, yy_, taper_, weight_, w_;
-  Column middle_;                 ///< 1 near the centre, 0 elsewhere
+  Column x_, y_, xx_, xy_, yy_, taper_, weight_, root_, w_;  // root_: of the weight
+  Column middle_;                                            ///< 1 near the centre, 0 elsewhere
   std::array<Column, 8> beyond_;  ///< 1 on one side of the centre, 0 elsewhere
   Column seen_, predicted_;       ///< weighted by what a pixel says
   std::vector<Column> image_;     ///< per family

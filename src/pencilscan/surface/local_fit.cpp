@@ -2,6 +2,7 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "pencilscan/core/chunks.h"
@@ -58,10 +59,10 @@ bool fit_quadric(std::span<const SurfaceSample> samples, const PointGrid& grid, 
   const Vec3 n = sample.normal;
   const Vec3 e1 = n.unitOrthogonal();
   const Vec3 e2 = n.cross(e1);
-  Mat6 A = Mat6::Zero();
+  // Sums of w x^i y^j by rising degree: the normal equations hold nothing else.
+  std::array<double, 15> moments{};
   Vec6 b = Vec6::Zero();
   double sum_h2 = 0;
-  double sum = 0;
   int count = 0;
   const double width2 = 0.25 * radius * radius;  // Gaussian of half the radius
   grid.for_each_within(sample.position, radius, [&](std::size_t j, double d2) {
@@ -74,14 +75,26 @@ bool fit_quadric(std::span<const SurfaceSample> samples, const PointGrid& grid, 
     if (std::abs(h) > 0.5) return;
     const double sigma = sigma_across(q, n) / radius;
     const double w = std::exp(-0.5 * d2 / width2) / (1e-4 + sigma * sigma);
-    const Vec6 row{1, x, y, x * x, x * y, y * y};
-    A += w * row * row.transpose();
-    b += w * h * row;
+    const double xx = x * x, xy = x * y, yy = y * y;
+    const double wxx = w * xx, wxy = w * xy, wyy = w * yy;
+    const std::array<double, 15> terms{w,        w * x,    w * y,    wxx,      wxy,
+                                       wyy,      wxx * x,  wxx * y,  wyy * x,  wyy * y,
+                                       wxx * xx, wxx * xy, wxx * yy, wyy * xy, wyy * yy};
+    for (std::size_t k = 0; k < terms.size(); ++k) moments[k] += terms[k];
+    for (int k = 0; k < 6; ++k) b[k] += h * terms[static_cast<std::size_t>(k)];
     sum_h2 += w * h * h;
-    sum += w;
     ++count;
   });
   if (count < 8) return false;
+  const double sum = moments[0];
+  const auto& m = moments;
+  Mat6 A;
+  A << m[0], m[1], m[2], m[3], m[4], m[5],    //
+      m[1], m[3], m[4], m[6], m[7], m[8],     //
+      m[2], m[4], m[5], m[7], m[8], m[9],     //
+      m[3], m[6], m[7], m[10], m[11], m[12],  //
+      m[4], m[7], m[8], m[11], m[12], m[13],  //
+      m[5], m[8], m[9], m[12], m[13], m[14];
   // A weak pull of the curvature to zero decides where a single curve leaves it open.
   for (int k = 1; k < 6; ++k) A(k, k) += (k < 3 ? 1e-6 : 3e-3) * sum;
   const Vec6 c = solve_symmetric(A, b);

@@ -14,7 +14,7 @@ struct FollowOptions {
   double farthest_mm = 1;     ///< nodes farther off along the normal are another surface, > 0
   double robust_mm = 0.3;     ///< so far from the others a prediction counts a quarter, > 0
   double least_weight = 0.6;  ///< sum of the nodes' bells below which a vertex has no depth, > 0
-  int rounds = 3;             ///< normals settle as vertices move
+  int rounds = 2;             ///< normals settle as vertices move
 };
 
 /// Moves each vertex along its normal to where the nodes of all cameras around its pixels say the

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <unordered_map>
@@ -26,7 +27,8 @@ class PointGrid {
     std::sort(order.begin(), order.end());
     index_.reserve(order.size());
     for (std::size_t i = 0; i < order.size(); ++i) {
-      if (i == 0 || order[i].first != order[i - 1].first) first_[order[i].first] = i;
+      Run& run = columns_.try_emplace(column_of(order[i].first), Run{i, i}).first->second;
+      run.end = i + 1;
       index_.push_back(order[i].second);
       points_.push_back(points[order[i].second]);
       keys_.push_back(order[i].first);
@@ -40,14 +42,16 @@ class PointGrid {
     const Cell high = cell_of(center + Vec3::Constant(radius));
     for (std::int64_t x = low[0]; x <= high[0]; ++x) {
       for (std::int64_t y = low[1]; y <= high[1]; ++y) {
-        for (std::int64_t z = low[2]; z <= high[2]; ++z) {
-          const std::uint64_t wanted = key({x, y, z});
-          const auto found = first_.find(wanted);
-          if (found == first_.end()) continue;
-          for (std::size_t i = found->second; i < keys_.size() && keys_[i] == wanted; ++i) {
-            const double d2 = (points_[i] - center).squaredNorm();
-            if (d2 <= radius * radius) visit(static_cast<std::size_t>(index_[i]), d2);
-          }
+        const std::uint64_t least = key({x, y, low[2]});
+        const std::uint64_t most = key({x, y, high[2]});
+        const auto column = columns_.find(column_of(least));
+        if (column == columns_.end()) continue;
+        const auto end = keys_.begin() + static_cast<std::ptrdiff_t>(column->second.end);
+        auto at = keys_.begin() + static_cast<std::ptrdiff_t>(column->second.begin);
+        for (at = std::lower_bound(at, end, least); at != end && *at <= most; ++at) {
+          const auto i = static_cast<std::size_t>(at - keys_.begin());
+          const double d2 = (points_[i] - center).squaredNorm();
+          if (d2 <= radius * radius) visit(static_cast<std::size_t>(index_[i]), d2);
         }
       }
     }
@@ -60,19 +64,25 @@ class PointGrid {
             static_cast<std::int64_t>(std::floor(x[1] / cell_)),
             static_cast<std::int64_t>(std::floor(x[2] / cell_))};
   }
-  /// 21 bits per axis: unique within two million cells, which is any sensible scene.
+  /// 21 bits per axis: unique within two million cells, which is any sensible scene. Cells of one
+  /// column follow each other.
   [[nodiscard]] static std::uint64_t key(const Cell& c) {
+    constexpr std::int64_t kMiddle = 1 << 20;
     constexpr std::uint64_t kMask = (1u << 21) - 1;
-    return (static_cast<std::uint64_t>(c[0]) & kMask) << 42 |
-           (static_cast<std::uint64_t>(c[1]) & kMask) << 21 |
-           (static_cast<std::uint64_t>(c[2]) & kMask);
+    return (static_cast<std::uint64_t>(c[0] + kMiddle) & kMask) << 42 |
+           (static_cast<std::uint64_t>(c[1] + kMiddle) & kMask) << 21 |
+           (static_cast<std::uint64_t>(c[2] + kMiddle) & kMask);
   }
+  [[nodiscard]] static std::uint64_t column_of(std::uint64_t key) { return key >> 21; }
 
+  struct Run {
+    std::size_t begin, end;
+  };
   double cell_;
   std::vector<Vec3> points_;          ///< sorted by key
   std::vector<std::uint32_t> index_;  ///< points sorted by key
   std::vector<std::uint64_t> keys_;
-  std::unordered_map<std::uint64_t, std::size_t> first_;
+  std::unordered_map<std::uint64_t, Run> columns_;  ///< of cells with the same x and y
 };
 
 }  // namespace pencilscan
