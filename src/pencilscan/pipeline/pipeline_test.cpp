@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <fstream>
 #include <map>
+#include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
 #include <tuple>
 #include <utility>
@@ -276,6 +277,14 @@ TEST_F(PipelineTest, ResumesItsOwnOutputAndRefusesThatOfOtherOptions) {
   EXPECT_EQ(read_file(out / "000000" / "report.json"), report);
   other.overwrite = true;
   EXPECT_TRUE(run(*folder_ / "frames", out, other).front().done);
+  // So says another build of the program, which would have made other frames.
+  nlohmann::ordered_json inputs = nlohmann::ordered_json::parse(read_file(out / "inputs.json"));
+  inputs["program"] = "0";
+  std::ofstream(out / "inputs.json") << inputs;
+  other.overwrite = false;
+  EXPECT_THROW(static_cast<void>(run(*folder_ / "frames", out, other)), InputError);
+  other.overwrite = true;
+  EXPECT_FALSE(run(*folder_ / "frames", out, other).front().resumed);
 }
 
 TEST_F(PipelineTest, RefinedRigIsWrittenUsedAndResumed) {

@@ -34,12 +34,13 @@ std::string hex(std::uint64_t value) {
   return text;
 }
 
-/// What decides the output: rig bytes, options, image bytes of every frame.
+/// What decides the output: the program, rig bytes, options, image bytes of every frame.
 ordered_json describe_inputs(const fs::path& rig_path, const std::vector<FrameFiles>& frames,
                              const std::string& options) {
   std::vector<std::uint64_t> hashes(frames.size());
   parallel_for(frames.size(), [&](std::size_t i) { hashes[i] = frame_hash(frames[i]); });
   ordered_json inputs;
+  inputs["program"] = hex(hash_bytes(read_file("/proc/self/exe")));
   inputs["rig"] = hex(hash_bytes(read_file(rig_path)));
   inputs["options"] = options;
   inputs["frames"] = ordered_json::object();
@@ -54,9 +55,10 @@ bool same_frame(const nlohmann::json& earlier, const ordered_json& now, const st
 }
 
 bool same_settings(const nlohmann::json& earlier, const ordered_json& now) {
-  return earlier.contains("rig") && earlier.contains("options") &&
-         earlier["rig"] == now["rig"].get<std::string>() &&
-         earlier["options"] == now["options"].get<std::string>();
+  for (const char* key : {"program", "rig", "options"}) {
+    if (!earlier.contains(key) || earlier[key] != now[key].get<std::string>()) return false;
+  }
+  return true;
 }
 
 /// Decides which frames are there already; refuses the output of other inputs. A refined rig is of
@@ -76,7 +78,7 @@ std::vector<char> resumable(const fs::path& out, const std::vector<FrameFiles>& 
   }
   const nlohmann::json earlier = read_json(out / kInputsFile);
   if (!same_settings(earlier, inputs)) {
-    refuse("holds the output of another rig or other options");
+    refuse("holds the output of another rig, other options or another build of the program");
     return done;
   }
   if (options.refine_rig &&
