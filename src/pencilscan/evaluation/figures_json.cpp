@@ -35,6 +35,15 @@ void put_lines(Json& json, const LabelFigures& labels, const RecallFigures& reca
   json["true_line_pixels"] = recall.recall.count;
   json["line_error_median_px"] = number(labels.line_error_median_px);
   json["line_error_p90_px"] = number(labels.line_error_p90_px);
+  Json bands = Json::array();
+  for (const ConfidenceBand& band : labels.right_by_confidence) {
+    if (band.right.count == 0) continue;
+    const double confidence = band.confidence_sum / static_cast<double>(band.right.count);
+    bands.push_back({{"confidence", number(confidence)},
+                     {"right", number(band.right.value())},
+                     {"points", band.right.count}});
+  }
+  json["right_by_confidence"] = bands;
 }
 
 void put_sigma(Json& json, const std::string& prefix, const SigmaFigures& sigma) {

@@ -87,16 +87,37 @@ std::vector<PointVerdict> judge_points(const TruthScene& truth,
   return verdicts;
 }
 
+namespace {
+
+std::vector<ConfidenceBand> confidence_bands() {
+  std::vector<ConfidenceBand> bands;
+  for (const double low : {0.0, 0.5, 0.7, 0.8, 0.9, 0.95, 0.98, 0.99, 0.995, 0.999})
+    bands.push_back({low, 0, {}});
+  return bands;
+}
+
+void add_to_band(float confidence, bool right, std::vector<ConfidenceBand>& bands) {
+  const double c = std::isfinite(confidence) ? static_cast<double>(confidence) : 0;
+  std::size_t b = bands.size() - 1;
+  while (b > 0 && c < bands[b].low) --b;
+  bands[b].confidence_sum += c;
+  bands[b].right.add(right);
+}
+
+}  // namespace
+
 LabelFigures label_figures(const TruthScene& truth, std::span<const MeasuredPoint> points,
                            std::span<const PointVerdict> verdicts) {
   LabelFigures figures;
   figures.wrong_by_projector.resize(truth.rig().projectors.size());
   figures.wrong_by_spacing.resize(kSpacingBandCount);
+  figures.right_by_confidence = confidence_bands();
   std::vector<double> errors;
   for (std::size_t i = 0; i < points.size(); ++i) {
     const PointVerdict& v = verdicts[i];
     if (!v.counted) continue;
     figures.wrong.add(!v.right);
+    add_to_band(points[i].confidence, v.right, figures.right_by_confidence);
     figures.wrong_by_projector[points[i].projector].add(!v.right);
     if (v.spacing_px) {
       figures.wrong_by_spacing[spacing_band(*v.spacing_px)].add(!v.right);

@@ -33,13 +33,22 @@ struct LabelOptions {
                                                      std::span<const MeasuredPoint> points,
                                                      const LabelOptions& options = {});
 
+/// Vertices whose confidence lies in [low, next band's low): is their share of right labels what
+/// they say?
+struct ConfidenceBand {
+  double low = 0;
+  double confidence_sum = 0;
+  Share right;
+};
+
 /// Label error as docs/figures.md defines it: the share is of *wrong* vertices.
 struct LabelFigures {
   Share wrong;
   std::vector<Share> wrong_by_projector;
   std::vector<Share> wrong_by_spacing;  ///< kSpacingBandCount bands
   Share wrong_unlit;                    ///< vertices where the projector does not light at (u, v)
-  double line_error_median_px = 0;      ///< of the right ones
+  std::vector<ConfidenceBand> right_by_confidence;
+  double line_error_median_px = 0;  ///< of the right ones
   double line_error_p90_px = 0;
   double largest_wrong_patch_mm2 = 0;
 };
