@@ -114,11 +114,12 @@ SettledPoints settle_on_surface(const Rig& rig, const RayScene& surface,
                                 std::span<const MeasuredPoint> points) {
   constexpr double kFarthest = 4;  // deviations of the difference
   constexpr double kLeastCosine = 0.2;
-  // Shares of what the surface says, what the point said, and their difference: on rendered
-  // bunnies, a statue, a hand and a knot errors are then as large as they should be.
-  constexpr double kOfSurface = 0.8;
-  constexpr double kOfPoint = 0.2;
-  constexpr double kOfDifference = 0.3;
+  // Shares of what the surface says and of its difference from the point: on rendered bunnies, a
+  // statue, a hand and a knot errors are then as large as they should be. So they are for points
+  // that stay where they were, which are the odd ones.
+  constexpr double kOfSurface = 0.95;
+  constexpr double kOfDifference = 0.2;
+  constexpr double kOffSurface = 1.5;
   const TriangleMesh& mesh = surface.mesh();
   PENCILSCAN_CHECK(mesh.sigma.size() == mesh.vertices.size() &&
                    mesh.confidence.size() == mesh.vertices.size());
@@ -134,6 +135,7 @@ SettledPoints settle_on_surface(const Rig& rig, const RayScene& surface,
     const Ray ray = camera.ray(pixel);
     const auto hit = check.look(ray);
     if (check.contradicts(camera, pixel, {p.projector, p.pattern}, p.line, hit)) keep[i] = 0;
+    p.sigma *= static_cast<float>(kOffSurface);
     if (!hit) return;
     double across = 0;
     for (std::size_t k = 0; k < 3; ++k)
@@ -141,7 +143,7 @@ SettledPoints settle_on_surface(const Rig& rig, const RayScene& surface,
                 static_cast<double>(mesh.sigma[static_cast<std::size_t>(mesh.faces[hit->face][k])]);
     const double cosine = -face_normal(mesh, hit->face).dot(ray.direction);
     const double of_surface = across / std::max(cosine, kLeastCosine);
-    const double of_point = static_cast<double>(p.sigma);
+    const double of_point = static_cast<double>(points[i].sigma);
     const Vec3 x(static_cast<double>(p.x), static_cast<double>(p.y), static_cast<double>(p.z));
     const double difference = hit->distance - (x - ray.origin).dot(ray.direction);
     if (std::abs(difference) > kFarthest * std::hypot(of_surface, of_point)) return;
@@ -149,8 +151,7 @@ SettledPoints settle_on_surface(const Rig& rig, const RayScene& surface,
     p.x = static_cast<float>(hit->point.x());
     p.y = static_cast<float>(hit->point.y());
     p.z = static_cast<float>(hit->point.z());
-    p.sigma = static_cast<float>(
-        std::hypot(kOfSurface * of_surface, kOfPoint * of_point, kOfDifference * difference));
+    p.sigma = static_cast<float>(std::hypot(kOfSurface * of_surface, kOfDifference * difference));
   });
   std::size_t count = 0;
   for (std::size_t i = 0; i < keep.size(); ++i) {

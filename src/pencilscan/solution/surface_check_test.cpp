@@ -100,8 +100,8 @@ TEST_F(SurfaceCheckTest, PointsSettleOnTheSurfaceAndTheirSigmaTellsOfTheWayThere
     const double way =
         std::hypot(before[j].x - settled.points[i].x, before[j].y - settled.points[i].y,
                    before[j].z - settled.points[i].z);
-    EXPECT_GE(settled.points[i].sigma, 0.29 * way);
-    EXPECT_GE(settled.points[i].sigma, 0.8F * 0.02F);
+    EXPECT_GE(settled.points[i].sigma, 0.19 * way);
+    EXPECT_GE(settled.points[i].sigma, 0.94F * 0.02F);
     moved_far += way > 0.05 ? 1 : 0;
   }
   EXPECT_GT(errors.size(), before.size() / 2);

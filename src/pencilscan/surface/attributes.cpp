@@ -36,12 +36,30 @@ void cut_fringe(std::span<const char> fringe, TriangleMesh& mesh) {
   }
 }
 
+/// Weighted sums over the samples on a vertex's side that reach it.
+struct Surroundings {
+  double nearest = 0;  ///< mm, to any sample of this side
+  double best = 1;     ///< distance / reach of the best sample
+  double weight = 0;
+  double information = 0;
+  double confidence = 0;
+  double relief = 0;         ///< mm
+  Vec3 pull = Vec3::Zero();  ///< sum of the offsets: cancels out where samples surround the vertex
+  double pull_length = 0;
+  std::array<bool, 256> seen{};  ///< by which cameras
+  int cameras = 0;
+};
+
 }  // namespace
 
 void attribute_vertices(std::span<const SurfaceSample> samples, double reach_spacings,
                         double spacing, TriangleMesh& mesh) {
-  constexpr double kMaxStretch = 2.5;      // of the spacing on a grazed surface
-  constexpr double kInterpolation = 0.02;  // mm of error per mm away from the nearest sample
+  constexpr double kMaxStretch = 2.5;  // of the spacing on a grazed surface
+  // Shares of what makes a vertex uncertain: on eight rendered objects errors are then as large as
+  // they should be, those of the least sure tenth too.
+  constexpr double kNoise = 0.9;           // of what the samples' own deviations say
+  constexpr double kInterpolation = 0.01;  // mm of error per mm away from the nearest sample
+  constexpr double kRelief = 0.7;          // of how far the surface bends within a sample's window
   constexpr double kOutsideReach = 0.4;    // of the reach, beyond the last line
   const double radius = reach_spacings * kMaxStretch * spacing;
   std::vector<Vec3> positions;
@@ -53,57 +71,60 @@ void attribute_vertices(std::span<const SurfaceSample> samples, double reach_spa
     const double stretch = 1 / std::sqrt(std::max(1 - tilt * tilt, 1e-6));
     reach.push_back(reach_spacings * s.spacing * std::min(stretch, kMaxStretch));
   }
-  // Nearly all vertices are within reach of a sample; only the others look farther.
   const double near_radius =
       std::min(radius, samples.empty() ? radius : *std::max_element(reach.begin(), reach.end()));
-  const PointGrid grid(positions, near_radius);
+  // Farther samples weigh nothing to speak of and matter only where none lies well within its
+  // reach.
+  const double weighty_radius =
+      std::min(std::max(kOutsideReach * near_radius, 2 * spacing), near_radius);
+  const PointGrid grid(positions, weighty_radius);
   const std::vector<Vec3> normals = vertex_normals(mesh);
   std::vector<char> fringe(mesh.vertices.size(), 0);
   mesh.sigma.assign(mesh.vertices.size(), 0.0F);
   mesh.confidence.assign(mesh.vertices.size(), 0.0F);
-  parallel_chunks(mesh.vertices.size(), [&](std::size_t v) {
-    double nearest = radius;  // mm, to any sample of this side
-    double best = 1;          // distance / reach of the best sample
-    double weight_sum = 0;
-    double information_sum = 0;
-    double confidence_sum = 0;
-    Vec3 pull = Vec3::Zero();  // sum of the offsets: cancels out where samples surround the vertex
-    double pull_length = 0;
-    std::array<bool, 256> seen{};
-    int cameras = 0;
-    const auto visit = [&](std::size_t i, double d2) {
+  const auto around = [&](std::size_t v, double within) {
+    Surroundings a;
+    a.nearest = radius;
+    grid.for_each_within(mesh.vertices[v], within, [&](std::size_t i, double d2) {
       const SurfaceSample& s = samples[i];
       const Vec3 d = s.position - mesh.vertices[v];
-      if (s.normal.dot(normals[v]) < 0.5) return;
-      if (std::abs(d.dot(normals[v])) > 0.5 * spacing) return;
+      const double cosine = s.normal.dot(normals[v]);
+      if (cosine < 0.5 || std::abs(d.dot(normals[v])) > 0.5 * spacing) return;
       const double distance = std::sqrt(d2);
-      nearest = std::min(nearest, distance);
+      a.nearest = std::min(a.nearest, distance);
       if (distance > reach[i]) return;
-      best = std::min(best, distance / reach[i]);
-      pull += d;
-      pull_length += distance;
+      a.best = std::min(a.best, distance / reach[i]);
+      a.pull += d;
+      a.pull_length += distance;
       // The neighbours' scatter about the surface holds their noise: the larger of both counts.
       const double across = s.sigma * std::max(std::abs(s.to_camera.dot(s.normal)), 0.2);
       const double off = std::max(across, s.residual);
       const double w = std::exp(-2 * d2 / (spacing * spacing));
-      weight_sum += w;
-      information_sum += w / std::max(off * off, 1e-9);
-      confidence_sum += w * s.confidence;
-      if (!seen[s.camera]) ++cameras;
-      seen[s.camera] = true;
-    };
-    grid.for_each_within(mesh.vertices[v], near_radius, visit);
-    if (nearest == radius) grid.for_each_within(mesh.vertices[v], radius, visit);
-    double variance = kInterpolation * kInterpolation * nearest * nearest;
+      a.weight += w;
+      a.information += w / std::max(off * off, 1e-9);
+      a.confidence += w * s.confidence;
+      // A window's quadric cannot follow what turns within it; 2 (1 - cos) is the angle squared.
+      a.relief += w * 2 * (1 - cosine) * s.spacing;
+      if (!a.seen[s.camera]) ++a.cameras;
+      a.seen[s.camera] = true;
+    });
+    return a;
+  };
+  parallel_chunks(mesh.vertices.size(), [&](std::size_t v) {
+    Surroundings a = around(v, weighty_radius);
+    if (a.best > kOutsideReach) a = around(v, near_radius);
+    if (a.nearest == radius) a = around(v, radius);
     // Samples that fill a half plane pull with 2 / pi of their summed distance.
-    fringe[v] = pull.norm() > 0.55 * pull_length && best > kOutsideReach;
-    if (weight_sum > 0) {
+    fringe[v] = a.pull.norm() > 0.55 * a.pull_length && a.best > kOutsideReach;
+    double variance =
+        a.nearest * a.nearest;  // a guess where no sample reaches: at least so far off
+    if (a.weight > 0) {
       // Samples of one camera share their errors; cameras are independent, the surest counts most.
-      variance += weight_sum / information_sum / std::max(cameras, 1);
-      const double certainty = confidence_sum / weight_sum * (1 - 0.5 * best * best);
+      const double noise2 = kNoise * kNoise * a.weight / a.information / a.cameras;
+      const double relief = kRelief * a.relief / a.weight;
+      variance = kInterpolation * kInterpolation * variance + noise2 + relief * relief;
+      const double certainty = a.confidence / a.weight * (1 - 0.5 * a.best * a.best);
       mesh.confidence[v] = static_cast<float>(std::clamp(certainty, 0.01, 1.0));
-    } else {
-      variance = nearest * nearest;  // a guess: at least as far off as the nearest sample is away
     }
     mesh.sigma[v] = static_cast<float>(std::sqrt(variance));
   });
