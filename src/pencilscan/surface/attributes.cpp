@@ -43,7 +43,8 @@ struct Surroundings {
   double weight = 0;
   double information = 0;
   double confidence = 0;
-  double relief = 0;         ///< mm
+  double bend = 0;           ///< mm
+  double twist = 0;          ///< mm
   Vec3 pull = Vec3::Zero();  ///< sum of the offsets: cancels out where samples surround the vertex
   double pull_length = 0;
   std::array<bool, 256> seen{};  ///< by which cameras
@@ -57,9 +58,10 @@ void attribute_vertices(std::span<const SurfaceSample> samples, double reach_spa
   constexpr double kMaxStretch = 2.5;  // of the spacing on a grazed surface
   // Shares of what makes a vertex uncertain: on eight rendered objects errors are then as large as
   // they should be, those of the least sure tenth too.
-  constexpr double kNoise = 0.9;           // of what the samples' own deviations say
+  constexpr double kNoise = 0.7;           // of what the samples' own deviations say
+  constexpr double kBend = 0.4;            // of how far the surface bends within a window
+  constexpr double kTwist = 0.4;           // of how far samples and vertex disagree on the bend
   constexpr double kInterpolation = 0.01;  // mm of error per mm away from the nearest sample
-  constexpr double kRelief = 0.7;          // of how far the surface bends within a sample's window
   constexpr double kOutsideReach = 0.4;    // of the reach, beyond the last line
   const double radius = reach_spacings * kMaxStretch * spacing;
   std::vector<Vec3> positions;
@@ -103,8 +105,9 @@ void attribute_vertices(std::span<const SurfaceSample> samples, double reach_spa
       a.weight += w;
       a.information += w / std::max(off * off, 1e-9);
       a.confidence += w * s.confidence;
-      // A window's quadric cannot follow what turns within it; 2 (1 - cos) is the angle squared.
-      a.relief += w * 2 * (1 - cosine) * s.spacing;
+      // 2 (1 - cos) is the angle squared. Of a quadric the chord is square to the mean normal.
+      a.bend += w * 2 * (1 - cosine) * s.spacing;
+      a.twist += w * std::abs(d.dot(s.normal + normals[v]));
       if (!a.seen[s.camera]) ++a.cameras;
       a.seen[s.camera] = true;
     });
@@ -121,7 +124,7 @@ void attribute_vertices(std::span<const SurfaceSample> samples, double reach_spa
     if (a.weight > 0) {
       // Samples of one camera share their errors; cameras are independent, the surest counts most.
       const double noise2 = kNoise * kNoise * a.weight / a.information / a.cameras;
-      const double relief = kRelief * a.relief / a.weight;
+      const double relief = std::hypot(kBend * a.bend, kTwist * a.twist) / a.weight;
       variance = kInterpolation * kInterpolation * variance + noise2 + relief * relief;
       const double certainty = a.confidence / a.weight * (1 - 0.5 * a.best * a.best);
       mesh.confidence[v] = static_cast<float>(std::clamp(certainty, 0.01, 1.0));
