@@ -144,7 +144,7 @@ def calibrate(args, program, truth, folders, out, *more):
     out.mkdir(parents=True)
     known = np.linalg.norm(common.center_of(truth["cameras"][0]) - common.center_of(truth["cameras"][1]))
     words = [str(args.program.resolve()), "calibrate", "--out", str(out / "rig.json"),
-             "--known-distance", "cam0", "cam1", f"{known:.6f}"]
+             "--known-distance", "cam0", "cam1", f"{known:.6f}", "--threads", str(args.threads)]
     for folder in folders:
         words += ["--captures", str(folder)]
     words += [str(w) for w in more]
@@ -239,43 +239,75 @@ def replace_image(path, image):
     Image.fromarray(image).save(path)
 
 
-def moved_camera(args, program, truth, folders, out, noise):
-    """cam2 is shifted by 4 mm and turned by 0.3 degrees before the second half of the captures."""
-    rig = json.loads(json.dumps(truth))
-    d = next(c for c in rig["cameras"] if c["name"] == "cam2")
+class Draw:
+    """Which devices a failure hits."""
+
+    def __init__(self, truth, number):
+        self.truth = truth
+        self.random = np.random.default_rng(number)
+
+    def device(self, group):
+        return self.truth[group][self.random.integers(len(self.truth[group]))]
+
+    def partners(self, device, group):
+        """Devices of the other kind that see surfaces which `device` sees: less than 100 degrees away."""
+        def direction(d):
+            c = common.center_of(d) * [1, 1, 0]
+            return c / np.linalg.norm(c)
+        return [d for d in self.truth[group] if direction(device) @ direction(d) > math.cos(math.radians(100))]
+
+    def two(self, devices):
+        chosen = sorted(self.random.choice(len(devices), 2, replace=False))
+        return [devices[i] for i in chosen]
+
+    def pair(self):
+        """Folder of a projector and a camera that have surfaces in common."""
+        projector = self.device("projectors")
+        cameras = self.partners(projector, "cameras")
+        return f"{projector['name']}/{cameras[self.random.integers(len(cameras))]['name']}"
+
+
+def moved_camera(args, program, draw, folders, out, noise):
+    """A camera is shifted by 4 mm and turned by 0.3 degrees before the second half of the captures."""
+    d = json.loads(json.dumps(draw.device("cameras")))
     R, c = np.asarray(d["R"]), common.center_of(d)
-    R = common._rotation(np.array([0, math.radians(0.3), 0])) @ R
-    d["R"], d["t"] = R.tolist(), (-R @ (c + [0, 0, 4])).tolist()
-    path = common.write_rig(out / "moved.json", {**rig, "cameras": [d]})
-    for seed in range(len(folders) // 2, len(folders)):
-        scene = render(program, args, noise, seed, path, f"moved{seed}")
-        for pair in scene.glob("*/cam2"):
-            shutil.rmtree(folders[seed] / pair.parent.name / "cam2")
-            shutil.copytree(pair, folders[seed] / pair.parent.name / "cam2", copy_function=os.link)
-    return ["cam2 has moved"]
+    shift, axis = draw.random.normal(size=(2, 3))
+    R = common._rotation(math.radians(0.3) * axis / np.linalg.norm(axis)) @ R
+    d["R"], d["t"] = R.tolist(), (-R @ (c + 4 * shift / np.linalg.norm(shift))).tolist()
+    path = common.write_rig(out / "moved.json", {**draw.truth, "cameras": [d]})
+    for k in range(len(folders) // 2, len(folders)):
+        shutil.rmtree(args.out / noise / "moved", ignore_errors=True)
+        scene = render(program, args, noise, args.first_capture + k, path, "moved")
+        for pair in scene.glob(f"*/{d['name']}"):
+            shutil.rmtree(folders[k] / pair.parent.name / d["name"])
+            shutil.copytree(pair, folders[k] / pair.parent.name / d["name"])
+    return [f"camera {d['name']} has moved"]
 
 
-def inverted_order(args, program, truth, folders, out, noise):
-    """Each inverse of proj1/cam3 comes before its pattern in one capture."""
-    files = sorted((folders[-1] / "proj1/cam3").glob("*.png"))
+def inverted_order(args, program, draw, folders, out, noise):
+    """Each inverse of one pair comes before its pattern in one capture."""
+    pair = draw.pair()
+    k = draw.random.integers(len(folders))
+    files = sorted((folders[k] / pair).glob("*.png"))
     for pattern, inverse in zip(files[2::2], files[3::2]):
         pattern.rename(out / "swap.png")
         inverse.rename(pattern)
         (out / "swap.png").rename(inverse)
-    return ["proj1/cam3", "wrong order"]
+    return [f"the images of {pair} (--captures number {k + 1}) are in the wrong order"]
 
 
-def missing_projector(args, program, truth, folders, out, noise):
-    """proj4 is in no capture of cam0 and cam5."""
+def missing_projector(args, program, draw, folders, out, noise):
+    """One projector is in no capture of two cameras."""
+    projector = draw.device("projectors")
+    cameras = draw.two(draw.partners(projector, "cameras"))
     for folder in folders:
-        for camera in ("cam0", "cam5"):
-            shutil.rmtree(folder / "proj4" / camera, ignore_errors=True)
+        for camera in cameras:
+            shutil.rmtree(folder / projector["name"] / camera["name"], ignore_errors=True)
     return []
 
 
-def outliers(args, program, truth, folders, out, noise):
-    """Thirty per cent of the blocks of 16 x 16 pixels of every pair lie elsewhere in its images."""
-    random = np.random.default_rng(3)
+def outliers(args, program, draw, folders, out, noise):
+    """Thirty per cent of the lit blocks of 16 x 16 pixels of every pair lie elsewhere in its images."""
     size = 16
     for folder in folders:
         for pair in sorted(folder.glob("*/*")):
@@ -289,7 +321,7 @@ def outliers(args, program, truth, folders, out, noise):
                       if lit[j:j + size, i:i + size].mean() > 15]
             if len(places) < 4:
                 continue
-            chosen = random.choice(len(places), int(0.3 * len(places)), replace=False)
+            chosen = draw.random.choice(len(places), int(0.3 * len(places)), replace=False)
             source = np.roll(chosen, 1)
             for file in files:
                 old = np.asarray(Image.open(file))
@@ -301,50 +333,58 @@ def outliers(args, program, truth, folders, out, noise):
     return []
 
 
-def swapped_folders(args, program, truth, folders, out, noise):
-    """proj2/cam1 and proj2/cam2 are exchanged in all captures."""
+def swapped_folders(args, program, draw, folders, out, noise):
+    """Two folders of a projector (or of a camera) are exchanged in all captures."""
+    if draw.random.integers(2) == 0:
+        projector = draw.device("projectors")
+        a, b = (f"{projector['name']}/{c['name']}" for c in draw.two(draw.partners(projector, "cameras")))
+    else:
+        camera = draw.device("cameras")
+        a, b = (f"{p['name']}/{camera['name']}" for p in draw.two(draw.partners(camera, "projectors")))
     for folder in folders:
-        (folder / "proj2/cam1").rename(folder / "proj2/swap")
-        (folder / "proj2/cam2").rename(folder / "proj2/cam1")
-        (folder / "proj2/swap").rename(folder / "proj2/cam2")
-    return ["proj2/cam1 and proj2/cam2 are swapped"]
+        (folder / a).rename(out / "swap")
+        (folder / b).rename(folder / a)
+        (out / "swap").rename(folder / b)
+    return [f"{a} and {b} are swapped"]
 
 
 FAILURES = [moved_camera, inverted_order, missing_projector, outliers, swapped_folders]
 
 
 def break_captures(args, program, truth, noise):
-    """Each failure by itself, K of the cameras given; what must be named, and what was."""
+    """Each failure by itself, a few draws of each, K of the cameras given; what must be named, and what was."""
     known = sizes_only(truth)
     for d, c in zip(known["cameras"], truth["cameras"]):
         d.update(K=c["K"], distortion=c["distortion"])
     devices = common.write_rig(args.out / "known_cameras.json", known)
     good = [render(program, args, noise, seed, args.out / "truth.json", f"capture{seed}")
-            for seed in range(args.broken_captures)]
+            for seed in range(args.first_capture, args.first_capture + args.broken_captures)]
     rows = {}
     for failure in [None, *FAILURES]:
         name = failure.__name__ if failure else "nothing_wrong"
         if args.only and name not in args.only:
             continue
-        out = args.out / "broken" / name
-        folders, expected = good, []
-        if failure:
-            folders = [copied(f, out / f"capture{k}") for k, f in enumerate(good)]
-            expected = failure(args, program, truth, folders, out, noise)
-        row = calibrate(args, program, truth, folders, args.out / f"found_{name}", "--devices", devices,
-                        "--max-tracks", args.broken_tracks)
-        row["named"] = all(any(e in reason for reason in row["reasons"]) for e in expected)
-        rows[name] = row
-        show(name, row)
-        print("    named" if row["named"] else f"    NOT NAMED: {expected}", flush=True)
-        if failure:
+        for number in range(args.first_draw, args.first_draw + args.draws) if failure else [0]:
+            out = args.out / "broken" / name
+            folders, expected = good, []
+            if failure:
+                folders = [copied(f, out / f"capture{k}") for k, f in enumerate(good)]
+                expected = failure(args, program, Draw(truth, number), folders, out, noise)
+            row = calibrate(args, program, truth, folders, args.out / f"found_{name}", "--devices", devices,
+                            "--max-tracks", args.broken_tracks)
+            row["expected"] = expected
+            row["named"] = all(any(e in reason for reason in row["reasons"]) for e in expected)
+            rows[f"{name} {number}"] = row
+            show(f"{name} {number}", row)
+            print(f"    {'named' if row['named'] else 'NOT NAMED'}: {expected}", flush=True)
             shutil.rmtree(out, ignore_errors=True)
     return rows
 
 
 def main():
     args = common.arguments("calibration", __doc__, captures=(6, 2), tracks=(20000, 2000),
-                            broken_captures=(4, 2), broken_tracks=(6000, 2000), parts=("sizes,guesses,failures", "sizes"),
+                            broken_captures=(4, 2), broken_tracks=(6000, 2000), draws=(3, 1),
+                            first_draw=(0, 0), first_capture=(0, 0), parts=("sizes,guesses,failures", "sizes"),
                             only=("", ""))
     program = common.Program(args)
     truth = lensed_ring(program, args.out / "truth.json")
