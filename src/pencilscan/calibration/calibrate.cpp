@@ -8,6 +8,7 @@
 #include "pencilscan/calibration/board_start.h"
 #include "pencilscan/calibration/priors.h"
 #include "pencilscan/calibration/structure.h"
+#include "pencilscan/calibration/suspects.h"
 #include "pencilscan/calibration/uncertainty.h"
 #include "pencilscan/core/median.h"
 #include "pencilscan/core/parallel.h"
@@ -406,7 +407,22 @@ std::vector<double> track_errors(const BundleProblem& problem, const Track& trac
 
 CalibrationResult calibrate(const CalibrationInput& input, const CalibrateOptions& options,
                             const Progress& progress) {
-  return Calibration(input, options, progress).run();
+  CalibrationResult first = Calibration(input, options, progress).run();
+  // What contradicts may have drawn a device to a wrong place, from where right pairs contradict.
+  // Without all of them the rig may tell which are wrong.
+  const Contradictions contradictions = find_contradictions(input, first);
+  if (contradictions.unexplained.empty()) return first;
+  CalibrationInput rest = input;
+  rest.tracks = without_pairs(input.tracks, contradictions.unexplained);
+  if (rest.tracks.empty()) return first;
+  CalibrationResult again = Calibration(rest, options, progress).run();
+  const bool places_all =
+      again.solved && present_devices(again.problem) >= present_devices(first.problem);
+  if (!places_all) return first;
+  again.pairs = first.pairs;
+  if (find_contradictions(input, again).unexplained.size() >= contradictions.unexplained.size())
+    return first;
+  return again;
 }
 
 }  // namespace pencilscan

@@ -5,7 +5,6 @@
 #include <map>
 #include <set>
 
-#include "pencilscan/calibration/pair_matches.h"
 #include "pencilscan/calibration/structure.h"
 
 namespace pencilscan {
@@ -85,24 +84,32 @@ std::string join(const std::vector<std::string>& names) {
   return text;
 }
 
-/// The device that most of the contradicting pairs have in common.
-Finding name_mover(const CalibrationInput& input, const std::set<DevicePair>& bad,
-                   const std::map<DevicePair, std::vector<std::size_t>>& captures) {
-  std::map<std::size_t, std::size_t> count;
-  for (const DevicePair& pair : bad) {
-    ++count[pair.first];
-    ++count[pair.second];
+using Captures = std::map<DevicePair, std::vector<std::size_t>>;
+
+/// The device that most of the contradicting pairs have in common; of several, the one whose pairs
+/// fit worst altogether.
+Finding name_mover(const CalibrationInput& input, const Matches& matches, const PairFit& fit,
+                   const Captures& bad) {
+  std::map<std::size_t, std::pair<std::size_t, double>> blame;
+  for (const auto& [pair, captures] : bad) {
+    ++blame[pair.first].first;
+    ++blame[pair.second].first;
+  }
+  for (const auto& [pair, list] : matches) {
+    if (!fit.placed(pair.first) || !fit.placed(pair.second)) continue;
+    const double misfit = 1 - fit.share(list, pair.first, pair.second);
+    for (const std::size_t d : {pair.first, pair.second})
+      if (blame.contains(d)) blame[d].second += misfit;
   }
   const auto mover = std::max_element(
-      count.begin(), count.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
+      blame.begin(), blame.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
   std::vector<std::string> partners;
   std::set<std::size_t> when;
-  for (const DevicePair& pair : bad) {
+  for (const auto& [pair, captures] : bad) {
     if (pair.first != mover->first && pair.second != mover->first) continue;
     const std::size_t partner = pair.first == mover->first ? pair.second : pair.first;
     partners.push_back(device_at(input.rig, partner).name);
-    const auto found = captures.find(pair);
-    if (found != captures.end()) when.insert(found->second.begin(), found->second.end());
+    when.insert(captures.begin(), captures.end());
   }
   const bool is_camera = mover->first < input.rig.cameras.size();
   std::string text = std::string(is_camera ? "camera " : "projector ") +
@@ -120,12 +127,12 @@ Finding name_mover(const CalibrationInput& input, const std::set<DevicePair>& ba
 
 }  // namespace
 
-std::vector<Finding> find_suspects(const CalibrationInput& input, const CalibrationResult& result) {
+Contradictions find_contradictions(const CalibrationInput& input, const CalibrationResult& result) {
   if (!result.solved) return {};
   const Matches matches = matches_by_pair(input.tracks);
   const PairFit fit(result);
   std::set<DevicePair> bad;
-  std::map<DevicePair, std::vector<std::size_t>> captures;  // where only some contradict
+  Captures captures;  // where only some contradict
   for (const auto& [pair, list] : matches) {
     if (!fit.placed(pair.first) || !fit.placed(pair.second)) continue;
     if (list.size() >= kLeastMatches &&
@@ -143,12 +150,30 @@ std::vector<Finding> find_suspects(const CalibrationInput& input, const Calibrat
       captures[pair].push_back(capture);
     }
   }
-  std::vector<Finding> findings = find_swaps(input, matches, fit, bad);
+  Contradictions found{find_swaps(input, matches, fit, bad), {}};
   // Pairs without sense in themselves (their fundamental matrix fits few) are named elsewhere.
   for (const PairGeometry& geometry : result.pairs)
     if (geometry.inlier_share() < 0.35) bad.erase({geometry.camera, geometry.projector});
-  if (!bad.empty()) findings.push_back(name_mover(input, bad, captures));
-  return findings;
+  for (const DevicePair& pair : bad) found.unexplained[pair] = captures[pair];
+  if (!bad.empty()) found.findings.push_back(name_mover(input, matches, fit, found.unexplained));
+  return found;
+}
+
+std::vector<Track> without_pairs(const std::vector<Track>& tracks, const Captures& pairs) {
+  std::vector<Track> kept;
+  for (const Track& track : tracks) {
+    Track rest{{track.views[0]}, track.capture};
+    for (std::size_t i = 1; i < track.views.size(); ++i) {
+      const auto found = pairs.find(pair_of(track, track.views[i]));
+      const bool is_out =
+          found != pairs.end() &&
+          (found->second.empty() ||
+           std::count(found->second.begin(), found->second.end(), track.capture) != 0);
+      if (!is_out) rest.views.push_back(track.views[i]);
+    }
+    if (rest.views.size() > 1) kept.push_back(std::move(rest));
+  }
+  return kept;
 }
 
 }  // namespace pencilscan

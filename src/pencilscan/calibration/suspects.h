@@ -1,14 +1,28 @@
 #pragma once
 
+#include <map>
 #include <vector>
 
+#include "pencilscan/calibration/pair_matches.h"
 #include "pencilscan/calibration/verdict.h"
 
 namespace pencilscan {
 
+/// What contradicts a rig.
+struct Contradictions {
+  std::vector<Finding> findings;
+  /// Pairs that neither swapped folders explain nor their own images (some fit no pair of devices
+  /// at all), with the captures in which they contradict; none: in all.
+  std::map<DevicePair, std::vector<std::size_t>> unexplained;
+};
+
 /// Pairs whose correspondences contradict the rig, explained: swapped folders, a device that moved
 /// between captures or between projectors, or a scene that moved.
-[[nodiscard]] std::vector<Finding> find_suspects(const CalibrationInput& input,
+[[nodiscard]] Contradictions find_contradictions(const CalibrationInput& input,
                                                  const CalibrationResult& result);
+
+/// Tracks without the views of some pairs, in the captures stated or in all.
+[[nodiscard]] std::vector<Track> without_pairs(
+    const std::vector<Track>& tracks, const std::map<DevicePair, std::vector<std::size_t>>& pairs);
 
 }  // namespace pencilscan

@@ -104,7 +104,8 @@ class Judge {
               " fit a rigid scene seen by one camera and one projector",
           "look at these images: something moved, or files are mixed up");
     }
-    for (const Finding& finding : find_suspects(input_, result_)) findings_.push_back(finding);
+    for (const Finding& finding : find_contradictions(input_, result_).findings)
+      findings_.push_back(finding);
   }
 
   void judge_residuals() {
