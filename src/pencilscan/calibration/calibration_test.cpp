@@ -7,6 +7,7 @@
 
 #include "pencilscan/calibration/calibrate.h"
 #include "pencilscan/calibration/calibration_report.h"
+#include "pencilscan/calibration/pair_matches.h"
 #include "pencilscan/calibration/reprojection.h"
 #include "pencilscan/calibration/sample_tracks.h"
 #include "pencilscan/calibration/structure.h"
@@ -17,6 +18,7 @@ namespace pencilscan {
 namespace {
 
 using ::testing::HasSubstr;
+using ::testing::Not;
 using namespace sample;
 
 /// Distances of projections of points in the volume, median, px. Free of gauge: the similarity that
@@ -173,40 +175,56 @@ TEST(Verdict, PlanarSceneIsUnusable) {
   EXPECT_THAT(all, HasSubstr("planar scene"));
 }
 
-TEST(Verdict, SwappedFoldersAreNamed) {
-  const Rig truth = ring(4, 4);
-  // Captures give thousands: with few, the ring is not joined round the exchanged pairs.
-  std::vector<Track> tracks = tracks_of(truth, {.count = 2500});
-  // What cam1 and cam2 saw of proj1, exchanged: their pixels are the same size.
-  const std::size_t projector = truth.cameras.size() + 1;
+/// What two pairs (camera, projector) saw, each taken as the other's.
+std::vector<Track> with_exchanged(const std::vector<Track>& tracks, const DevicePair& a,
+                                  const DevicePair& b) {
   std::vector<Track> mixed;
   for (const Track& track : tracks) {
     Track rest{{track.views[0]}, 0};
     for (std::size_t i = 1; i < track.views.size(); ++i) {
-      Track pair{{track.views[0], track.views[i]}, 0};
-      bool swapped = false;
-      const bool is_pair = pair.views[0].device == projector || pair.views[1].device == projector;
-      for (TrackView& view : pair.views) {
-        if (!is_pair || (view.device != 1 && view.device != 2)) continue;
-        view.device = 3 - view.device;
-        swapped = true;
-      }
-      if (swapped)
-        mixed.push_back(pair);
-      else
+      const DevicePair pair = pair_of(track, track.views[i]);
+      if (pair != a && pair != b) {
         rest.views.push_back(track.views[i]);
+        continue;
+      }
+      const DevicePair& other = pair == a ? b : a;
+      Track exchanged{{track.views[0], track.views[i]}, 0};
+      for (TrackView& view : exchanged.views)
+        view.device = view.device == pair.first ? other.first : other.second;
+      mixed.push_back(exchanged);
     }
     if (rest.views.size() > 1) mixed.push_back(rest);
   }
-  const CalibrationInput input = input_of(truth, mixed, true);
+  return mixed;
+}
+
+/// All findings about a ring of four and four devices, cameras known.
+std::string findings_of(const Rig& truth, const std::vector<Track>& tracks) {
+  const CalibrationInput input = input_of(truth, tracks, true);
   const auto result = calibrate(input, kQuick);
-  ASSERT_TRUE(result.solved);
+  EXPECT_TRUE(result.solved);
   Uncertainty sigma;
   sigma.devices.resize(device_count(truth));
-  const Verdict verdict = judge(input, result, sigma, {});
   std::string all;
-  for (const Finding& finding : verdict.findings) all += finding.what + "\n";
-  EXPECT_THAT(all, HasSubstr("the folders proj1/cam1 and proj1/cam2 are swapped"));
+  for (const Finding& finding : judge(input, result, sigma, {}).findings)
+    all += finding.what + "\n";
+  return all;
+}
+
+TEST(Verdict, SwappedFoldersAreNamed) {
+  const Rig truth = ring(4, 4);
+  const auto tracks = with_exchanged(tracks_of(truth, {.count = 2500}), {1, 5}, {2, 5});
+  EXPECT_THAT(findings_of(truth, tracks),
+              HasSubstr("the folders proj1/cam1 and proj1/cam2 are swapped"));
+}
+
+/// These draw cam2 to a wrong place, from where right pairs contradict.
+TEST(Verdict, SwappedFoldersAreNamedThoughTheyMisplaceADevice) {
+  const Rig truth = ring(4, 4);
+  const auto tracks = with_exchanged(tracks_of(truth, {.count = 1000, .seed = 7}), {2, 5}, {2, 6});
+  const std::string all = findings_of(truth, tracks);
+  EXPECT_THAT(all, HasSubstr("the folders proj1/cam2 and proj2/cam2 are swapped"));
+  EXPECT_THAT(all, Not(HasSubstr("has moved")));
 }
 
 TEST(Uncertainty, CoversTheErrorsOfTheResult) {
