@@ -25,10 +25,11 @@ struct TestLine {
   }
 };
 
-/// Image of lines over a small background, `noise` standard deviation; box edges blurred by 0.7 px.
-cv::Mat draw(const std::vector<TestLine>& lines, int width, int height, double noise) {
+/// Image of lines over a small background, `noise` standard deviation; box edges blurred, px.
+cv::Mat draw(const std::vector<TestLine>& lines, int width, int height, double noise,
+             double blur = 0.7) {
   cv::Mat image(height, width, CV_32FC3);
-  const auto step = [](double d) { return 0.5 * (1 + std::erf(d / (0.7 * std::sqrt(2.0)))); };
+  const auto step = [&](double d) { return 0.5 * (1 + std::erf(d / (blur * std::sqrt(2.0)))); };
   for (int y = 0; y < height; ++y) {
     Random random(11, static_cast<std::uint64_t>(y));
     for (int x = 0; x < width; ++x) {
@@ -140,6 +141,23 @@ TEST(DetectCurves, WideLineIsOneCurveInItsMiddle) {
   for (const Curve& curve : found.curves) {
     for (const CurvePoint& p : curve.points)
       EXPECT_NEAR(lines[0].distance(p.position.x(), p.position.y()), 0, 0.3);
+  }
+}
+
+TEST(DetectCurves, LinesAtTheEdgeOfADenseFieldAreFoundHoweverSharpTheyAre) {
+  for (const double blur : {0.3, 0.7}) {
+    std::vector<TestLine> lines;
+    for (int i = 0; i < 12; ++i) lines.push_back({20.0 + 4.2 * i, 0, 1.45, 1.4});
+    const CameraDetection found = detect(draw(lines, 320, 120, 0.005, blur));
+    std::size_t on_line = 0;
+    for (const Curve& curve : found.curves) {
+      for (const CurvePoint& p : curve.points) {
+        on_line += std::any_of(lines.begin(), lines.end(), [&](const TestLine& line) {
+          return std::abs(line.distance(p.position.x(), p.position.y())) < 0.4;
+        });
+      }
+    }
+    EXPECT_GT(on_line, 2 * 110U) << "of 120 rows of each line, blur " << blur;
   }
 }
 

@@ -152,9 +152,9 @@ void fit_curve(const cv::Mat& residual, bool first_round, int half_arc, Curve& c
   }
 }
 
+/// Of dense lines the fit gives the least width: as thin as the picture can show them.
 bool sound(const CurvePoint& p, const RefineOptions& options) {
-  return p.amplitude > 0 && p.sigma_px < options.max_sigma_px && p.width_px > kMinLineWidth &&
-         p.width_px < kMaxLineWidth;
+  return p.amplitude > 0 && p.sigma_px < options.max_sigma_px && p.width_px < kMaxLineWidth;
 }
 
 /// True when going from b to c leaves the direction from a to b by a jump.
