@@ -43,6 +43,8 @@ LineNaming name_lines(const Rig& rig, const std::vector<ColorFamily>& families,
                       const std::vector<GridGraph>& graphs, const PointOptions& options) {
   constexpr double kNearlyAll = 0.8;    // of the curves' points; right names reach .9 and more
   constexpr double kClearlyMore = 1.1;  // points, of a rig that shows no error in itself
+  constexpr double kAsWell = 1.2;       // crossings' misses, of those before
+  constexpr double kClearlyLess = 0.8;  // the same
   LineNaming result;
   result.labeling = solve(rig, families, graphs, options.solution);
   result.crossings = disagreement(rig, graphs, result.labeling);
@@ -59,9 +61,15 @@ LineNaming name_lines(const Rig& rig, const std::vector<ColorFamily>& families,
   RigRefinement found = refine_rig_on_frames(rig, {&curves, 1}, refinement);
   if (found.report.refined) {
     Labeling& labeling = found.labelings.front();
-    const bool names_more = static_cast<double>(labelled_points(labeling)) > kClearlyMore * points;
-    const bool agrees = !disagrees(disagreement(found.rig, graphs, labeling));
-    if (agrees && (is_off || names_more)) {
+    const CrossingDisagreement left = disagreement(found.rig, graphs, labeling);
+    const auto named = static_cast<double>(labelled_points(labeling));
+    const double misses = left.median_px / result.crossings.median_px;
+    // Curves that are themselves off their lines leave more than image noise explains, and wrong
+    // names may meet as well as right ones: but they leave many curves without one.
+    const bool is_better = (misses < kAsWell && named > kClearlyMore * points) ||
+                           (misses < kClearlyLess && named > points);
+    if (is_off ? is_better || !disagrees(left)
+               : named > kClearlyMore * points && !disagrees(left)) {
       result.labeling = std::move(labeling);
       result.corrected = std::move(found.rig);
       result.crossings = disagreement(rig, graphs, result.labeling);

@@ -18,7 +18,7 @@ struct LineNaming {
 
 /// Names the lines with the rig as given. Where their crossings then miss each other, or many
 /// curves stay without a name, with the rig as the crossings correct it (refine_rig_on_frames), if
-/// its own crossings agree.
+/// its own crossings agree, or agree better, or clearly more curves have a name.
 [[nodiscard]] LineNaming name_lines(const Rig& rig, const std::vector<ColorFamily>& families,
                                     const std::vector<GridGraph>& graphs,
                                     const PointOptions& options);

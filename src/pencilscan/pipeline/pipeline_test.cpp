@@ -3,11 +3,13 @@
 #include <unistd.h>
 
 #include <array>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
 #include <tuple>
 #include <utility>
 
@@ -378,21 +380,57 @@ Rig rig_off_by(double px, const Rig& rig) {
   return corrected_rig(rig, {one, other, other, one});
 }
 
-TEST_F(PipelineTest, LinesAreNamedRightWithARigThatIsOff) {
+/// Of the points of `truth`, those that have the same name in `points`, and another one.
+std::pair<std::size_t, std::size_t> same_and_other_names(const std::vector<MeasuredPoint>& truth,
+                                                         const std::vector<MeasuredPoint>& points) {
   using Place = std::tuple<int, float, float>;
   std::map<Place, std::pair<int, int>> names;
-  const auto truth = measure_points(*rig_, *frame_).points;
   for (const MeasuredPoint& p : truth) names[{p.camera, p.u, p.v}] = {p.projector, p.line};
+  std::size_t same = 0;
+  std::size_t other = 0;
+  for (const MeasuredPoint& p : points) {
+    const auto found = names.find({p.camera, p.u, p.v});
+    if (found == names.end()) continue;
+    ++(found->second == std::pair<int, int>(p.projector, p.line) ? same : other);
+  }
+  return {same, other};
+}
+
+TEST_F(PipelineTest, LinesAreNamedRightWithARigThatIsOff) {
+  const auto truth = measure_points(*rig_, *frame_).points;
   for (const double px : {1.0, 2.0, 4.0}) {
-    std::size_t same = 0;
-    std::size_t other_name = 0;
-    for (const MeasuredPoint& p : measure_points(rig_off_by(px, *rig_), *frame_).points) {
-      const auto found = names.find({p.camera, p.u, p.v});
-      if (found == names.end()) continue;
-      ++(found->second == std::pair<int, int>(p.projector, p.line) ? same : other_name);
-    }
+    const auto points = measure_points(rig_off_by(px, *rig_), *frame_).points;
+    const auto [same, other] = same_and_other_names(truth, points);
     EXPECT_GT(same, 9 * truth.size() / 10) << px;
-    EXPECT_LT(other_name, truth.size() / 200) << px;
+    EXPECT_LT(other, truth.size() / 200) << px;
+  }
+}
+
+/// The picture with every line bent to and fro by `amplitude` px.
+cv::Mat bent(const cv::Mat& image, float amplitude) {
+  cv::Mat x(image.size(), CV_32F);
+  cv::Mat y(image.size(), CV_32F);
+  for (int v = 0; v < image.rows; ++v) {
+    for (int u = 0; u < image.cols; ++u) {
+      const auto [fu, fv] = std::pair(static_cast<float>(u), static_cast<float>(v));
+      x.at<float>(v, u) = fu + amplitude * std::sin(0.19F * fv + 0.11F * fu);
+      y.at<float>(v, u) = fv + amplitude * std::sin(0.17F * fu - 0.13F * fv);
+    }
+  }
+  cv::Mat result;
+  cv::remap(image, result, x, y, cv::INTER_CUBIC, cv::BORDER_REPLICATE);
+  return result;
+}
+
+TEST_F(PipelineTest, LinesThatAreBentAreNamedRightWithARigThatIsOff) {
+  Frame frame = *frame_;
+  for (cv::Mat& image : frame.images) image = bent(image, 0.8F);
+  const auto truth = measure_points(*rig_, frame).points;
+  for (const double px : {1.0, 2.0, 3.0}) {
+    const auto points = measure_points(rig_off_by(px, *rig_), frame).points;
+    const auto [same, other] = same_and_other_names(truth, points);
+    EXPECT_GT(same, 85 * truth.size() / 100) << px;
+    EXPECT_LT(other, truth.size() / 50) << px;
   }
 }
 
