@@ -16,10 +16,9 @@
 
 #include "pencilscan/calibration/pair_matches.h"
 #include "pencilscan/calibration/sample_tracks.h"
-#include "pencilscan/calibration/structure.h"
+#include "pencilscan/calibration/suspects.h"
 #include "pencilscan/calibration/verdict.h"
 #include "pencilscan/core/parallel.h"
-#include "pencilscan/geometry/least_squares.h"
 
 namespace {
 
@@ -92,19 +91,8 @@ Case missing_projector(const Setting& setting, Random& random) {
   const std::size_t a = partner_of(setting.truth, projector, random);
   std::size_t b = a;
   while (b == a) b = partner_of(setting.truth, projector, random);
-  std::vector<Track> kept;
-  for (Track track : captures_of(setting, setting.truth, kCaptures)) {
-    const auto is_gone = [&](const TrackView& view) {
-      const DevicePair pair = pair_of(track, view);
-      return pair == DevicePair{a, projector} || pair == DevicePair{b, projector};
-    };
-    std::vector<TrackView> views{track.views[0]};
-    for (std::size_t i = 1; i < track.views.size(); ++i)
-      if (!is_gone(track.views[i])) views.push_back(track.views[i]);
-    track.views = views;
-    if (views.size() > 1) kept.push_back(track);
-  }
-  return {kept, ""};
+  const auto all = captures_of(setting, setting.truth, kCaptures);
+  return {without_pairs(all, {{{a, projector}, {}}, {{b, projector}, {}}}), ""};
 }
 
 /// From the second capture on one device is turned by 0.3 degrees and shifted by 4 mm.
@@ -133,51 +121,9 @@ Case swapped_folders(const Setting& setting, Random& random) {
   while (y == x) y = partner_of(setting.truth, shared, random);
   const DevicePair a = ordered(shared, std::min(x, y));
   const DevicePair b = ordered(shared, std::max(x, y));
-  std::vector<Track> mixed;
-  for (const Track& track : captures_of(setting, setting.truth, kCaptures)) {
-    Track rest{{track.views[0]}, track.capture};
-    for (std::size_t i = 1; i < track.views.size(); ++i) {
-      const DevicePair pair = pair_of(track, track.views[i]);
-      if (pair != a && pair != b) {
-        rest.views.push_back(track.views[i]);
-        continue;
-      }
-      const DevicePair& other = pair == a ? b : a;
-      Track exchanged{{track.views[0], track.views[i]}, track.capture};
-      for (TrackView& view : exchanged.views)
-        view.device = view.device < n ? other.first : other.second;
-      mixed.push_back(exchanged);
-    }
-    if (rest.views.size() > 1) mixed.push_back(rest);
-  }
+  std::vector<Track> mixed =
+      sample::with_exchanged(captures_of(setting, setting.truth, kCaptures), a, b);
   return {mixed, folder(setting.truth, a) + " and " + folder(setting.truth, b) + " are swapped"};
-}
-
-double projection_error(const Rig& truth, const BundleProblem& found) {
-  Random random(1);
-  Eigen::Matrix3Xd a(3, 100);
-  Eigen::Matrix3Xd b(3, 100);
-  for (Eigen::Index i = 0; i < a.cols(); ++i) {
-    a.col(i) << random.uniform(-90, 90), random.uniform(-90, 90), random.uniform(-90, 90);
-    Track track;
-    for (std::size_t d = 0; d < device_count(truth); ++d)
-      track.views.push_back({d, *device_at(truth, d).project(a.col(i)), 1});
-    b.col(i) = triangulate(found, track, 0.01).value_or(Vec3::Constant(1e6));
-  }
-  const Eigen::Matrix4d S = fit_similarity(a, b, true);
-  std::vector<double> errors;
-  for (Eigen::Index i = 0; i < a.cols(); ++i) {
-    const Vec3 moved = (S * a.col(i).homogeneous()).head<3>();
-    for (std::size_t d = 0; d < device_count(truth); ++d) {
-      const auto p = device_at(truth, d).project(a.col(i));
-      if (const auto e = p ? view_error(found.devices[d], moved, {d, *p, 1}) : std::nullopt)
-        errors.push_back(e->norm());
-    }
-  }
-  if (errors.empty()) return 1e6;
-  std::nth_element(errors.begin(), errors.begin() + std::ptrdiff_t(errors.size() / 2),
-                   errors.end());
-  return errors[errors.size() / 2];
 }
 
 struct Outcome {
@@ -194,7 +140,7 @@ Outcome outcome_of(const Setting& setting, Case what) {
   if (result.solved) {
     const Uncertainty sigma = uncertainty(result.problem, result.adjustment);
     outcome.verdict = judge(input, result, sigma, {});
-    outcome.error_px = projection_error(setting.truth, result.problem);
+    outcome.error_px = sample::projection_error(setting.truth, result.problem);
   } else {
     outcome.verdict.grade = Grade::kUnusable;
   }

@@ -21,38 +21,13 @@ using ::testing::HasSubstr;
 using ::testing::Not;
 using namespace sample;
 
-/// Distances of projections of points in the volume, median, px. Free of gauge: the similarity that
-/// takes the points to where the found rig measures them comes first.
 double projection_error(const Rig& truth, const Rig& found) {
-  constexpr Eigen::Index kPoints = 100;
   BundleProblem problem;
   for (std::size_t d = 0; d < device_count(found); ++d) {
     problem.devices.push_back(bundle_device(device_at(found, d)));
     problem.devices.back().present = true;
   }
-  Random random(1);
-  Eigen::Matrix3Xd a(3, kPoints);
-  Eigen::Matrix3Xd b(3, kPoints);
-  for (Eigen::Index i = 0; i < kPoints; ++i) {
-    a.col(i) << random.uniform(-90, 90), random.uniform(-90, 90), random.uniform(-90, 90);
-    Track track;
-    for (std::size_t d = 0; d < device_count(truth); ++d)
-      track.views.push_back({d, *device_at(truth, d).project(a.col(i)), 1});
-    b.col(i) = triangulate(problem, track, 0.01).value_or(Vec3::Constant(1e6));
-  }
-  const Eigen::Matrix4d S = fit_similarity(a, b, true);
-  std::vector<double> errors;
-  for (Eigen::Index i = 0; i < kPoints; ++i) {
-    const Vec3 moved = (S * a.col(i).homogeneous()).head<3>();
-    for (std::size_t d = 0; d < device_count(truth); ++d) {
-      const auto p = device_at(truth, d).project(a.col(i));
-      const auto q = device_at(found, d).project(moved);
-      if (p && q) errors.push_back((*p - *q).norm());
-    }
-  }
-  std::nth_element(errors.begin(), errors.begin() + std::ptrdiff_t(errors.size() / 2),
-                   errors.end());
-  return errors[errors.size() / 2];
+  return sample::projection_error(truth, problem);
 }
 
 /// Small scenes need no more, and tests shall be quick.
@@ -173,29 +148,6 @@ TEST(Verdict, PlanarSceneIsUnusable) {
   std::string all;
   for (const Finding& finding : verdict.findings) all += finding.what + "\n";
   EXPECT_THAT(all, HasSubstr("planar scene"));
-}
-
-/// What two pairs (camera, projector) saw, each taken as the other's.
-std::vector<Track> with_exchanged(const std::vector<Track>& tracks, const DevicePair& a,
-                                  const DevicePair& b) {
-  std::vector<Track> mixed;
-  for (const Track& track : tracks) {
-    Track rest{{track.views[0]}, 0};
-    for (std::size_t i = 1; i < track.views.size(); ++i) {
-      const DevicePair pair = pair_of(track, track.views[i]);
-      if (pair != a && pair != b) {
-        rest.views.push_back(track.views[i]);
-        continue;
-      }
-      const DevicePair& other = pair == a ? b : a;
-      Track exchanged{{track.views[0], track.views[i]}, 0};
-      for (TrackView& view : exchanged.views)
-        view.device = view.device == pair.first ? other.first : other.second;
-      mixed.push_back(exchanged);
-    }
-    if (rest.views.size() > 1) mixed.push_back(rest);
-  }
-  return mixed;
 }
 
 /// All findings about a ring of four and four devices, cameras known.
