@@ -106,23 +106,11 @@ void print_distances(const TruthScene& truth, const PointResult& result,
 }
 
 /// Of points with confidence near c, which share is right?
-void print_reliability(const PointResult& result, const std::vector<PointVerdict>& verdicts) {
-  constexpr double kBounds[] = {0, 0.5, 0.7, 0.8, 0.9, 0.95, 0.98, 0.99, 0.995, 0.999, 1.01};
-  for (std::size_t b = 0; b + 1 < std::size(kBounds); ++b) {
-    std::size_t points = 0;
-    std::size_t right = 0;
-    double sum = 0;
-    for (std::size_t i = 0; i < verdicts.size(); ++i) {
-      const double c = result.points[i].confidence;
-      if (c < kBounds[b] || c >= kBounds[b + 1]) continue;
-      ++points;
-      sum += c;
-      right += verdicts[i].right;
-    }
-    if (points == 0) continue;
-    const auto n = static_cast<double>(points);
-    std::printf("  confidence %.4f  right %.4f  of %zu points\n", sum / n,
-                static_cast<double>(right) / n, points);
+void print_reliability(const LabelFigures& labels) {
+  for (const ConfidenceBand& band : labels.right_by_confidence) {
+    if (band.right.count == 0) continue;
+    std::printf("  confidence %.4f  right %.4f  of %zu points\n", band.mean_confidence(),
+                band.right.value(), band.right.count);
   }
 }
 
@@ -189,7 +177,7 @@ int run(const std::filesystem::path& rig_path, const std::filesystem::path& fram
         choices[k].name, result.points.size(), labels.wrong.value(), recall.recall.value(),
         recall.recall_dense.value(), labels.line_error_median_px);
     print_distances(truth, result, verdicts);
-    print_reliability(result, verdicts);
+    print_reliability(labels);
   }
   return 0;
 }

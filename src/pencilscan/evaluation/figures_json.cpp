@@ -38,8 +38,7 @@ void put_lines(Json& json, const LabelFigures& labels, const RecallFigures& reca
   Json bands = Json::array();
   for (const ConfidenceBand& band : labels.right_by_confidence) {
     if (band.right.count == 0) continue;
-    const double confidence = band.confidence_sum / static_cast<double>(band.right.count);
-    bands.push_back({{"confidence", number(confidence)},
+    bands.push_back({{"confidence", number(band.mean_confidence())},
                      {"right", number(band.right.value())},
                      {"points", band.right.count}});
   }

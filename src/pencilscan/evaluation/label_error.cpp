@@ -73,22 +73,6 @@ void judge(const TruthScene& truth, const MeasuredPoint& p, const std::vector<Ve
   }
 }
 
-}  // namespace
-
-std::vector<PointVerdict> judge_points(const TruthScene& truth,
-                                       std::span<const MeasuredPoint> points,
-                                       const LabelOptions& options) {
-  std::vector<PointVerdict> verdicts(points.size());
-  mark_duplicates(points, verdicts);
-  const auto disc = disc_offsets();
-  parallel_chunks(points.size(), [&](std::size_t i) {
-    if (verdicts[i].counted) judge(truth, points[i], disc, options, verdicts[i]);
-  });
-  return verdicts;
-}
-
-namespace {
-
 std::vector<ConfidenceBand> confidence_bands() {
   std::vector<ConfidenceBand> bands;
   for (const double low : {0.0, 0.5, 0.7, 0.8, 0.9, 0.95, 0.98, 0.99, 0.995, 0.999})
@@ -105,6 +89,18 @@ void add_to_band(float confidence, bool right, std::vector<ConfidenceBand>& band
 }
 
 }  // namespace
+
+std::vector<PointVerdict> judge_points(const TruthScene& truth,
+                                       std::span<const MeasuredPoint> points,
+                                       const LabelOptions& options) {
+  std::vector<PointVerdict> verdicts(points.size());
+  mark_duplicates(points, verdicts);
+  const auto disc = disc_offsets();
+  parallel_chunks(points.size(), [&](std::size_t i) {
+    if (verdicts[i].counted) judge(truth, points[i], disc, options, verdicts[i]);
+  });
+  return verdicts;
+}
 
 LabelFigures label_figures(const TruthScene& truth, std::span<const MeasuredPoint> points,
                            std::span<const PointVerdict> verdicts) {

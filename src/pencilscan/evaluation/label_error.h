@@ -39,6 +39,11 @@ struct ConfidenceBand {
   double low = 0;
   double confidence_sum = 0;
   Share right;
+
+  /// Of a band with vertices.
+  [[nodiscard]] double mean_confidence() const {
+    return confidence_sum / static_cast<double>(right.count);
+  }
 };
 
 /// Label error as docs/figures.md defines it: the share is of *wrong* vertices.

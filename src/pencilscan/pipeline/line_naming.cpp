@@ -42,7 +42,7 @@ std::string disagreement_warning(const CrossingDisagreement& crossings, bool lab
 LineNaming name_lines(const Rig& rig, const std::vector<ColorFamily>& families,
                       const std::vector<GridGraph>& graphs, const PointOptions& options) {
   constexpr double kNearlyAll = 0.8;    // of the curves' points; right names reach .9 and more
-  constexpr double kClearlyMore = 1.1;  // points, of a rig that shows no error in itself
+  constexpr double kClearlyMore = 1.1;  // points named, of those before
   constexpr double kAsWell = 1.2;       // crossings' misses, of those before
   constexpr double kClearlyLess = 0.8;  // the same
   LineNaming result;
@@ -64,12 +64,13 @@ LineNaming name_lines(const Rig& rig, const std::vector<ColorFamily>& families,
     const CrossingDisagreement left = disagreement(found.rig, graphs, labeling);
     const auto named = static_cast<double>(labelled_points(labeling));
     const double misses = left.median_px / result.crossings.median_px;
+    const bool agrees = !disagrees(left);
+    const bool names_more = named > kClearlyMore * points;
     // Curves that are themselves off their lines leave more than image noise explains, and wrong
     // names may meet as well as right ones: but they leave many curves without one.
-    const bool is_better = (misses < kAsWell && named > kClearlyMore * points) ||
-                           (misses < kClearlyLess && named > points);
-    if (is_off ? is_better || !disagrees(left)
-               : named > kClearlyMore * points && !disagrees(left)) {
+    const bool is_better =
+        (names_more && misses < kAsWell) || (named > points && misses < kClearlyLess);
+    if (is_off ? agrees || is_better : agrees && names_more) {
       result.labeling = std::move(labeling);
       result.corrected = std::move(found.rig);
       result.crossings = disagreement(rig, graphs, result.labeling);

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "pencilscan/core/lanes.h"
+#include "pencilscan/geometry/quadric_moments.h"
 
 namespace pencilscan {
 namespace {
@@ -139,17 +140,6 @@ PENCILSCAN_CLONES void weigh_by_distance(const float* x, const float* y, std::si
     exponential(-0.5F * (lx * lx + ly * ly), weight);
     store(weight, near + i);
   }
-}
-
-Matrix6f normal_matrix(const std::array<float, 15>& s) {
-  Matrix6f N;
-  N << s[0], s[1], s[2], s[3], s[4], s[5],    //
-      s[1], s[3], s[4], s[6], s[7], s[8],     //
-      s[2], s[4], s[5], s[7], s[8], s[9],     //
-      s[3], s[6], s[7], s[10], s[11], s[12],  //
-      s[4], s[7], s[8], s[11], s[12], s[13],  //
-      s[5], s[8], s[9], s[12], s[13], s[14];
-  return N;
 }
 
 }  // namespace
@@ -342,7 +332,7 @@ SurfacePatch LocalSurface::fit(const Vector2f& pixel, float scale_px, Neighborho
     // First a plane and all points alike, so that one wrong line does not bend it alone.
     const bool first = iteration == 0;
     sum_moments(columns, !first, 1 / (kTuning * scale), sums);
-    Matrix6f N = share * normal_matrix(sums.of_terms);
+    Matrix6f N = share * quadric_normal_matrix(sums.of_terms);
     N.diagonal().head<3>().array() += 1e-2F;
     N.diagonal().tail<3>().array() += first ? 1e12F : curvature_weight;
     factor.compute(N);

@@ -7,6 +7,7 @@
 
 #include "pencilscan/core/chunks.h"
 #include "pencilscan/geometry/least_squares.h"
+#include "pencilscan/geometry/quadric_moments.h"
 
 namespace pencilscan {
 namespace {
@@ -59,8 +60,7 @@ bool fit_quadric(std::span<const SurfaceSample> samples, const PointGrid& grid, 
   const Vec3 n = sample.normal;
   const Vec3 e1 = n.unitOrthogonal();
   const Vec3 e2 = n.cross(e1);
-  // Sums of w x^i y^j by rising degree: the normal equations hold nothing else.
-  std::array<double, 15> moments{};
+  std::array<double, 15> moments{};  // of quadric_moments.h
   Vec6 b = Vec6::Zero();
   double sum_h2 = 0;
   int count = 0;
@@ -87,14 +87,7 @@ bool fit_quadric(std::span<const SurfaceSample> samples, const PointGrid& grid, 
   });
   if (count < 8) return false;
   const double sum = moments[0];
-  const auto& m = moments;
-  Mat6 A;
-  A << m[0], m[1], m[2], m[3], m[4], m[5],    //
-      m[1], m[3], m[4], m[6], m[7], m[8],     //
-      m[2], m[4], m[5], m[7], m[8], m[9],     //
-      m[3], m[6], m[7], m[10], m[11], m[12],  //
-      m[4], m[7], m[8], m[11], m[12], m[13],  //
-      m[5], m[8], m[9], m[12], m[13], m[14];
+  Mat6 A = quadric_normal_matrix(moments);
   // A weak pull of the curvature to zero decides where a single curve leaves it open.
   for (int k = 1; k < 6; ++k) A(k, k) += (k < 3 ? 1e-6 : 3e-3) * sum;
   const Vec6 c = solve_symmetric(A, b);
