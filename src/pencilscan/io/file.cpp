@@ -78,9 +78,10 @@ class TemporaryFile {
 
   [[nodiscard]] bool opened_ok() const { return descriptor_ >= 0 || closed_; }
   [[nodiscard]] int descriptor() const { return descriptor_; }
-  /// Flushes to the disk and closes; 0 or the errno of what failed.
-  int finish() {
-    int error = ::fsync(descriptor_) == 0 || errno == EINVAL ? 0 : errno;
+  /// Flushes to the disk if asked to and closes; 0 or the errno of what failed.
+  int finish(Durability durability) {
+    const bool flushed = durability == Durability::kProcess || ::fsync(descriptor_) == 0;
+    int error = flushed || errno == EINVAL ? 0 : errno;
     if (::close(descriptor_) != 0 && error == 0) error = errno;
     descriptor_ = -1;
     closed_ = true;
@@ -106,7 +107,7 @@ class TemporaryFile {
 }  // namespace
 
 void write_atomically(const std::filesystem::path& path,
-                      const std::function<void(std::ostream&)>& write) {
+                      const std::function<void(std::ostream&)>& write, Durability durability) {
   std::error_code made;
   if (path.has_parent_path()) std::filesystem::create_directories(path.parent_path(), made);
   if (made) cannot_write(path, made.value());
@@ -118,16 +119,18 @@ void write_atomically(const std::filesystem::path& path,
   stream.flush();
   if (buffer.error() != 0) cannot_write(path, buffer.error());
   if (!stream) throw StageError(path.string() + ": cannot be written: the stream failed");
-  if (const int error = file.finish(); error != 0) cannot_write(path, error);
+  if (const int error = file.finish(durability); error != 0) cannot_write(path, error);
   if (const int error = file.rename_to(path); error != 0) cannot_write(path, error);
 }
 
-void write_text(const std::filesystem::path& path, const std::string& text) {
-  write_atomically(path, [&](std::ostream& stream) { stream << text; });
+void write_text(const std::filesystem::path& path, const std::string& text, Durability durability) {
+  write_atomically(
+      path, [&](std::ostream& stream) { stream << text; }, durability);
 }
 
-void write_json(const std::filesystem::path& path, const nlohmann::ordered_json& value) {
-  write_text(path, value.dump(2) + "\n");
+void write_json(const std::filesystem::path& path, const nlohmann::ordered_json& value,
+                Durability durability) {
+  write_text(path, value.dump(2) + "\n", durability);
 }
 
 std::string read_file(const std::filesystem::path& path) {

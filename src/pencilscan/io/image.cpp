@@ -106,30 +106,34 @@ std::string lower_ending(const std::filesystem::path& path) {
 
 }  // namespace
 
-cv::Mat read_image(const std::filesystem::path& path) {
+cv::Mat read_stored_image(const std::filesystem::path& path) {
   const std::string bytes = read_file(path);
   check_whole(path, bytes);
-  cv::Mat stored = decode(path, bytes);
-  double scale = 1;
-  if (stored.depth() == CV_8U) {
-    scale = 1.0 / 255;
-  } else if (stored.depth() == CV_16U) {
-    scale = 1.0 / 65535;
-  } else if (stored.depth() != CV_32F) {
+  cv::Mat image = decode(path, bytes);
+  if (image.depth() != CV_8U && image.depth() != CV_16U && image.depth() != CV_32F)
     throw InputError(path.string(), "", "", "must have 8 or 16 bit per channel");
-  }
-  cv::Mat image;
-  stored.convertTo(image, CV_32F, scale);
-  if (image.channels() == 1) {
-    cv::cvtColor(image, image, cv::COLOR_GRAY2RGB);
-  } else if (image.channels() == 4) {
+  if (image.channels() == 4) {
     cv::cvtColor(image, image, cv::COLOR_BGRA2RGB);
   } else if (image.channels() == 3) {
     cv::cvtColor(image, image, cv::COLOR_BGR2RGB);
-  } else {
+  } else if (image.channels() != 1) {
     throw InputError(path.string(), "", "", "must be grey or colour");
   }
   return image;
+}
+
+cv::Mat unit_image(const cv::Mat& stored) {
+  const double scale = stored.depth() == CV_8U    ? 1.0 / 255
+                       : stored.depth() == CV_16U ? 1.0 / 65535
+                                                  : 1;
+  cv::Mat image;
+  stored.convertTo(image, CV_32F, scale);
+  if (image.channels() == 1) cv::cvtColor(image, image, cv::COLOR_GRAY2RGB);
+  return image;
+}
+
+cv::Mat read_image(const std::filesystem::path& path) {
+  return unit_image(read_stored_image(path));
 }
 
 std::optional<std::filesystem::path> find_image(const std::filesystem::path& folder,

@@ -12,6 +12,11 @@ namespace pencilscan {
 /// image.
 [[nodiscard]] cv::Mat read_image(const std::filesystem::path& path);
 
+/// The same as stored: CV_8U, CV_16U (or CV_32F of TIFF) of one channel, or of three in RGB order.
+[[nodiscard]] cv::Mat read_stored_image(const std::filesystem::path& path);
+/// CV_32FC3 in [0, 1] of an image as stored.
+[[nodiscard]] cv::Mat unit_image(const cv::Mat& stored);
+
 /// The file of `stem` in `folder` with one of the known endings (.png .tiff .tif .jpg .jpeg .bmp).
 [[nodiscard]] std::optional<std::filesystem::path> find_image(const std::filesystem::path& folder,
                                                               const std::string& stem);

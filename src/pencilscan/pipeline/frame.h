@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -19,12 +20,20 @@
 
 namespace pencilscan {
 
+/// When the cameras of a frame opened their shutters.
+struct FrameTiming {
+  std::vector<double> offset_us;  ///< one per camera, after the median of the frame; 0: unknown
+  std::vector<bool> is_late;      ///< it shows mostly another moment
+  double spread_us = 0;           ///< latest minus earliest
+};
+
 /// One moment seen by all cameras.
 struct Frame {
   std::string name;
   std::vector<cv::Mat> images;  ///< one per camera of the rig, CV_32FC3 RGB as read; empty: missing
   /// The same moment in plain light, for colour: as `images`, or nothing at all.
   std::vector<cv::Mat> plain;
+  std::optional<FrameTiming> timing;  ///< where the pictures have time stamps
 };
 
 struct PointOptions {

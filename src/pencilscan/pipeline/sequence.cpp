@@ -8,12 +8,14 @@
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/core/stopwatch.h"
 #include "pencilscan/io/file.h"
+#include "pencilscan/io/hash.h"
 #include "pencilscan/io/mesh_file.h"
 #include "pencilscan/pipeline/curve_output.h"
 #include "pencilscan/pipeline/depth_output.h"
-#include "pencilscan/pipeline/frame_files.h"
 #include "pencilscan/pipeline/frame_output.h"
+#include "pencilscan/pipeline/frame_source.h"
 #include "pencilscan/pipeline/rig_refinement.h"
+#include "pencilscan/pipeline/run_folder.h"
 #include "pencilscan/solution/single_projector.h"
 
 namespace pencilscan {
@@ -22,88 +24,87 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::ordered_json;
 
-constexpr const char* kInputsFile = "inputs.json";
 constexpr const char* kDevicesFile = "devices.json";
 constexpr const char* kRigFile = "rig.json";
 constexpr const char* kRefinementFile = "refinement.json";
 
-std::string hex(std::uint64_t value) {
-  static constexpr char kDigits[] = "0123456789abcdef";
-  std::string text(16, '0');
-  for (std::size_t i = 16; i-- > 0; value >>= 4U) text[i] = kDigits[value & 15U];
-  return text;
+/// The pictures themselves are why a frame cannot be done: no other time will do better.
+struct NothingFound : StageError {
+  using StageError::StageError;
+};
+
+/// The frames that a rig is refined from: evenly picked.
+std::vector<std::size_t> refinement_frames(std::size_t frames) {
+  constexpr std::size_t kMaxFrames = 24;  // more add little but time
+  std::vector<std::size_t> picked;
+  const std::size_t count = std::min(frames, kMaxFrames);
+  for (std::size_t i = 0; i < count; ++i) picked.push_back(i * frames / count);
+  return picked;
 }
 
-/// What decides the output: the program, rig bytes, options, image bytes of every frame.
-ordered_json describe_inputs(const fs::path& rig_path, const std::vector<FrameFiles>& frames,
-                             const std::string& options) {
-  std::vector<std::uint64_t> hashes(frames.size());
-  parallel_for(frames.size(), [&](std::size_t i) { hashes[i] = frame_hash(frames[i]); });
-  ordered_json inputs;
-  inputs["program"] = hex(hash_bytes(read_file("/proc/self/exe")));
-  inputs["rig"] = hex(hash_bytes(read_file(rig_path)));
-  inputs["options"] = options;
-  inputs["frames"] = ordered_json::object();
-  for (std::size_t i = 0; i < frames.size(); ++i) inputs["frames"][frames[i].name] = hex(hashes[i]);
+/// What decides the output: the program, rig bytes, options, the frames that refine the rig.
+RunInputs describe_inputs(const fs::path& rig_path, const FrameSource& frames,
+                          const SequenceOptions& options) {
+  RunInputs inputs;
+  inputs.program = hex(hash_bytes(read_file("/proc/self/exe")));
+  inputs.rig = hex(hash_bytes(read_file(rig_path)));
+  inputs.options = options.description;
+  inputs.frames = frames.names();
+  if (!options.refine_rig) return inputs;
+  std::string hashes;
+  for (const std::size_t i : refinement_frames(frames.size())) hashes += hex(frames.hash(i));
+  inputs.refined_from = hex(hash_bytes(hashes));
   return inputs;
 }
 
-/// True when `earlier` says that a frame was made from the same inputs.
-bool same_frame(const nlohmann::json& earlier, const ordered_json& now, const std::string& name) {
-  if (!earlier.contains("frames") || !earlier["frames"].contains(name)) return false;
-  return earlier["frames"][name] == now["frames"][name].get<std::string>();
+std::vector<std::string> image_hashes(const FrameSource& frames,
+                                      const std::vector<std::size_t>& own) {
+  std::vector<std::string> hashes(own.size());
+  parallel_for(own.size(), [&](std::size_t i) { hashes[i] = hex(frames.hash(own[i])); });
+  return hashes;
 }
 
-bool same_settings(const nlohmann::json& earlier, const ordered_json& now) {
-  for (const char* key : {"program", "rig", "options"}) {
-    if (!earlier.contains(key) || earlier[key] != now[key].get<std::string>()) return false;
-  }
-  return true;
-}
-
-/// Decides which frames are there already; refuses the output of other inputs. A refined rig is of
-/// all frames together: with another frame, none is there.
-std::vector<char> resumable(const fs::path& out, const std::vector<FrameFiles>& frames,
-                            const ordered_json& inputs, const SequenceOptions& options) {
-  std::vector<char> done(frames.size(), 0);
+/// Decides which of the frames `own` are there already; refuses the output of other inputs.
+std::vector<char> resumable(const fs::path& out, const RunInputs& inputs,
+                            const std::vector<std::size_t>& own,
+                            const std::vector<std::string>& images,
+                            const SequenceOptions& options) {
+  std::vector<char> done(own.size(), 0);
   if (!fs::exists(out) || (fs::is_directory(out) && fs::is_empty(out))) return done;
   const auto refuse = [&](const std::string& what) {
     if (!options.overwrite)
       throw InputError("--out", "", out.string(), what + " (or give --overwrite)");
   };
   if (!fs::is_directory(out)) throw InputError("--out", "", out.string(), "must be a folder");
-  if (!fs::exists(out / kInputsFile)) {
+  if (!has_run_inputs(out)) {
     refuse("must be new, empty or the output of the same inputs");
     return done;
   }
-  const nlohmann::json earlier = read_json(out / kInputsFile);
-  if (!same_settings(earlier, inputs)) {
-    refuse("holds the output of another rig, other options or another build of the program");
+  const RunInputs earlier = read_run_inputs(out);
+  if (earlier.settings() != inputs.settings()) {
+    RunInputs of_other_frames = earlier;
+    of_other_frames.refined_from = inputs.refined_from;
+    refuse(of_other_frames.settings() == inputs.settings()
+               ? "holds a rig refined from other frames"
+               : "holds the output of another rig, other options or another build of the program");
     return done;
   }
-  if (options.refine_rig &&
-      earlier.value("frames", nlohmann::json()) != nlohmann::json(inputs["frames"])) {
-    refuse("holds a rig refined from other frames");
-    return done;
-  }
-  for (std::size_t i = 0; i < frames.size(); ++i) {
-    const bool there = fs::exists(out / frames[i].name / "report.json");
-    if (there && !same_frame(earlier, inputs, frames[i].name)) {
-      refuse("holds the output of other images in frame " + frames[i].name);
-      continue;
-    }
-    done[i] = there ? 1 : 0;
+  for (std::size_t i = 0; i < own.size(); ++i) {
+    const std::string& name = inputs.frames[own[i]];
+    const FrameState state = frame_status(out, name, inputs.settings(), images[i]).state;
+    if (state == FrameState::kOther) refuse("holds the output of other images in frame " + name);
+    done[i] = state == FrameState::kDone ? 1 : 0;
   }
   return done;
 }
 
-void check_images(const Rig& rig, const std::vector<FrameFiles>& frames, const Progress& progress) {
+void check_images(const Rig& rig, const FrameSource& frames, const Progress& progress) {
   // In chunks, so that only a few decoded frames are in memory.
   const auto chunk = static_cast<std::size_t>(thread_count());
   for (std::size_t first = 0; first < frames.size(); first += chunk) {
     const std::size_t count = std::min(chunk, frames.size() - first);
     parallel_for(count, [&](std::size_t i) {
-      const Frame frame = read_frame(rig, frames[first + i]);
+      const Frame frame = frames.read(rig, first + i);
       static_cast<void>(frame);
     });
     if (progress) {
@@ -113,14 +114,21 @@ void check_images(const Rig& rig, const std::vector<FrameFiles>& frames, const P
   }
 }
 
-void reconstruct_frame(const Rig& rig, const FrameFiles& files, const fs::path& folder,
-                       const SequenceOptions& options, FrameOutcome& outcome) {
+bool has_picture(const Frame& frame) {
+  return std::any_of(frame.images.begin(), frame.images.end(),
+                     [](const cv::Mat& image) { return !image.empty(); });
+}
+
+void reconstruct_frame(const Rig& rig, const FrameSource& frames, std::size_t index,
+                       const fs::path& folder, const SequenceOptions& options,
+                       FrameOutcome& outcome) {
   const Stopwatch total;
-  const Frame frame = read_frame(rig, files);
+  const Frame frame = frames.read(rig, index);
+  if (!has_picture(frame)) throw NothingFound("no camera of the rig has a picture of this moment");
   const double reading = total.seconds();
   PointResult points = measure_points(rig, frame, options.points);
   if (points.points.empty()) {
-    throw StageError("no curve could be given its projector line");
+    throw NothingFound("no curve could be given its projector line");
   }
   ShapeResult shape =
       options.meshes ? measure_shape(rig, frame, points, options.shape) : ShapeResult{};
@@ -150,11 +158,10 @@ void reconstruct_frame(const Rig& rig, const FrameFiles& files, const fs::path& 
   timing["seconds"]["total"] = total.seconds();
   write_json(folder / "timing.json", timing);
   const ordered_json report = frame_report(rig, frame, points, shape);
-  write_json(folder / "report.json", report);  // last: its presence means that the frame is done
+  write_json(folder / "report.json", report);
   outcome.points = points.points.size();
   outcome.warnings = report["warnings"].get<std::vector<std::string>>();
   outcome.seconds = total.seconds();
-  outcome.done = true;
 }
 
 bool is_output_file(const fs::path& rig_path, const fs::path& file) {
@@ -173,7 +180,7 @@ void remove_refined_rig(const fs::path& out, const fs::path& rig_path) {
 }
 
 /// The rig to reconstruct with: refined from the frames, or what an earlier run refined.
-Rig refined_rig(const Rig& rig, const std::vector<FrameFiles>& frames, const fs::path& out,
+Rig refined_rig(const Rig& rig, const FrameSource& frames, const fs::path& out,
                 const SequenceOptions& options, const Progress& progress,
                 RefinementOutcome& outcome) {
   if (fs::exists(out / kRigFile) && fs::exists(out / kRefinementFile)) {
@@ -181,19 +188,19 @@ Rig refined_rig(const Rig& rig, const std::vector<FrameFiles>& frames, const fs:
     outcome.resumed = true;
     return read_rig(out / kRigFile);
   }
-  constexpr std::size_t kMaxFrames = 24;  // more add little but time
-  const std::size_t count = std::min(frames.size(), kMaxFrames);
+  const std::vector<std::size_t> picked = refinement_frames(frames.size());
   std::vector<FrameCurves> curves;
   std::vector<std::string> names;
-  for (std::size_t i = 0; i < count; ++i) {
-    const FrameFiles& files = frames[i * frames.size() / count];
-    if (progress)
-      progress("lines for the rig", static_cast<double>(i) / static_cast<double>(count));
+  for (const std::size_t i : picked) {
+    if (progress) {
+      progress("lines for the rig",
+               static_cast<double>(names.size()) / static_cast<double>(picked.size()));
+    }
     PointOptions joint = options.points;
     joint.solution.method = Method::kJoint;
-    PointResult detected = detect_frame(rig, read_frame(rig, files), joint);
+    PointResult detected = detect_frame(rig, frames.read(rig, i), joint);
     curves.push_back({std::move(detected.families), std::move(detected.graphs)});
-    names.push_back(files.name);
+    names.push_back(frames.name(i));
   }
   if (progress) progress("refining the rig", 0);
   RigRefinementOptions refinement_options;
@@ -206,14 +213,43 @@ Rig refined_rig(const Rig& rig, const std::vector<FrameFiles>& frames, const fs:
   return refinement.rig;
 }
 
+/// A frame into its folder, or why not.
+FrameOutcome frame_outcome(const Rig& rig, const FrameSource& frames, std::size_t index,
+                           const fs::path& out, const std::string& settings,
+                           const std::string& images, const SequenceOptions& options) {
+  FrameOutcome outcome;
+  outcome.name = frames.name(index);
+  FrameFailure failure;
+  try {
+    FrameFolder folder(out, outcome.name, settings, images);
+    reconstruct_frame(rig, frames, index, folder.path(), options, outcome);
+    folder.publish();
+    outcome.done = true;
+    return outcome;
+  } catch (const InputError& error) {
+    failure = {error.what(), false};
+  } catch (const NothingFound& error) {
+    failure = {error.what(), false};
+  } catch (const std::exception& error) {
+    failure = {error.what(), true};
+  }
+  outcome.failure = failure.reason;
+  try {
+    write_failure(out, outcome.name, settings, images, failure);
+  } catch (const std::exception&) {
+    // What keeps the reason from being written is the reason.
+  }
+  return outcome;
+}
+
 }  // namespace
 
 SequenceOutcome reconstruct_sequence(const fs::path& rig_path, const fs::path& frames_path,
                                      const fs::path& out, const SequenceOptions& options,
                                      const Progress& progress) {
   Rig rig = read_rig(rig_path);
-  std::vector<FrameFiles> frames = find_frames(rig, frames_path);
-  if (!options.plain_frames.empty()) add_plain_frames(rig, options.plain_frames, frames);
+  FrameSource frames = FrameSource::open(rig, frames_path);
+  if (!options.plain_frames.empty()) frames.add_plain(rig, options.plain_frames);
   if (options.refine_rig && is_output_rig(rig_path, out)) {
     throw InputError("--rig", "", rig_path.string(),
                      "must not be the rig.json in --out, where the refined rig is written");
@@ -223,40 +259,39 @@ SequenceOutcome reconstruct_sequence(const fs::path& rig_path, const fs::path& f
                      "must hold one with a vertical and a horizontal pattern, which the method "
                      "single-projector needs");
   }
-  check_images(rig, frames, progress);
-  const ordered_json inputs = describe_inputs(rig_path, frames, options.description);
-  const std::vector<char> there = resumable(out, frames, inputs, options);
+  // One of several shards leaves the other frames to the others, and a broken one is a failed one.
+  if (!options.shard) check_images(rig, frames, progress);
+  const std::vector<std::size_t> own = options.shard.value_or(Shard{}).frames_of(frames.size());
+  const RunInputs inputs = describe_inputs(rig_path, frames, options);
+  const std::vector<std::string> images = image_hashes(frames, own);
+  const std::vector<char> there = resumable(out, inputs, own, images, options);
 
-  // From here on the output may change. What is to be made anew goes first, so that an abort leaves
-  // no frame that claims to be of these inputs and is not.
-  for (std::size_t i = 0; i < frames.size(); ++i) {
-    if (there[i] == 0) fs::remove_all(out / frames[i].name);
+  // From here on the output may change. What is to be made anew goes first.
+  for (std::size_t i = 0; i < own.size(); ++i) {
+    if (there[i] == 0) fs::remove_all(out / frames.name(own[i]));
   }
-  if (!options.refine_rig || std::find(there.begin(), there.end(), 1) == there.end())
+  remove_abandoned(out);
+  if (!has_run_inputs(out) || read_run_inputs(out).settings() != inputs.settings())
     remove_refined_rig(out, rig_path);
-  write_json(out / kInputsFile, inputs);
+  write_run_inputs(out, inputs);
 
   SequenceOutcome result;
   if (options.refine_rig)
     rig = refined_rig(rig, frames, out, options, progress, result.refinement.emplace());
   // The rig in use, so that the output can be looked at without its input.
   if (!is_output_file(rig_path, out / kDevicesFile)) write_rig(rig, out / kDevicesFile);
-  for (std::size_t i = 0; i < frames.size(); ++i) {
-    FrameOutcome outcome;
-    outcome.name = frames[i].name;
+  for (std::size_t i = 0; i < own.size(); ++i) {
     if (there[i] != 0) {
+      FrameOutcome& outcome = result.frames.emplace_back();
+      outcome.name = frames.name(own[i]);
       outcome.done = outcome.resumed = true;
     } else {
-      try {
-        reconstruct_frame(rig, frames[i], out / frames[i].name, options, outcome);
-      } catch (const std::exception& error) {
-        outcome.failure = error.what();
-      }
+      result.frames.push_back(
+          frame_outcome(rig, frames, own[i], out, inputs.settings(), images[i], options));
     }
-    result.frames.push_back(std::move(outcome));
     if (progress) {
-      progress("frame " + frames[i].name,
-               static_cast<double>(i + 1) / static_cast<double>(frames.size()));
+      progress("frame " + frames.name(own[i]),
+               static_cast<double>(i + 1) / static_cast<double>(own.size()));
     }
   }
   return result;

@@ -8,6 +8,7 @@
 #include "pencilscan/core/progress.h"
 #include "pencilscan/pipeline/frame.h"
 #include "pencilscan/pipeline/refinement_output.h"
+#include "pencilscan/pipeline/shard.h"
 
 namespace pencilscan {
 
@@ -21,7 +22,8 @@ struct SequenceOptions {
   bool depth_maps = false;                ///< depth/ and sigma/ of every camera
   std::vector<std::string> mesh_formats;  ///< of obj, stl, glb: the closed mesh once more
   bool overwrite = false;                 ///< replace the results of other inputs or options
-  std::string description;  ///< of the options: output of another description is not resumed
+  std::optional<Shard> shard;  ///< of several programs that share the frames; nothing: all
+  std::string description;     ///< of the options: output of another description is not resumed
 };
 
 struct FrameOutcome {
@@ -39,13 +41,15 @@ struct SequenceOutcome {
   std::optional<RefinementOutcome> refinement;  ///< with refine_rig
 };
 
-/// Reconstructs every frame below `frames` into `out`/<frame>: points.ply, mesh.ply,
-/// mesh_measured.ply, pictures/, timing.json and, last, report.json. All input is checked before
-/// the first byte is written (InputError). A frame that fails does not stop the others. A frame
-/// that is there already from the same rig, images and options is kept; output of anything else is
-/// an InputError unless `overwrite`. With refine_rig the rig is refined from all frames together
-/// (of a long sequence, from frames evenly picked) and written to `out`/rig.json with
-/// refinement.json; where the frames do not determine it, that is the rig as given.
+/// Reconstructs every frame of `frames` (image folders or a recording) into `out`/<frame>:
+/// points.ply, mesh.ply, mesh_measured.ply, pictures/, timing.json, report.json; or failure.json
+/// with the reason. A frame's folder appears whole or not at all. All input is checked before the
+/// first byte is written (InputError); of a shard, all but the pictures, and a broken one is a
+/// failure of its frame. A frame that fails does not stop the others. A frame that is there already
+/// from the same rig, images and options is kept; output of anything else is an InputError unless
+/// `overwrite`. With refine_rig the rig is refined from all frames together (of a long sequence,
+/// from frames evenly picked) and written to `out`/rig.json with refinement.json; where the frames
+/// do not determine it, that is the rig as given. Several shards may run at once on one folder.
 [[nodiscard]] SequenceOutcome reconstruct_sequence(const std::filesystem::path& rig_path,
                                                    const std::filesystem::path& frames,
                                                    const std::filesystem::path& out,

@@ -1,0 +1,157 @@
+#include "pencilscan/pipeline/frame_source.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "pencilscan/core/error.h"
+#include "pencilscan/io/file.h"
+#include "pencilscan/io/hash.h"
+#include "pencilscan/io/image.h"
+#include "pencilscan/pipeline/frame_files.h"
+#include "pencilscan/recording/frame_sets.h"
+#include "pencilscan/recording/pack.h"
+#include "pencilscan/recording/recording.h"
+
+namespace pencilscan {
+
+namespace fs = std::filesystem;
+
+struct FrameSource::Storage {
+  virtual ~Storage() = default;
+  /// One image per camera of the rig, empty where there is none.
+  [[nodiscard]] virtual std::vector<cv::Mat> images(const Rig& rig, std::size_t frame) const = 0;
+  [[nodiscard]] virtual std::uint64_t hash(std::size_t frame, std::uint64_t start) const = 0;
+  [[nodiscard]] virtual std::optional<FrameTiming> timing(std::size_t frame) const = 0;
+};
+
+struct FrameSource::Folders : Storage {
+  std::vector<FrameFiles> frames;
+
+  std::vector<cv::Mat> images(const Rig& rig, std::size_t frame) const override {
+    return read_images(rig, frames[frame]);
+  }
+  std::uint64_t hash(std::size_t frame, std::uint64_t start) const override {
+    return files_hash(frames[frame], start);
+  }
+  std::optional<FrameTiming> timing(std::size_t) const override { return std::nullopt; }
+};
+
+struct FrameSource::Recorded : Storage {
+  Recorded(Recording opened, FrameSets grouped)
+      : recording(std::move(opened)), sets(std::move(grouped)) {}
+
+  Recording recording;
+  FrameSets sets;
+  std::vector<std::optional<std::size_t>> camera_of;  ///< of the rig's cameras, in the recording
+
+  /// Where the picture of a camera of the rig is.
+  [[nodiscard]] std::optional<std::size_t> row(std::size_t frame, std::size_t c) const {
+    return camera_of[c] ? sets.sets[frame].rows[*camera_of[c]] : std::nullopt;
+  }
+  std::vector<cv::Mat> images(const Rig& rig, std::size_t frame) const override {
+    std::vector<cv::Mat> result(rig.cameras.size());
+    for (std::size_t c = 0; c < result.size(); ++c) {
+      const auto at = row(frame, c);
+      if (!at) continue;
+      const cv::Mat stored = recording.read(*at, *camera_of[c]);
+      if (!stored.empty()) result[c] = unit_image(stored);
+    }
+    return result;
+  }
+  std::uint64_t hash(std::size_t frame, std::uint64_t start) const override {
+    std::uint64_t hash = start;
+    for (std::size_t c = 0; c < camera_of.size(); ++c) {
+      const auto at = row(frame, c);
+      const fs::path file = at ? recording.picture_file(*at, *camera_of[c]) : fs::path();
+      std::error_code ignored;
+      hash = at && fs::exists(file, ignored) ? hash_bytes(read_file(file), hash)
+                                             : hash_bytes("missing", hash);
+    }
+    return hash;
+  }
+  std::optional<FrameTiming> timing(std::size_t frame) const override {
+    const FrameSet& set = sets.sets[frame];
+    FrameTiming timing;
+    bool any = false;
+    for (const auto& camera : camera_of) {
+      const bool timed = camera && sets.clocks[*camera].timed && set.rows[*camera];
+      any = any || timed;
+      timing.offset_us.push_back(timed ? set.offset_ns[*camera] / 1000 : 0);
+      timing.is_late.push_back(timed && sets.clocks[*camera].limit_ns > 0 &&
+                               std::abs(set.offset_ns[*camera]) > sets.clocks[*camera].limit_ns);
+    }
+    timing.spread_us = set.spread_ns / 1000;
+    if (!any) return std::nullopt;
+    return timing;
+  }
+};
+
+FrameSource FrameSource::open(const Rig& rig, const fs::path& path) {
+  FrameSource source;
+  if (!Recording::is_one(path)) {
+    auto folders = std::make_shared<Folders>();
+    folders->frames = find_frames(rig, path);
+    for (const FrameFiles& files : folders->frames) source.names_.push_back(files.name);
+    source.storage_ = std::move(folders);
+    return source;
+  }
+  Recording recording = Recording::open(path);
+  FrameSets sets = group_frames(recording);
+  auto recorded = std::make_shared<Recorded>(std::move(recording), std::move(sets));
+  bool any = false;
+  for (const Camera& camera : rig.cameras) {
+    const auto c = recorded->recording.camera_named(camera.name);
+    recorded->camera_of.push_back(c);
+    if (!c) continue;
+    any = true;
+    const RecordedCamera& of = recorded->recording.cameras()[*c];
+    if (of.width != camera.width || of.height != camera.height) {
+      throw InputError((path / camera.name / ".zarray").string(), "shape",
+                       std::to_string(of.width) + "x" + std::to_string(of.height),
+                       "must be " + std::to_string(camera.width) + "x" +
+                           std::to_string(camera.height) + " as camera " + camera.name +
+                           " of the rig");
+    }
+  }
+  if (!any) {
+    throw InputError(path.string(), "cameras", "none of the rig",
+                     "must hold a camera of the rig (" + camera_names(rig) + ")");
+  }
+  if (recorded->sets.sets.empty())
+    throw InputError(path.string(), "frames", "none", "must hold at least one frame");
+  for (std::size_t k = 0; k < recorded->sets.sets.size(); ++k)
+    source.names_.push_back(six_digits(k));
+  source.storage_ = std::move(recorded);
+  return source;
+}
+
+void FrameSource::add_plain(const Rig& rig, const fs::path& path) {
+  auto plain = std::make_shared<FrameSource>(open(rig, path));
+  for (const std::string& name : names_) {
+    const auto own = std::find(plain->names_.begin(), plain->names_.end(), name);
+    if (own == plain->names_.end() && plain->size() > 1) {
+      throw InputError(path.string(), "frames", std::to_string(plain->size()),
+                       "must hold one named " + name + ", or one in all");
+    }
+    plain_of_.push_back(
+        own == plain->names_.end() ? 0 : static_cast<std::size_t>(own - plain->names_.begin()));
+  }
+  plain_ = std::move(plain);
+}
+
+Frame FrameSource::read(const Rig& rig, std::size_t frame) const {
+  Frame result;
+  result.name = names_[frame];
+  result.images = storage_->images(rig, frame);
+  result.timing = storage_->timing(frame);
+  if (plain_) result.plain = plain_->storage_->images(rig, plain_of_[frame]);
+  return result;
+}
+
+std::uint64_t FrameSource::hash(std::size_t frame) const {
+  const std::uint64_t own = storage_->hash(frame, hash_bytes(names_[frame]));
+  return plain_ ? plain_->storage_->hash(plain_of_[frame], own) : own;
+}
+
+}  // namespace pencilscan

@@ -1,0 +1,287 @@
+#include "pencilscan/pipeline/sequence.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <fstream>
+#include <map>
+#include <opencv2/core.hpp>
+
+#include "pencilscan/core/error.h"
+#include "pencilscan/core/parallel.h"
+#include "pencilscan/io/file.h"
+#include "pencilscan/io/image.h"
+#include "pencilscan/io/temporary_folder.h"
+#include "pencilscan/pipeline/frame_source.h"
+#include "pencilscan/pipeline/run_folder.h"
+#include "pencilscan/recording/pack.h"
+#include "pencilscan/rig/sample_devices.h"
+
+namespace pencilscan {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+std::string error_of(const std::function<void()>& call) {
+  try {
+    call();
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+// ---- shards
+// ---------------------------------------------------------------------------------------
+
+TEST(Shards, EveryFrameIsOfOneShardAndChunksStayWhole) {
+  for (const std::size_t frames : {1U, 49U, 50U, 51U, 333U}) {
+    for (const std::size_t count : {1U, 2U, 7U}) {
+      std::vector<int> taken(frames, 0);
+      for (std::size_t index = 0; index < count; ++index) {
+        for (const std::size_t i : Shard{index, count}.frames_of(frames)) {
+          ++taken[i];
+          EXPECT_TRUE((Shard{index, count}.holds(i / kChunkFrames * kChunkFrames)));
+        }
+      }
+      EXPECT_THAT(taken, ::testing::Each(1));
+    }
+  }
+  EXPECT_EQ(chunk_count(1500), 30U);
+  EXPECT_EQ(chunk_count(1501), 31U);
+}
+
+TEST(Shards, SchedulersSayWhichOneThisIs) {
+  const auto with = [](const std::map<std::string, std::string>& variables) {
+    const Environment environment = [&](const std::string& name) -> std::optional<std::string> {
+      const auto found = variables.find(name);
+      return found == variables.end() ? std::nullopt : std::optional(found->second);
+    };
+    const Shard shard = shard_from_text("auto", environment);
+    return std::pair(shard.index, shard.count);
+  };
+  using Place = std::pair<std::size_t, std::size_t>;
+  EXPECT_EQ(with({{"SLURM_ARRAY_TASK_ID", "3"},
+                  {"SLURM_ARRAY_TASK_MIN", "0"},
+                  {"SLURM_ARRAY_TASK_MAX", "6"},
+                  {"SLURM_ARRAY_TASK_COUNT", "7"}}),
+            Place(3, 7));
+  EXPECT_EQ(with({{"SLURM_ARRAY_TASK_ID", "7"},
+                  {"SLURM_ARRAY_TASK_MIN", "1"},
+                  {"SLURM_ARRAY_TASK_COUNT", "4"},
+                  {"SLURM_ARRAY_TASK_STEP", "2"}}),
+            Place(3, 4));
+  EXPECT_EQ(with({{"SGE_TASK_ID", "2"}, {"SGE_TASK_FIRST", "1"}, {"SGE_TASK_LAST", "5"}}),
+            Place(1, 5));
+  EXPECT_EQ(with({{"JOB_COMPLETION_INDEX", "0"}, {"PENCILSCAN_SHARDS", "3"}}), Place(0, 3));
+  EXPECT_EQ(with({{"PBS_ARRAY_INDEX", "2"}, {"PENCILSCAN_SHARDS", "3"}}), Place(2, 3));
+  EXPECT_EQ(with({{"OMPI_COMM_WORLD_RANK", "1"}, {"OMPI_COMM_WORLD_SIZE", "2"}}), Place(1, 2));
+  const auto refused = [&](const std::map<std::string, std::string>& variables) {
+    return error_of([&] { with(variables); });
+  };
+  EXPECT_THAT(refused({}), HasSubstr("no scheduler"));
+  EXPECT_THAT(refused({{"SGE_TASK_ID", "undefined"}}), HasSubstr("no scheduler"));
+  EXPECT_THAT(refused({{"JOB_COMPLETION_INDEX", "0"}}), HasSubstr("PENCILSCAN_SHARDS"));
+  EXPECT_THAT(refused({{"PBS_ARRAY_INDEX", "3"}, {"PENCILSCAN_SHARDS", "3"}}),
+              HasSubstr("one of 3 tasks"));
+  for (const char* text : {"3/3", "-1/3", "1", "1/0", "a/b", "1/3x", ""})
+    EXPECT_THAT(error_of([&] { (void)shard_from_text(text, process_environment()); }),
+                HasSubstr("must be i/n"))
+        << text;
+  EXPECT_EQ(shard_from_text("2/3", process_environment()).index, 2U);
+}
+
+// ---- what an output folder holds
+// ------------------------------------------------------------------
+
+class Run : public ::testing::Test {
+ protected:
+  fs::path out() { return temporary_.path() / "out"; }
+  TemporaryFolder temporary_{::testing::UnitTest::GetInstance()->current_test_info()->name()};
+};
+
+TEST_F(Run, AFrameAppearsWholeAndTheFirstOneStays) {
+  {
+    FrameFolder dropped(out(), "000000", "s", "i");
+    write_text(dropped.path() / "report.json", "{}");
+  }
+  EXPECT_EQ(frame_status(out(), "000000", "s", "i").state, FrameState::kMissing);
+  EXPECT_FALSE(fs::exists(out() / ".making"));
+  FrameFolder first(out(), "000000", "s", "i");
+  FrameFolder second(out(), "000000", "s", "i");
+  write_text(first.path() / "report.json", "1");
+  write_text(second.path() / "report.json", "2");
+  EXPECT_EQ(frame_status(out(), "000000", "s", "i").state, FrameState::kMissing);
+  first.publish();
+  second.publish();
+  EXPECT_EQ(read_file(out() / "000000" / "report.json"), "1");
+  EXPECT_FALSE(fs::exists(out() / ".making"));
+  EXPECT_EQ(frame_status(out(), "000000", "s", "i").state, FrameState::kDone);
+  EXPECT_EQ(frame_status(out(), "000000", "s", std::nullopt).state, FrameState::kDone);
+  EXPECT_EQ(frame_status(out(), "000000", "s", "j").state, FrameState::kOther);
+  EXPECT_EQ(frame_status(out(), "000000", "t", "i").state, FrameState::kOther);
+}
+
+TEST_F(Run, AFailureSaysWhyAndMakesWayForAResult) {
+  write_failure(out(), "000000", "s", "i", {"the disk is full", true});
+  const FrameStatus status = frame_status(out(), "000000", "s", "i");
+  ASSERT_EQ(status.state, FrameState::kFailed);
+  EXPECT_EQ(status.failure.value().reason, "the disk is full");
+  EXPECT_TRUE(status.failure->is_passing);
+  FrameFolder folder(out(), "000000", "s", "i");
+  write_text(folder.path() / "report.json", "{}");
+  folder.publish();
+  EXPECT_EQ(frame_status(out(), "000000", "s", "i").state, FrameState::kDone);
+  write_failure(out(), "000000", "s", "i", {"too late", true});
+  EXPECT_EQ(frame_status(out(), "000000", "s", "i").state, FrameState::kDone);
+}
+
+TEST_F(Run, WhatAKilledProgramLeftIsRemovedAndNothingElse) {
+  const pid_t child = ::fork();
+  ASSERT_GE(child, 0);
+  if (child == 0) {
+    FrameFolder folder(out(), "000001", "s", "i");
+    ::kill(::getpid(), SIGKILL);
+  }
+  ::waitpid(child, nullptr, 0);
+  FrameFolder mine(out(), "000002", "s", "i");
+  const auto folders = [&] {
+    return std::distance(fs::directory_iterator(out() / ".making"), fs::directory_iterator{});
+  };
+  EXPECT_EQ(folders(), 2);
+  remove_abandoned(out());
+  EXPECT_EQ(folders(), 1);
+  EXPECT_TRUE(fs::exists(mine.path()));
+}
+
+// ---- sequences
+// ------------------------------------------------------------------------------------
+
+/// Frames of a camera that sees nothing but noise, so that each is done at once; one has no
+/// picture, one a damaged one.
+class Sequence : public ::testing::Test {
+ protected:
+  static constexpr std::size_t kFrames = 110;
+
+  void SetUp() override {
+    write_rig(rig_, rig_file());
+    cv::Mat image(rig_.cameras[0].height, rig_.cameras[0].width, CV_8UC3);
+    for (std::size_t k = 0; k < kFrames; ++k) {
+      image.setTo(cv::Scalar::all(static_cast<double>(k)));
+      write_image(frames() / six_digits(k) / "cam0.png", image);
+    }
+    pack_recording(frames(), recording());
+    fs::remove(recording() / "cam0" / "7.0.0.0");
+    fs::resize_file(recording() / "cam0" / "60.0.0.0", 20);
+  }
+  fs::path rig_file() { return temporary_.path() / "rig.json"; }
+  fs::path frames() { return temporary_.path() / "frames"; }
+  fs::path recording() { return temporary_.path() / "recording.zarr"; }
+  SequenceOutcome run(const fs::path& from, const fs::path& out, std::optional<Shard> shard,
+                      bool overwrite = false) {
+    SequenceOptions options;
+    options.meshes = options.pictures = false;
+    options.overwrite = overwrite;
+    options.shard = shard;
+    return reconstruct_sequence(rig_file(), from, out, options);
+  }
+  /// Every file below a folder with its bytes.
+  static std::map<std::string, std::string> bytes(const fs::path& folder) {
+    std::map<std::string, std::string> files;
+    for (const auto& entry : fs::recursive_directory_iterator(folder)) {
+      if (entry.is_regular_file())
+        files[fs::relative(entry.path(), folder).string()] = read_file(entry.path());
+    }
+    return files;
+  }
+
+  TemporaryFolder temporary_{::testing::UnitTest::GetInstance()->current_test_info()->name()};
+  Rig rig_ = sample::small_rig(48, 36, 11);
+};
+
+TEST_F(Sequence, ARecordingGivesTheFramesOfItsFolders) {
+  const FrameSource folders = FrameSource::open(rig_, frames());
+  const FrameSource recorded = FrameSource::open(rig_, recording());
+  ASSERT_EQ(folders.names(), recorded.names());
+  for (const std::size_t k : {0U, 6U, 109U}) {
+    const Frame a = folders.read(rig_, k);
+    const Frame b = recorded.read(rig_, k);
+    EXPECT_EQ(cv::norm(a.images[0], b.images[0], cv::NORM_INF), 0);
+    EXPECT_TRUE(b.images[1].empty());
+  }
+  EXPECT_TRUE(recorded.read(rig_, 7).images[0].empty());
+  EXPECT_THROW((void)recorded.read(rig_, 60), InputError);
+  EXPECT_NE(recorded.hash(1), recorded.hash(2));
+  Rig other = rig_;
+  other.cameras[0].width = 50;
+  EXPECT_THAT(error_of([&] { (void)FrameSource::open(other, recording()); }),
+              HasSubstr("must be 50x36"));
+  other.cameras[0].name = "else";
+  EXPECT_THAT(error_of([&] { (void)FrameSource::open(other, recording()); }),
+              HasSubstr("must hold a camera of the rig"));
+}
+
+TEST_F(Sequence, ShardsInAnyNumberGiveTheSameBytes) {
+  const fs::path one = temporary_.path() / "one";
+  const fs::path three = temporary_.path() / "three";
+  const auto outcome = run(recording(), one, Shard{0, 1});
+  ASSERT_EQ(outcome.frames.size(), kFrames);
+  EXPECT_THAT(outcome.frames[7].failure, HasSubstr("no camera"));
+  EXPECT_THAT(outcome.frames[60].failure, HasSubstr("damaged"));
+  EXPECT_THAT(outcome.frames[0].failure, HasSubstr("no curve"));
+  for (const std::size_t index : {2U, 0U, 1U}) (void)run(recording(), three, Shard{index, 3});
+  EXPECT_EQ(bytes(one), bytes(three));
+  EXPECT_EQ(bytes(one).size(), 2 * kFrames + 2);
+  // A whole run refuses a damaged picture before it writes anything.
+  EXPECT_THAT(error_of([&] { (void)run(recording(), temporary_.path() / "none", {}); }),
+              HasSubstr("60.0.0.0"));
+  EXPECT_FALSE(fs::exists(temporary_.path() / "none"));
+}
+
+TEST_F(Sequence, KilledAtAnyMomentAndResumedGivesTheSameBytes) {
+  const fs::path whole = temporary_.path() / "whole";
+  const fs::path killed = temporary_.path() / "killed";
+  (void)run(frames(), whole, Shard{0, 1});
+  for (const int milliseconds : {5, 17, 40, 90, 160}) {
+    const pid_t child = ::fork();
+    ASSERT_GE(child, 0);
+    if (child == 0) {
+      const ThreadLimit limit(1);  // no thread but this one outlives a fork
+      (void)run(frames(), killed, Shard{0, 1});
+      ::_exit(0);
+    }
+    ::usleep(static_cast<unsigned>(1000 * milliseconds));
+    ::kill(child, SIGKILL);
+    ::waitpid(child, nullptr, 0);
+    for (std::size_t k = 0; k < kFrames; ++k) {
+      if (fs::exists(killed / six_digits(k))) {
+        EXPECT_EQ(bytes(killed / six_digits(k)), bytes(whole / six_digits(k)));
+      }
+    }
+  }
+  (void)run(frames(), killed, Shard{0, 1});
+  EXPECT_EQ(bytes(whole), bytes(killed));
+}
+
+TEST_F(Sequence, OtherSettingsAreRefusedAndReplacedShardByShard) {
+  const fs::path out = temporary_.path() / "out";
+  (void)run(frames(), out, Shard{0, 2});
+  (void)run(frames(), out, Shard{1, 2});
+  rig_.cameras[0].K(0, 0) += 1;
+  write_rig(rig_, rig_file());
+  EXPECT_THAT(error_of([&] { (void)run(frames(), out, Shard{0, 2}); }), HasSubstr("another rig"));
+  (void)run(frames(), out, Shard{0, 2}, true);
+  const std::string settings = read_run_inputs(out).settings();
+  EXPECT_EQ(frame_status(out, "000049", settings, std::nullopt).state, FrameState::kFailed);
+  EXPECT_EQ(frame_status(out, "000050", settings, std::nullopt).state, FrameState::kOther);
+  (void)run(frames(), out, Shard{1, 2}, true);
+  EXPECT_EQ(frame_status(out, "000050", settings, std::nullopt).state, FrameState::kFailed);
+}
+
+}  // namespace
+}  // namespace pencilscan

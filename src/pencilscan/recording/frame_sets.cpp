@@ -1,0 +1,301 @@
+#include "pencilscan/recording/frame_sets.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+
+#include "pencilscan/core/median.h"
+
+namespace pencilscan {
+namespace {
+
+/// A picture with its time by the common clock.
+struct Shot {
+  double time_ns = 0;  ///< after the first picture of the reference
+  std::size_t camera = 0;
+  std::size_t row = 0;
+};
+
+/// The known times of a camera in order of rows, after `origin`.
+struct Track {
+  std::vector<std::size_t> rows;
+  std::vector<double> times;
+};
+
+/// Pictures over which a clock counts as steady: few enough for drift (100 ppm of 64 / 25 s is
+/// 0.3 ms), enough for a median.
+constexpr std::size_t kBlock = 64;
+/// Lags that are tried where clocks do not share their start.
+constexpr int kMaxLag = 100;
+
+Track track_of(const ShotTimes& camera, std::int64_t origin) {
+  Track track;
+  for (std::size_t row = 0; row < camera.times_ns.size(); ++row) {
+    if (camera.times_ns[row] == kUnknownTime) continue;
+    track.rows.push_back(row);
+    track.times.push_back(static_cast<double>(camera.times_ns[row] - origin));
+  }
+  return track;
+}
+
+double period_of(const Track& track) {
+  std::vector<double> steps;
+  for (std::size_t i = 1; i < track.times.size(); ++i)
+    steps.push_back(track.times[i] - track.times[i - 1]);
+  return upper_median(std::move(steps));
+}
+
+/// The index of the sorted time nearest to t.
+std::size_t nearest(const std::vector<double>& times, double t) {
+  const auto after = std::lower_bound(times.begin(), times.end(), t);
+  if (after == times.begin()) return 0;
+  const auto i = static_cast<std::size_t>(after - times.begin());
+  if (after == times.end()) return i - 1;
+  return t - times[i - 1] <= times[i] - t ? i - 1 : i;
+}
+
+/// How many pictures of `other` meet one of `reference` when its clock is `shift` ahead, within a
+/// quarter of a period: twice as near as belonging together asks for.
+std::size_t meetings(const Track& reference, const Track& other, double shift, double period) {
+  std::size_t count = 0;
+  for (const double t : other.times) {
+    const double at = t - shift;
+    count += std::abs(reference.times[nearest(reference.times, at)] - at) < period / 4;
+  }
+  return count;
+}
+
+/// True when the two clocks seem to count from the same moment: they were recording at the same
+/// time for most of the shorter one. Cameras start one after the other, but clocks that were never
+/// set to each other lie hours apart.
+bool share_start(const Track& reference, const Track& other, double period) {
+  const double first = std::max(reference.times.front(), other.times.front());
+  const double last = std::min(reference.times.back(), other.times.back());
+  const double shorter = std::min(reference.times.back() - reference.times.front(),
+                                  other.times.back() - other.times.front());
+  return last - first > 0.5 * shorter - period;
+}
+
+double best_shift(const Track& reference, const Track& other, double period) {
+  double best = 0;
+  std::size_t most = 0;
+  bool found = false;
+  for (int k = 0; k <= 2 * kMaxLag; ++k) {
+    const int lag = k % 2 == 0 ? -k / 2 : (k + 1) / 2;  // 0, 1, -1, 2, -2, ...
+    std::vector<double> differences;
+    for (std::size_t i = 0; i < reference.times.size(); ++i) {
+      const auto j = static_cast<std::ptrdiff_t>(i) + lag;
+      if (j < 0 || j >= static_cast<std::ptrdiff_t>(other.times.size())) continue;
+      differences.push_back(other.times[static_cast<std::size_t>(j)] - reference.times[i]);
+    }
+    if (differences.empty()) continue;
+    const double shift = upper_median(std::move(differences));
+    const std::size_t count = meetings(reference, other, shift, period);
+    if (found && count <= most) continue;
+    found = true;
+    most = count;
+    best = shift;
+  }
+  return best;
+}
+
+/// The clock's lead over the reference at each picture of `other`, followed block by block from
+/// `shift`.
+std::vector<double> followed_lead(const Track& reference, const Track& other, double shift,
+                                  double period) {
+  std::vector<double> lead;
+  double now = shift;
+  for (std::size_t first = 0; first < other.times.size(); first += kBlock) {
+    const std::size_t end = std::min(other.times.size(), first + kBlock);
+    std::vector<double> leads;
+    for (std::size_t i = first; i < end; ++i) {
+      const double at = other.times[i] - now;
+      const double t = reference.times[nearest(reference.times, at)];
+      if (std::abs(t - at) < period / 2) leads.push_back(other.times[i] - t);
+    }
+    if (2 * leads.size() > end - first) now = upper_median(std::move(leads));
+    lead.resize(end, now);
+  }
+  return lead;
+}
+
+/// Slope of the line through the first and the last block of a lead, ppm; blocks are steps.
+double drift_ppm(const Track& track, const std::vector<double>& lead) {
+  if (track.times.size() < 2 * kBlock) return 0;
+  const double span = track.times.back() - track.times.front();
+  return 1e6 * (lead.back() - lead.front()) / span;
+}
+
+/// Shots in order of time fall into sets: a set ends where the next shot is half a period after its
+/// first one, or of a camera that it holds already.
+std::vector<std::vector<Shot>> fall_into_sets(std::vector<Shot> shots, double period) {
+  std::sort(shots.begin(), shots.end(), [](const Shot& a, const Shot& b) {
+    return std::tie(a.time_ns, a.camera) < std::tie(b.time_ns, b.camera);
+  });
+  std::vector<std::vector<Shot>> sets;
+  for (const Shot& shot : shots) {
+    const bool fits = !sets.empty() && shot.time_ns - sets.back().front().time_ns < period / 2 &&
+                      std::none_of(sets.back().begin(), sets.back().end(),
+                                   [&](const Shot& other) { return other.camera == shot.camera; });
+    if (!fits) sets.emplace_back();
+    sets.back().push_back(shot);
+  }
+  return sets;
+}
+
+/// The row that all shots of each set share, increasing; nothing where that is not so.
+bool are_rows(const std::vector<std::vector<Shot>>& sets) {
+  std::ptrdiff_t last = -1;
+  for (const std::vector<Shot>& set : sets) {
+    const auto row = static_cast<std::ptrdiff_t>(set.front().row);
+    if (row <= last) return false;
+    for (const Shot& shot : set) {
+      if (static_cast<std::ptrdiff_t>(shot.row) != row) return false;
+    }
+    last = row;
+  }
+  return true;
+}
+
+std::size_t row_count(std::span<const ShotTimes> cameras) {
+  std::size_t rows = 0;
+  for (const ShotTimes& camera : cameras) rows = std::max(rows, camera.valid.size());
+  return rows;
+}
+
+/// Set k is row k. Pictures without a time are taken in as well.
+void take_rows(std::span<const ShotTimes> cameras, FrameSets& result) {
+  result.by_row = true;
+  result.sets.resize(row_count(cameras));
+  for (std::size_t k = 0; k < result.sets.size(); ++k) {
+    FrameSet& set = result.sets[k];
+    set.rows.resize(cameras.size());
+    set.offset_ns.resize(cameras.size(), 0);
+    for (std::size_t c = 0; c < cameras.size(); ++c) {
+      if (k < cameras[c].valid.size() && cameras[c].valid[k] != 0) set.rows[c] = k;
+    }
+  }
+}
+
+void note_offsets(const std::vector<Shot>& shots, FrameSet& set) {
+  std::vector<double> times;
+  for (const Shot& shot : shots) times.push_back(shot.time_ns);
+  const auto [low, high] = std::minmax_element(times.begin(), times.end());
+  set.spread_ns = *high - *low;
+  const double middle = upper_median(times);
+  for (const Shot& shot : shots) set.offset_ns[shot.camera] = shot.time_ns - middle;
+}
+
+void name_dropped_and_late(std::span<const ShotTimes> cameras, FrameSets& result) {
+  for (std::size_t c = 0; c < cameras.size(); ++c) {
+    CameraClock& clock = result.clocks[c];
+    if (clock.timed) {
+      clock.limit_ns =
+          cameras[c].exposure_us > 0 ? 500 * cameras[c].exposure_us : result.period_ns / 4;
+    }
+    for (std::size_t k = 0; k < result.sets.size(); ++k) {
+      const FrameSet& set = result.sets[k];
+      if (!set.rows[c])
+        clock.dropped.push_back(k);
+      else if (clock.timed && clock.limit_ns > 0 && std::abs(set.offset_ns[c]) > clock.limit_ns)
+        clock.late.push_back(k);
+    }
+  }
+}
+
+/// All shots by the clock of the reference, and what each clock does.
+std::vector<Shot> common_clock(std::span<const ShotTimes> cameras, FrameSets& result) {
+  std::size_t reference = 0;
+  std::vector<Track> tracks;
+  std::int64_t origin = kUnknownTime;
+  for (std::size_t c = 0; c < cameras.size(); ++c) {
+    const auto known = std::find_if(cameras[c].times_ns.begin(), cameras[c].times_ns.end(),
+                                    [](std::int64_t t) { return t != kUnknownTime; });
+    if (origin == kUnknownTime && known != cameras[c].times_ns.end()) origin = *known;
+  }
+  for (std::size_t c = 0; c < cameras.size(); ++c) {
+    tracks.push_back(track_of(cameras[c], origin));
+    if (tracks[c].times.size() > tracks[reference].times.size()) reference = c;
+  }
+  std::vector<double> periods;
+  for (std::size_t c = 0; c < cameras.size(); ++c) {
+    result.clocks[c].timed = !tracks[c].times.empty();
+    result.clocks[c].period_ns = period_of(tracks[c]);
+    if (result.clocks[c].period_ns > 0) periods.push_back(result.clocks[c].period_ns);
+  }
+  result.period_ns = upper_median(std::move(periods));
+  std::vector<Shot> shots;
+  if (result.period_ns <= 0) return shots;
+  for (std::size_t c = 0; c < cameras.size(); ++c) {
+    const Track& track = tracks[c];
+    if (track.times.empty()) continue;
+    CameraClock& clock = result.clocks[c];
+    std::vector<double> lead(track.times.size(), 0);
+    if (c != reference) {
+      clock.shared =
+          cameras[c].shares_clock.value_or(share_start(tracks[reference], track, result.period_ns));
+      const double shift =
+          clock.shared ? 0 : best_shift(tracks[reference], track, result.period_ns);
+      const std::vector<double> followed =
+          followed_lead(tracks[reference], track, shift, result.period_ns);
+      clock.shift_ns = followed.front();
+      clock.drift_ppm = drift_ppm(track, followed);
+      if (!clock.shared) lead = followed;
+    }
+    for (std::size_t i = 0; i < track.times.size(); ++i)
+      shots.push_back({track.times[i] - lead[i], c, track.rows[i]});
+  }
+  return shots;
+}
+
+/// Moments that no camera has, by the time between sets.
+void name_gaps(const std::vector<std::vector<Shot>>& sets, FrameSets& result) {
+  for (std::size_t k = 1; k < sets.size(); ++k) {
+    const double step = (sets[k].front().time_ns - sets[k - 1].front().time_ns) / result.period_ns;
+    const long missing = std::lround(step) - 1;
+    if (missing > 0) result.gaps.emplace_back(k, static_cast<std::size_t>(missing));
+  }
+}
+
+}  // namespace
+
+FrameSets group_frames(std::span<const ShotTimes> cameras) {
+  FrameSets result;
+  result.clocks.resize(cameras.size());
+  std::vector<Shot> shots_in_time = common_clock(cameras, result);
+  const std::vector<std::vector<Shot>> sets =
+      fall_into_sets(std::move(shots_in_time), result.period_ns);
+  if (sets.empty() || are_rows(sets)) {
+    take_rows(cameras, result);
+    for (const std::vector<Shot>& set : sets) note_offsets(set, result.sets[set.front().row]);
+  } else {
+    result.by_row = false;
+    for (const std::vector<Shot>& shots : sets) {
+      FrameSet& set = result.sets.emplace_back();
+      set.rows.resize(cameras.size());
+      set.offset_ns.resize(cameras.size(), 0);
+      for (const Shot& shot : shots) {
+        if (cameras[shot.camera].valid[shot.row] != 0) set.rows[shot.camera] = shot.row;
+      }
+      note_offsets(shots, set);
+    }
+    name_gaps(sets, result);
+  }
+  name_dropped_and_late(cameras, result);
+  return result;
+}
+
+FrameSets group_frames(const Recording& recording) {
+  std::vector<ShotTimes> cameras(recording.cameras().size());
+  for (std::size_t c = 0; c < cameras.size(); ++c) {
+    cameras[c].exposure_us = recording.cameras()[c].exposure_us;
+    cameras[c].shares_clock = recording.shares_clock();
+    for (std::size_t row = 0; row < recording.row_count(); ++row) {
+      cameras[c].times_ns.push_back(recording.timestamp_ns(row, c));
+      cameras[c].valid.push_back(recording.valid(row, c) ? 1 : 0);
+    }
+  }
+  return group_frames(cameras);
+}
+
+}  // namespace pencilscan

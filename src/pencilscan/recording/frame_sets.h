@@ -1,0 +1,70 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "pencilscan/recording/recording.h"
+
+namespace pencilscan {
+
+/// The pictures of one moment.
+struct FrameSet {
+  std::vector<std::optional<std::size_t>> rows;  ///< one per camera; nothing: it has no picture
+  /// When each exposure began, ns after the median of the set by the common clock; 0 where it is
+  /// unknown or there is no picture.
+  std::vector<double> offset_ns;
+  double spread_ns = 0;  ///< latest minus earliest
+};
+
+/// How a camera's clock and shutter go, against the camera with most time stamps.
+struct CameraClock {
+  bool timed = false;                ///< it has time stamps
+  bool shared = true;                ///< its time stamps count from the same moment as the others'
+  double shift_ns = 0;               ///< its clock minus the others', at the first frame
+  double drift_ppm = 0;              ///< how much faster its clock runs
+  double period_ns = 0;              ///< median time from picture to picture; 0: unknown
+  double limit_ns = 0;               ///< a picture is late from here on; 0: unknown
+  std::vector<std::size_t> dropped;  ///< sets without its picture
+  std::vector<std::size_t> late;     ///< sets where its picture is of another moment
+};
+
+/// Which pictures show one moment.
+struct FrameSets {
+  std::vector<FrameSet> sets;
+  std::vector<CameraClock> clocks;  ///< one per camera
+  bool by_row = true;               ///< set k is row k of every camera
+  double period_ns = 0;             ///< from set to set; 0: unknown
+  /// Sets before which moments are missing in all cameras, and how many.
+  std::vector<std::pair<std::size_t, std::size_t>> gaps;
+};
+
+/// What is known of one camera's pictures, in the order in which it gave them.
+struct ShotTimes {
+  std::vector<std::int64_t> times_ns;  ///< kUnknownTime: not known
+  std::vector<std::uint8_t> valid;     ///< 1: there is a picture
+  double exposure_us = 0;              ///< 0: unknown
+  std::optional<bool> shares_clock;    ///< nothing: found out
+};
+
+/// Pictures belong together by their time stamps, not by their numbers: a camera that drops one
+/// counts on. Two are of one moment when they began less than half a period apart, because another
+/// moment is nearer otherwise.
+///
+/// Clocks that do not count from the same moment (the recording says so, or they were hardly ever
+/// running at once) are shifted onto each other: of all lags in
+/// pictures, the one that lets most pictures meet, the smallest of equals (a constant rate repeats
+/// itself). Then the lag is followed over time in blocks, as clocks drift. What is constant in it
+/// cannot be told from a shutter that opens late: it counts as late where clocks are shared and as
+/// a shift where not.
+///
+/// A picture is late when it began more than half an exposure before or after its set, so that it
+/// shows mostly another moment; where the exposure is unknown, more than a quarter of a period.
+///
+/// Where nothing is timed, or the rows already are the moments, set k is row k.
+[[nodiscard]] FrameSets group_frames(std::span<const ShotTimes> cameras);
+[[nodiscard]] FrameSets group_frames(const Recording& recording);
+
+}  // namespace pencilscan

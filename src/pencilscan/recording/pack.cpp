@@ -1,0 +1,216 @@
+#include "pencilscan/recording/pack.h"
+
+#include <algorithm>
+#include <atomic>
+#include <charconv>
+#include <cstdio>
+#include <map>
+#include <sstream>
+
+#include "pencilscan/core/error.h"
+#include "pencilscan/core/parallel.h"
+#include "pencilscan/io/file.h"
+#include "pencilscan/io/image.h"
+
+namespace pencilscan {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kTimesFile = "timestamps.csv";
+
+/// Pictures of one camera by their row.
+using CameraFiles = std::map<std::size_t, fs::path>;
+
+struct FoundFrames {
+  std::vector<std::string> names;              ///< by row; empty: no folder
+  std::map<std::string, CameraFiles> cameras;  ///< by name
+};
+
+bool is_six_digits(const std::string& name) {
+  return name.size() == 6 &&
+         std::all_of(name.begin(), name.end(), [](char c) { return c >= '0' && c <= '9'; });
+}
+
+std::vector<std::string> folder_names(const fs::path& folder) {
+  if (!fs::is_directory(folder))
+    throw InputError(folder.string(), "", "", "must be a folder that holds frame folders");
+  std::vector<std::string> names;
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    if (entry.is_directory()) names.push_back(entry.path().filename().string());
+  }
+  std::sort(names.begin(), names.end());
+  if (names.empty()) {
+    throw InputError(folder.string(), "frame folders", "none",
+                     "must hold at least one frame folder such as 000000");
+  }
+  return names;
+}
+
+FoundFrames find_pictures(const fs::path& folder) {
+  const std::vector<std::string> names = folder_names(folder);
+  const bool numbered = std::all_of(names.begin(), names.end(), is_six_digits);
+  FoundFrames found;
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    const std::size_t row = numbered ? std::stoul(names[i]) : i;
+    found.names.resize(row + 1);
+    found.names[row] = names[i];
+    for (const auto& entry : fs::directory_iterator(folder / names[i])) {
+      const std::string camera = entry.path().stem().string();
+      const auto file = find_image(folder / names[i], camera);
+      if (file && *file == entry.path()) found.cameras[camera][row] = *file;
+    }
+  }
+  if (found.cameras.empty()) {
+    throw InputError(folder.string(), "images", "none",
+                     "must hold images such as " + names.front() + "/cam0.png");
+  }
+  return found;
+}
+
+RecordedCamera camera_of(const std::string& name, const fs::path& file, double exposure_us) {
+  const cv::Mat image = read_stored_image(file);
+  if (image.depth() == CV_32F)
+    throw InputError(file.string(), "", "", "must have 8 or 16 bit per channel");
+  return {name,       image.cols, image.rows, image.channels(), image.depth() == CV_8U ? 8 : 16,
+          exposure_us};
+}
+
+std::string describe(int width, int height, int type) {
+  return std::to_string(width) + "x" + std::to_string(height) +
+         (CV_MAT_CN(type) == 3 ? " colour, " : " grey, ") +
+         (CV_MAT_DEPTH(type) == CV_8U ? "8" : "16") + " bit";
+}
+
+cv::Mat read_like(const RecordedCamera& camera, const fs::path& file) {
+  cv::Mat image = read_stored_image(file);
+  if (image.cols != camera.width || image.rows != camera.height ||
+      image.type() != camera.image_type()) {
+    throw InputError(file.string(), "image", describe(image.cols, image.rows, image.type()),
+                     "must be " + describe(camera.width, camera.height, camera.image_type()) +
+                         " as the camera's first one");
+  }
+  return image;
+}
+
+std::vector<std::string> words(const std::string& line) {
+  std::vector<std::string> result;
+  std::istringstream stream(line);
+  for (std::string word; std::getline(stream, word, ',');) {
+    word.erase(0, word.find_first_not_of(" \t\r"));
+    word.erase(word.find_last_not_of(" \t\r") + 1);
+    result.push_back(word);
+  }
+  return result;
+}
+
+/// Time stamps by frame name and camera. Empty cells are unknown.
+std::map<std::string, std::map<std::string, std::int64_t>> read_times(const fs::path& file) {
+  std::map<std::string, std::map<std::string, std::int64_t>> times;
+  std::istringstream lines(read_file(file));
+  std::string line;
+  std::getline(lines, line);
+  const std::vector<std::string> header = words(line);
+  if (header.size() < 2 || header[0] != "frame")
+    throw InputError(file.string(), "line 1", line, "must be frame,<camera>,<camera>,...");
+  for (int number = 2; std::getline(lines, line); ++number) {
+    const std::vector<std::string> cells = words(line);
+    if (cells.empty()) continue;
+    for (std::size_t c = 1; c < cells.size() && c < header.size(); ++c) {
+      std::int64_t time = kUnknownTime;
+      const char* const end = cells[c].data() + cells[c].size();
+      if (!cells[c].empty() && std::from_chars(cells[c].data(), end, time).ptr != end) {
+        throw InputError(file.string(), "line " + std::to_string(number) + ", " + header[c],
+                         cells[c], "must be whole nanoseconds or nothing");
+      }
+      times[cells[0]][header[c]] = time;
+    }
+  }
+  return times;
+}
+
+}  // namespace
+
+std::string six_digits(std::size_t frame) {
+  char name[24];
+  std::snprintf(name, sizeof name, "%06zu", frame);
+  return name;
+}
+
+PackReport pack_recording(const fs::path& frames, const fs::path& out, const PackOptions& options,
+                          const Progress& progress) {
+  const FoundFrames found = find_pictures(frames);
+  fs::path times_file = options.times;
+  if (times_file.empty() && fs::exists(frames / kTimesFile)) times_file = frames / kTimesFile;
+  const auto times = times_file.empty() ? decltype(read_times({}))() : read_times(times_file);
+  PackReport report;
+  report.frames = found.names.size();
+  std::vector<RecordedCamera> cameras;
+  std::vector<const CameraFiles*> files;
+  for (const auto& [name, pictures] : found.cameras) {
+    cameras.push_back(camera_of(name, pictures.begin()->second, options.exposure_us));
+    files.push_back(&pictures);
+    report.cameras.push_back(name);
+    report.pictures += pictures.size();
+  }
+  report.missing = report.frames * cameras.size() - report.pictures;
+  if (options.overwrite && Recording::is_one(out)) fs::remove_all(out);
+  RecordingOptions recording_options;
+  recording_options.compression = options.compression;
+  RecordingWriter writer(out, cameras, recording_options);
+  std::atomic<std::size_t> written{0};
+  parallel_for(cameras.size(), [&](std::size_t c) {
+    for (const auto& [row, file] : *files[c]) {
+      std::int64_t time = kUnknownTime;
+      if (const auto of = times.find(found.names[row]); of != times.end()) {
+        const auto own = of->second.find(cameras[c].name);
+        if (own != of->second.end()) time = own->second;
+      }
+      writer.write(row, c, read_like(cameras[c], file), time);
+      const std::size_t done = ++written;
+      if (progress && c == 0)
+        progress("packing", static_cast<double>(done) / static_cast<double>(report.pictures));
+    }
+  });
+  writer.close();
+  return report;
+}
+
+PackReport unpack_recording(const Recording& recording, const FrameSets& sets, const fs::path& out,
+                            const Progress& progress) {
+  PackReport report;
+  report.frames = sets.sets.size();
+  for (const RecordedCamera& camera : recording.cameras()) report.cameras.push_back(camera.name);
+  std::atomic<std::size_t> pictures{0};
+  const std::size_t cameras = recording.cameras().size();
+  parallel_for(sets.sets.size(), [&](std::size_t k) {
+    fs::create_directories(out / six_digits(k));
+    for (std::size_t c = 0; c < cameras; ++c) {
+      const auto row = sets.sets[k].rows[c];
+      const cv::Mat image = row ? recording.read(*row, c) : cv::Mat();
+      if (image.empty()) continue;
+      write_image(out / six_digits(k) / (recording.cameras()[c].name + ".png"), image,
+                  recording.cameras()[c].bit_depth);
+      ++pictures;
+    }
+    if (progress)
+      progress("unpacking", static_cast<double>(k + 1) / static_cast<double>(report.frames));
+  });
+  report.pictures = pictures;
+  report.missing = report.frames * cameras - report.pictures;
+  if (sets.period_ns <= 0) return report;
+  std::string table = "frame";
+  for (const RecordedCamera& camera : recording.cameras()) table += "," + camera.name;
+  for (std::size_t k = 0; k < sets.sets.size(); ++k) {
+    table += "\n" + six_digits(k);
+    for (std::size_t c = 0; c < cameras; ++c) {
+      const auto row = sets.sets[k].rows[c];
+      const std::int64_t time = row ? recording.timestamp_ns(*row, c) : kUnknownTime;
+      table += "," + (time == kUnknownTime ? std::string() : std::to_string(time));
+    }
+  }
+  write_text(out / kTimesFile, table + "\n");
+  return report;
+}
+
+}  // namespace pencilscan

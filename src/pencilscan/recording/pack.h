@@ -1,0 +1,41 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "pencilscan/core/progress.h"
+#include "pencilscan/recording/frame_sets.h"
+#include "pencilscan/recording/recording_writer.h"
+
+namespace pencilscan {
+
+/// What went into a recording or came out of it.
+struct PackReport {
+  std::size_t frames = 0;
+  std::vector<std::string> cameras;
+  std::size_t pictures = 0;
+  std::size_t missing = 0;  ///< pictures of a frame that are not there
+};
+
+struct PackOptions {
+  ZarrCompression compression = ZarrCompression::kZstd;
+  std::filesystem::path times;  ///< timestamps.csv: frame, then nanoseconds per camera; or empty
+  double exposure_us = 0;       ///< of all cameras; 0: unknown
+  bool overwrite = false;
+};
+
+/// Makes a recording of image folders (`frames/<frame>/<camera>.png` and so on), pixels as stored.
+/// Folders of six digits keep their number as their row, so that a gap stays a gap. InputError for
+/// pictures that are damaged or of another size or type than the camera's others.
+PackReport pack_recording(const std::filesystem::path& frames, const std::filesystem::path& out,
+                          const PackOptions& options = {}, const Progress& progress = {});
+
+/// The opposite: a folder of PNG files per frame set, and timestamps.csv where there are times.
+PackReport unpack_recording(const Recording& recording, const FrameSets& sets,
+                            const std::filesystem::path& out, const Progress& progress = {});
+
+/// The name of frame k: six digits.
+[[nodiscard]] std::string six_digits(std::size_t frame);
+
+}  // namespace pencilscan
