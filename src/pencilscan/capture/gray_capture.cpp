@@ -1,0 +1,322 @@
+#include "pencilscan/capture/gray_capture.h"
+
+#include <algorithm>
+#include <opencv2/imgproc.hpp>
+#include <set>
+#include <thread>
+
+#include "pencilscan/capture/work_queue.h"
+#include "pencilscan/core/check.h"
+#include "pencilscan/core/error.h"
+#include "pencilscan/core/host_clock.h"
+#include "pencilscan/core/parallel.h"
+#include "pencilscan/core/stopwatch.h"
+#include "pencilscan/io/image.h"
+#include "pencilscan/pattern/gray_code.h"
+#include "pencilscan/pattern/solid_color.h"
+
+namespace pencilscan {
+namespace {
+
+namespace fs = std::filesystem;
+using Kind = ProjectorPicture::Kind;
+
+/// A camera sees a projector where so much of its picture is lit: a hand at arm's length.
+constexpr double kLeastSeen = 0.002;
+/// Where nobody measured: projectors of three frames' delay, and a slow network.
+constexpr double kGuessedFrames = 3;
+constexpr double kGuessedTransferMs = 60;
+constexpr double kUsualRefreshHz = 60;
+/// Added to the delay when a picture is taken again.
+constexpr double kRetakeMs = 50;
+/// Pictures of all cameras that may wait to be written: half a gigabyte at most.
+constexpr std::size_t kWaitingPictures = 24;
+
+/// A picture of the sequence and the file it becomes.
+struct Shot {
+  ProjectorPicture picture;
+  std::string file;
+};
+
+std::string three_digits(std::size_t number) {
+  const std::string text = std::to_string(number);
+  return std::string(text.size() < 3 ? 3 - text.size() : 0, '0') + text;
+}
+
+/// The sequence as files; with inverses, a pattern is followed by its inverse.
+std::vector<Shot> shots_of(const Projector& projector, const GrayCaptureOptions& options) {
+  std::vector<Shot> shots;
+  const auto wanted = gray_code_sequence(projector.width, projector.height, options.inverses);
+  const auto all = gray_code_sequence(projector.width, projector.height, true);
+  for (std::size_t i = 0, k = 0; k < wanted.size(); ++i) {
+    if (!options.inverses && all[i].inverse) continue;
+    shots.push_back({{Kind::kGray, i, {}}, three_digits(k++) + ".png"});
+  }
+  if (!options.solids) return shots;
+  for (const SolidImage& solid : solid_images())
+    shots.push_back({{Kind::kSolid, 0, solid.value}, solid.name + ".png"});
+  return shots;
+}
+
+/// One projector's pictures while they are taken.
+class ProjectorRun {
+ public:
+  ProjectorRun(LiveCameras& cameras, ProjectorScreen& screen, const fs::path& folder,
+               std::size_t projector, const GrayCaptureOptions& options, WorkQueue& work,
+               GrayCaptureReport& report)
+      : cameras_(cameras),
+        screen_(screen),
+        folder_(folder),
+        projector_(projector),
+        options_(options),
+        work_(work),
+        report_(report),
+        shots_(shots_of(screen.projectors()[projector], options)),
+        coarse_(shots_.size() + 1, std::vector<cv::Mat>(cameras.group().size())) {}
+
+  /// False when `watch` asked to stop.
+  bool run(const std::function<bool(double share)>& watch);
+  /// Removes the folders of cameras that see nothing.
+  void drop_unseen() const;
+
+ private:
+  [[nodiscard]] double delay_ms() const;
+  /// Shows and takes shot i; `again` >= 1: a retake. Index shots_.size() is white once more.
+  void take(std::size_t i, int again = 0);
+  [[nodiscard]] std::string name_of(std::size_t camera) const {
+    return cameras_.group().name(camera);
+  }
+  [[nodiscard]] const Shot& shot(std::size_t i) const {
+    return i < shots_.size() ? shots_[i] : shots_[0];
+  }
+  void judge_whites();
+  /// Shots to take again, with the reason for every camera that complains.
+  [[nodiscard]] std::set<std::size_t> failed(bool last);
+  void note(std::size_t camera, std::size_t i, const std::string& why, bool given_up);
+  void judge_stillness();
+  /// Share of a camera's picture that changes at all during the sequence.
+  [[nodiscard]] double changing_share(std::size_t camera) const;
+
+  LiveCameras& cameras_;
+  ProjectorScreen& screen_;
+  const fs::path folder_;
+  std::size_t projector_;
+  const GrayCaptureOptions& options_;
+  WorkQueue& work_;
+  GrayCaptureReport& report_;
+  std::vector<Shot> shots_;
+  std::vector<std::vector<cv::Mat>> coarse_;  ///< [shot][camera]; empty: none came
+  std::vector<LitView> views_;
+};
+
+double ProjectorRun::delay_ms() const {
+  if (projector_ < options_.delay_ms.size() && options_.delay_ms[projector_] > 0)
+    return options_.delay_ms[projector_];
+  const double refresh = screen_.refresh_hz(projector_);
+  double exposure_ms = 0;
+  for (std::size_t c = 0; c < cameras_.group().size(); ++c)
+    exposure_ms =
+        std::max(exposure_ms, cameras_.group().settings(c).exposure_us.value_or(0) / 1000);
+  return 1000 * kGuessedFrames / (refresh > 0 ? refresh : kUsualRefreshHz) + exposure_ms +
+         kGuessedTransferMs;
+}
+
+void ProjectorRun::take(std::size_t i, int again) {
+  const Stopwatch watch;
+  const std::int64_t shown = screen_.show(projector_, shot(i).picture);
+  std::int64_t since = shown + static_cast<std::int64_t>(1e6 * (delay_ms() + kRetakeMs * again));
+  const bool software =
+      cameras_.group().size() > 0 && cameras_.group().settings(0).trigger == Trigger::kSoftware;
+  if (software) {
+    std::this_thread::sleep_for(
+        std::chrono::nanoseconds(std::max<std::int64_t>(0, since - host_now_ns())));
+    since = host_now_ns();
+    cameras_.group().trigger();
+  }
+  const auto until = since + static_cast<std::int64_t>(1e9 * options_.patience_s);
+  const std::vector<TimedFrame> frames = cameras_.first_since(since, until);
+  report_.waiting_seconds += static_cast<double>(host_now_ns() - shown) / 1e9;
+  ++report_.pictures;
+  work_.wait(kWaitingPictures);
+  for (std::size_t c = 0; c < frames.size(); ++c) {
+    coarse_[i][c].release();
+    if (!frames[c].frame) continue;
+    work_.add([this, i, c, frame = frames[c].frame] {
+      const cv::Mat picture = picture_for_files(*frame);
+      coarse_[i][c] = coarse_picture(picture);
+      if (i < shots_.size()) write_image(folder_ / name_of(c) / shots_[i].file, picture);
+    });
+  }
+}
+
+void ProjectorRun::judge_whites() {
+  views_.assign(cameras_.group().size(), {});
+  for (std::size_t c = 0; c < views_.size(); ++c)
+    if (!coarse_[0][c].empty() && !coarse_[1][c].empty())
+      views_[c] = lit_view(coarse_[0][c], coarse_[1][c]);
+}
+
+void ProjectorRun::note(std::size_t camera, std::size_t i, const std::string& why, bool given_up) {
+  report_.troubles.push_back({projector_, camera, to_string(shot(i).picture), why, given_up});
+  if (!given_up) return;
+  const std::string& projector = screen_.projectors()[projector_].name;
+  const bool missing = coarse_[i][camera].empty();
+  for (const Fault& fault : report_.faults)
+    if (fault.device == name_of(camera) && fault.kind == (missing ? "missing" : "picture")) return;
+  report_.faults.push_back({missing ? "missing" : "picture", name_of(camera),
+                            to_string(shot(i).picture) + " of " + projector + " after " +
+                                std::to_string(options_.retakes) + " more tries: " + why,
+                            missing
+                                ? "check the camera, its trigger and its network"
+                                : "keep everything still; measure the projectors' delay again"});
+}
+
+std::set<std::size_t> ProjectorRun::failed(bool last) {
+  std::set<std::size_t> again;
+  judge_whites();
+  const std::size_t white_again = shots_.size();
+  for (std::size_t c = 0; c < views_.size(); ++c) {
+    for (std::size_t i = 0; i <= shots_.size(); ++i) {
+      if (!coarse_[i][c].empty()) continue;
+      again.insert(i);
+      note(c, i, "no picture came", last);
+    }
+    // A camera that sees nothing between white and black, and then something: these came late.
+    if (views_[c].share < kLeastSeen) {
+      if (changing_share(c) < kLeastSeen) continue;
+      // Then every picture may show the one before: pairs would not tell.
+      for (std::size_t i = 0; i <= white_again; ++i) again.insert(i);
+      note(c, 0, "white and black came late", last);
+      continue;
+    }
+    if (!options_.inverses) continue;
+    const std::size_t patterns = gray_code_sequence(screen_.projectors()[projector_].width,
+                                                    screen_.projectors()[projector_].height)
+                                     .size();
+    for (std::size_t i = 2; i + 1 < patterns; i += 2) {
+      if (coarse_[i][c].empty() || coarse_[i + 1][c].empty()) continue;
+      const std::string why = pair_trouble(coarse_[i][c], coarse_[i + 1][c], views_[c]);
+      if (why.empty()) continue;
+      again.insert({i, i + 1});
+      note(c, i, why, last);
+    }
+  }
+  return again;
+}
+
+double ProjectorRun::changing_share(std::size_t camera) const {
+  cv::Mat low;
+  cv::Mat high;
+  for (const auto& shot : coarse_) {
+    if (shot[camera].empty()) continue;
+    low = low.empty() ? shot[camera].clone() : cv::Mat(cv::min(low, shot[camera]));
+    high = high.empty() ? shot[camera].clone() : cv::Mat(cv::max(high, shot[camera]));
+  }
+  return low.empty() ? 0 : lit_view(high, low).share;
+}
+
+void ProjectorRun::judge_stillness() {
+  for (std::size_t c = 0; c < views_.size(); ++c) {
+    const cv::Mat& again = coarse_[shots_.size()][c];
+    if (views_[c].share < kLeastSeen || again.empty()) continue;
+    const std::string why = white_again_trouble(coarse_[0][c], again, views_[c]);
+    if (why.empty()) continue;
+    report_.faults.push_back({"moved", name_of(c),
+                              "under " + screen_.projectors()[projector_].name + ": " + why,
+                              "take this pose again"});
+  }
+}
+
+bool ProjectorRun::run(const std::function<bool(double share)>& watch) {
+  const std::size_t count = shots_.size() + 1;
+  // The light of the projector before has to be gone.
+  const std::int64_t dark = screen_.show(projector_, {});
+  (void)cameras_.first_since(dark + static_cast<std::int64_t>(1e6 * delay_ms()),
+                             dark + static_cast<std::int64_t>(1e6 * delay_ms() + 5e8));
+  for (std::size_t i = 0; i < count; ++i) {
+    take(i);
+    if (!watch(static_cast<double>(i + 1) / static_cast<double>(count))) return false;
+  }
+  work_.wait();
+  for (int round = 1; round <= options_.retakes; ++round) {
+    const auto again = failed(false);
+    if (again.empty()) break;
+    for (const std::size_t i : again) {
+      take(i, round);
+      ++report_.retaken;
+      if (!watch(1)) return false;
+    }
+    work_.wait();
+  }
+  (void)failed(true);
+  judge_stillness();
+  report_.views[projector_] = views_;
+  const bool seen = std::any_of(views_.begin(), views_.end(),
+                                [](const LitView& view) { return view.share >= kLeastSeen; });
+  if (!seen)
+    report_.faults.push_back({"unseen", screen_.projectors()[projector_].name,
+                              "no camera sees any of its light",
+                              "lamp on? lens cap? the right output? exposure long enough?"});
+  screen_.show(projector_, {});
+  return true;
+}
+
+void ProjectorRun::drop_unseen() const {
+  for (std::size_t c = 0; c < views_.size(); ++c)
+    if (views_[c].share < kLeastSeen) fs::remove_all(folder_ / name_of(c));
+}
+
+}  // namespace
+
+cv::Mat picture_for_files(const CameraFrame& frame) {
+  if (frame.mosaic.empty()) return frame.image;
+  const int code = frame.mosaic == "RGGB"   ? cv::COLOR_BayerRGGB2RGB
+                   : frame.mosaic == "BGGR" ? cv::COLOR_BayerBGGR2RGB
+                   : frame.mosaic == "GRBG" ? cv::COLOR_BayerGRBG2RGB
+                                            : cv::COLOR_BayerGBRG2RGB;
+  cv::Mat color;
+  cv::demosaicing(frame.image, color, code);
+  return color;
+}
+
+GrayCaptureReport capture_gray_codes(LiveCameras& cameras, ProjectorScreen& screen, const Rig& rig,
+                                     const fs::path& out, const GrayCaptureOptions& options,
+                                     const GrayCaptureWatch& watch, const ProjectorDone& done) {
+  PENCILSCAN_CHECK(rig.cameras.size() == cameras.group().size());
+  GrayCaptureReport report;
+  const Stopwatch clock;
+  const std::size_t projectors = screen.projectors().size();
+  report.views.assign(projectors, std::vector<LitView>(cameras.group().size()));
+  WorkQueue work(static_cast<std::size_t>(thread_count()));
+  screen.show_all({});
+  for (std::size_t p = 0; p < projectors; ++p) {
+    const std::string& name = screen.projectors()[p].name;
+    if (fs::exists(out / name)) {
+      ++report.resumed;
+      continue;
+    }
+    const fs::path part = out / ("." + name + ".part");
+    fs::remove_all(part);
+    fs::create_directories(part);
+    ProjectorRun run(cameras, screen, part, p, options, work, report);
+    const bool whole = run.run([&](double share) {
+      return !watch ||
+             watch(name, (static_cast<double>(p) + share) / static_cast<double>(projectors));
+    });
+    work.wait();
+    report.seconds = clock.seconds();
+    if (!whole) {
+      fs::remove_all(part);
+      screen.show_all({});
+      return report;
+    }
+    run.drop_unseen();
+    fs::rename(part, out / name);
+    if (done) done(p);
+  }
+  for (Fault& fault : screen.check()) report.faults.push_back(std::move(fault));
+  report.seconds = clock.seconds();
+  return report;
+}
+
+}  // namespace pencilscan

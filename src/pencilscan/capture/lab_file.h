@@ -1,0 +1,66 @@
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "pencilscan/capture/camera_group.h"
+#include "pencilscan/rig/rig.h"
+
+namespace pencilscan {
+
+/// How one camera of the rig is reached and set (lab.json).
+struct LabCamera {
+  std::string device;                ///< "aravis:Basler-2345", "v4l2:/dev/video0", "folder:shots"
+  std::vector<std::string> command;  ///< of a command camera, instead of `device`
+  std::optional<double> exposure_ms;
+  std::optional<double> gain;
+  std::optional<std::string> pixel_format;
+
+  friend bool operator==(const LabCamera&, const LabCamera&) = default;
+};
+
+/// lab.json: the devices of a laboratory, beside rig.json, which says what they are.
+struct Lab {
+  Trigger trigger = Trigger::kFree;
+  double rate_hz = 10;         ///< of frames, > 0
+  std::string line = "Line0";  ///< that the trigger's wire is on
+  double max_spread_ms = 0;    ///< of the pictures of a frame; 0: a quarter of the exposure
+  std::map<std::string, LabCamera> cameras;    ///< by name in the rig
+  std::map<std::string, std::string> outputs;  ///< by name of the projector, before the rig's own
+  std::map<std::string, double> delay_ms;      ///< measured, by name of the projector
+
+  friend bool operator==(const Lab&, const Lab&) = default;
+};
+
+/// Reads lab.json; InputError names file, field, value and rule. Paths in it are relative to its
+/// folder.
+[[nodiscard]] Lab read_lab(const std::filesystem::path& path);
+void write_lab(const Lab& lab, const std::filesystem::path& path);
+
+/// Cameras of all back ends that can be found: those of the network, of USB and of the kernel.
+[[nodiscard]] std::vector<CameraInfo> list_cameras();
+
+/// "cam0=aravis:Basler-2345" as a name and a camera; InputError of `option`.
+[[nodiscard]] std::pair<std::string, LabCamera> lab_camera_from_text(const std::string& text,
+                                                                     const std::string& option);
+
+/// Opens one by its address. InputError for an address of no back end, StageError when it does not
+/// answer.
+[[nodiscard]] std::unique_ptr<CameraDevice> open_camera(const LabCamera& camera);
+
+/// The settings of a camera of the rig in this laboratory.
+[[nodiscard]] CameraSettings settings_for(const Lab& lab, const Camera& camera);
+
+/// Opens every camera of the rig. InputError when one is not in the laboratory.
+[[nodiscard]] std::vector<NamedCamera> open_lab_cameras(const Lab& lab, const Rig& rig,
+                                                        const std::string& source);
+
+/// The limit of the spread that holds: as stated, or a quarter of the longest exposure (what moves
+/// is then displaced between views by a quarter of what it is blurred by).
+[[nodiscard]] double spread_limit_ms(const Lab& lab);
+
+}  // namespace pencilscan
