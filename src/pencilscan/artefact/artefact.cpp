@@ -1,0 +1,268 @@
+#include "pencilscan/artefact/artefact.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "pencilscan/artefact/find_shapes.h"
+#include "pencilscan/artefact/plate_face.h"
+#include "pencilscan/artefact/sphere_fit.h"
+#include "pencilscan/artefact/trimmed.h"
+#include "pencilscan/core/check.h"
+#include "pencilscan/core/error.h"
+
+namespace pencilscan {
+namespace {
+
+constexpr std::size_t kWorstShown = 10;
+
+[[noreturn]] void no_fit(const ArtefactPoints& points, const char* shape) {
+  throw StageError(points.source + ": no " + shape + " fits " +
+                   std::to_string(points.points.size()) + " points");
+}
+
+std::size_t removed_of(std::size_t count) {
+  return static_cast<std::size_t>(std::floor(kTrimmedShare * static_cast<double>(count)));
+}
+
+/// max - min of the signed distances of the points (all, or those of the indices).
+template <typename Distance>
+double range(std::span<const Vec3> points, const Distance& distance,
+             const std::vector<std::size_t>* indices = nullptr) {
+  double low = std::numeric_limits<double>::infinity(), high = -low;
+  const std::size_t count = indices != nullptr ? indices->size() : points.size();
+  for (std::size_t k = 0; k < count; ++k) {
+    const double d = distance(points[indices != nullptr ? (*indices)[k] : k]);
+    low = std::min(low, d);
+    high = std::max(high, d);
+  }
+  return high - low;
+}
+
+template <typename Distance>
+std::vector<WorstPoint> worst_points(std::span<const Vec3> points, const Distance& distance) {
+  std::vector<WorstPoint> worst(points.size());
+  for (std::size_t i = 0; i < points.size(); ++i) worst[i] = {i, distance(points[i])};
+  const std::size_t shown = std::min(kWorstShown, worst.size());
+  std::partial_sort(worst.begin(), worst.begin() + static_cast<std::ptrdiff_t>(shown), worst.end(),
+                    [](const WorstPoint& a, const WorstPoint& b) {
+                      const double x = std::abs(a.distance), y = std::abs(b.distance);
+                      return x != y ? x > y : a.index < b.index;
+                    });
+  worst.resize(shown);
+  return worst;
+}
+
+/// Least squares with nothing removed and with 3 per mille removed; the radius free or held.
+struct SphereFits {
+  Sphere all;
+  TrimmedFit<Sphere> trimmed;
+};
+std::optional<SphereFits> fit_both(std::span<const Vec3> points, const Sphere& start,
+                                   std::optional<double> radius = {}) {
+  const auto all = fit_sphere(points, start, radius);
+  if (!all) return std::nullopt;
+  auto trimmed = fit_trimmed(
+      points, removed_of(points.size()), std::vector<Sphere>{*all, start},
+      [&](std::span<const Vec3> rest, const Sphere& from) {
+        return fit_sphere(rest, from, radius);
+      },
+      [](const Sphere& sphere, const Vec3& point) { return signed_distance(sphere, point); });
+  if (!trimmed) return std::nullopt;
+  return SphereFits{*all, std::move(*trimmed)};
+}
+
+ArtefactPoints of_region(const ArtefactPoints& points, const ArtefactOptions& options) {
+  return options.region ? within(points, *options.region) : points;
+}
+
+/// Without the points in a cone seen from the ball's centre.
+ArtefactPoints without_cone(const ArtefactPoints& points, const Vec3& center,
+                            const LeftOutCone& cone) {
+  const double least = std::cos(cone.half_angle_rad);
+  std::vector<std::size_t> kept;
+  for (std::size_t i = 0; i < points.points.size(); ++i) {
+    const Vec3 offset = points.points[i] - center;
+    if (offset.dot(cone.direction) < least * offset.norm()) kept.push_back(i);
+  }
+  return points.subset(kept);
+}
+
+/// A found sphere refined by the points near it alone, so that stems and bars do not pull at it.
+Sphere refined(std::span<const Vec3> points, const Sphere& found) {
+  constexpr double kNear = 0.05;  // of the radius; more than twice what a vote allows
+  std::vector<Vec3> near;
+  for (const Vec3& point : points)
+    if (std::abs(signed_distance(found, point)) < kNear * found.radius) near.push_back(point);
+  return fit_sphere(near, found).value_or(found);
+}
+
+/// The figures of one ball whose rough place is known.
+BallFigures measure_ball(ArtefactPoints points, const Sphere& start, const Rig* rig,
+                         const ArtefactOptions& options) {
+  BallFigures ball;
+  ball.points = std::move(points);
+  const std::span<const Vec3> all(ball.points.points);
+  const auto fits = fit_both(all, start);
+  if (!fits) no_fit(ball.points, "sphere");
+  ball.sphere = fits->all;
+  ball.trimmed = fits->trimmed.model;
+  ball.removed = all.size() - fits->trimmed.kept.size();
+  const auto from = [](const Sphere& sphere) {
+    return [sphere](const Vec3& point) { return signed_distance(sphere, point); };
+  };
+  ball.form_mm = {range(all, from(ball.sphere)),
+                  range(all, from(ball.trimmed), &fits->trimmed.kept)};
+  if (options.diameter_mm) {
+    ball.size_mm = {2 * ball.sphere.radius - *options.diameter_mm,
+                    2 * ball.trimmed.radius - *options.diameter_mm};
+  }
+  ball.worst = worst_points(all, from(ball.trimmed));
+  ball.coverage = sphere_coverage(
+      all, {ball.trimmed.center, options.diameter_mm.value_or(2 * ball.trimmed.radius) / 2});
+  ball.z = z_scores(ball.points, rig, [&](const Vec3& point, const std::optional<Vec3>& center) {
+    return center ? error_along_ray(ball.trimmed, point, *center)
+                  : std::optional(signed_distance(ball.trimmed, point));
+  });
+  return ball;
+}
+
+std::optional<double> radius_of(const ArtefactOptions& options) {
+  if (!options.diameter_mm) return std::nullopt;
+  return *options.diameter_mm / 2;
+}
+
+/// Points that lie between the balls around the line that joins their centres.
+std::size_t count_between(std::span<const Vec3> points, const Vec3& a, const Vec3& b,
+                          double radius) {
+  const double length = (b - a).norm();
+  const Vec3 along = (b - a) / length;
+  const auto lies_between = [&](const Vec3& point) {
+    const double t = along.dot(point - a);
+    const double off = (point - a - t * along).norm();
+    return t > 1.1 * radius && t < length - 1.1 * radius && off < radius;
+  };
+  return static_cast<std::size_t>(std::count_if(points.begin(), points.end(), lies_between));
+}
+
+}  // namespace
+
+BallFigures measure_sphere(const ArtefactPoints& given, const Rig* rig,
+                           const ArtefactOptions& options) {
+  ArtefactPoints points = of_region(given, options);
+  const auto start = find_sphere(points.points, {radius_of(options), {}, options.seed});
+  if (!start) no_fit(points, "sphere");
+  std::size_t left_out = 0;
+  if (options.stem) {
+    ArtefactPoints kept =
+        without_cone(points, refined(points.points, *start).center, *options.stem);
+    left_out = points.points.size() - kept.points.size();
+    points = std::move(kept);
+  }
+  BallFigures ball = measure_ball(std::move(points), *start, rig, options);
+  ball.left_out = left_out;
+  return ball;
+}
+
+BallBarFigures measure_ball_bar(const ArtefactPoints& given, const Rig* rig,
+                                const ArtefactOptions& options) {
+  PENCILSCAN_CHECK(options.diameter_mm.has_value());
+  const double radius = *options.diameter_mm / 2;
+  const ArtefactPoints points = of_region(given, options);
+  SphereSearch search{radius, {}, options.seed};
+  auto first = find_sphere(points.points, search);
+  if (!first) no_fit(points, "ball of this diameter");
+  first = refined(points.points, *first);
+  search.not_here = Sphere{first->center, *options.diameter_mm};
+  // What lies on the first ball has no vote about the second.
+  std::vector<Vec3> others;
+  for (const Vec3& point : points.points) {
+    if (std::abs((point - first->center).norm() - radius) > 0.1 * radius) others.push_back(point);
+  }
+  auto second = find_sphere(others, search);
+  if (!second) no_fit(points, "second ball of this diameter");
+  second = refined(others, *second);
+
+  BallBarFigures bar;
+  bar.between = count_between(points.points, first->center, second->center, radius);
+  std::vector<std::size_t> of_ball[2];
+  for (std::size_t i = 0; i < points.points.size(); ++i) {
+    const double to_first = (points.points[i] - first->center).squaredNorm();
+    const double to_second = (points.points[i] - second->center).squaredNorm();
+    of_ball[to_first <= to_second ? 0 : 1].push_back(i);
+  }
+  Vec3 center[2], trimmed_center[2];
+  for (int b = 0; b < 2; ++b) {
+    const Sphere& own = b == 0 ? *first : *second;
+    const Sphere& other = b == 0 ? *second : *first;
+    ArtefactPoints part = points.subset(of_ball[b]);
+    const std::size_t whole = part.points.size();
+    if (options.bar_diameter_mm > 0) {
+      // The bar's shadow on the ball, and half as much again for the fillet or the thread.
+      const double sine = std::min(1.0, 1.5 * options.bar_diameter_mm / *options.diameter_mm);
+      part = without_cone(part, own.center,
+                          {(other.center - own.center).normalized(), std::asin(sine)});
+    }
+    const auto held = fit_both(part.points, own, radius);
+    if (!held) no_fit(part, "ball of this diameter");
+    center[b] = held->all.center;
+    trimmed_center[b] = held->trimmed.model.center;
+    bar.balls.push_back(measure_ball(std::move(part), own, rig, options));
+    bar.balls.back().left_out = whole - bar.balls.back().points.points.size();
+  }
+  bar.distance_mm = {(center[1] - center[0]).norm(),
+                     (trimmed_center[1] - trimmed_center[0]).norm()};
+  if (options.length_mm) {
+    bar.spacing_mm = {bar.distance_mm.all - *options.length_mm,
+                      bar.distance_mm.trimmed - *options.length_mm};
+  }
+  return bar;
+}
+
+PlateFigures measure_plate(const ArtefactPoints& given, const Rig* rig,
+                           const ArtefactOptions& options) {
+  PlateFigures plate;
+  plate.points = of_region(given, options);
+  if (options.plate_thickness_mm) {
+    const std::size_t whole = plate.points.points.size();
+    plate.points = points_of_face(plate.points,
+                                  {*options.plate_thickness_mm, options.border_mm, options.seed});
+    plate.left_out = whole - plate.points.points.size();
+  }
+  const std::span<const Vec3> all(plate.points.points);
+  const auto plane = fit_plane(all);
+  if (!plane) no_fit(plate.points, "plane");
+  std::vector<Plane> starts{*plane};
+  if (const auto found = find_plane(all, options.seed)) starts.push_back(*found);
+  const auto trimmed = fit_trimmed(
+      all, removed_of(all.size()), starts,
+      [](std::span<const Vec3> rest, const Plane&) { return fit_plane(rest); },
+      [](const Plane& p, const Vec3& point) { return p.signed_distance(point); });
+  if (!trimmed) no_fit(plate.points, "plane");
+  plate.plane = *plane;
+  plate.trimmed = trimmed->model;
+  plate.removed = all.size() - trimmed->kept.size();
+  const auto from = [](const Plane& p) {
+    return [p](const Vec3& point) { return p.signed_distance(point); };
+  };
+  plate.flatness_mm = {range(all, from(plate.plane)),
+                       range(all, from(plate.trimmed), &trimmed->kept)};
+  plate.worst = worst_points(all, from(plate.trimmed));
+  std::vector<Vec3> kept;
+  for (const std::size_t i : trimmed->kept) kept.push_back(all[i]);
+  plate.rectangle = smallest_rectangle(kept, plate.trimmed);
+  if (options.plate_length_mm && options.plate_width_mm) {
+    plate.rectangle.length = std::max(*options.plate_length_mm, *options.plate_width_mm);
+    plate.rectangle.width = std::min(*options.plate_length_mm, *options.plate_width_mm);
+  }
+  plate.coverage = plate_coverage(all, plate.rectangle);
+  plate.z = z_scores(plate.points, rig, [&](const Vec3& point, const std::optional<Vec3>& center) {
+    const double distance = plate.trimmed.signed_distance(point);
+    if (!center) return std::optional(distance);
+    const double slope = plate.trimmed.normal.dot((point - *center).normalized());
+    return slope != 0 ? std::optional(distance / slope) : std::nullopt;
+  });
+  return plate;
+}
+
+}  // namespace pencilscan

@@ -1,0 +1,51 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "pencilscan/geometry/types.h"
+
+namespace pencilscan {
+
+/// Where a point of ours comes from, so that a bad one can be looked at.
+struct PointOrigin {
+  float u = 0, v = 0;  ///< camera pixel
+  int camera = 0;
+  int projector = 0;
+  int line = 0;
+  float confidence = 0;
+};
+
+/// What was measured of an artefact in one position: the vertices of a PLY file. The lists beside
+/// `points` are empty or as long.
+struct ArtefactPoints {
+  std::string source;  ///< the file
+  std::vector<Vec3> points;
+  std::vector<float> sigma;          ///< mm; along the camera ray of points, the normal of a mesh
+  std::vector<PointOrigin> origins;  ///< of our points.ply
+  bool is_mesh = false;              ///< the file has faces
+  std::size_t not_finite = 0;        ///< vertices without a position, as organised clouds have
+  std::size_t outside_region = 0;    ///< left out: outside of what was asked for
+
+  [[nodiscard]] ArtefactPoints subset(const std::vector<std::size_t>& indices) const;
+};
+
+/// Which file of a frame's results to measure.
+enum class FrameSurface { kPoints, kMesh };  ///< points.ply, mesh_measured.ply
+
+/// The files that an argument names: a PLY file; the results of a frame; or an output folder, one
+/// position per frame. InputError when it holds none.
+[[nodiscard]] std::vector<std::filesystem::path> artefact_files(const std::filesystem::path& path,
+                                                                FrameSurface surface);
+
+/// Vertices of any PLY file, of points or a mesh. InputError when it is none or has no vertex with
+/// a finite position.
+[[nodiscard]] ArtefactPoints read_artefact_points(const std::filesystem::path& path);
+
+/// Leaves out what lies outside of a sphere.
+[[nodiscard]] ArtefactPoints within(const ArtefactPoints& points, const Sphere& region);
+
+}  // namespace pencilscan

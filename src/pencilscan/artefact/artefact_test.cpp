@@ -1,0 +1,307 @@
+#include "pencilscan/artefact/artefact.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <numbers>
+
+#include "pencilscan/artefact/plate_face.h"
+#include "pencilscan/artefact/sphere_fit.h"
+#include "pencilscan/core/error.h"
+#include "pencilscan/core/random.h"
+#include "pencilscan/io/file.h"
+#include "pencilscan/io/mesh_file.h"
+#include "pencilscan/io/point_file.h"
+#include "pencilscan/io/temporary_folder.h"
+
+namespace pencilscan {
+namespace {
+
+using ::testing::HasSubstr;
+
+/// Places spread evenly over a sphere (a Fibonacci lattice); `deviation(i)` is radial.
+template <typename Deviation>
+void add_ball(std::vector<Vec3>& points, const Sphere& sphere, int count,
+              const Deviation& deviation) {
+  const double golden = std::numbers::pi * (3 - std::sqrt(5.0));
+  for (int i = 0; i < count; ++i) {
+    const double z = 1 - (2.0 * i + 1) / count, r = std::sqrt(1 - z * z);
+    const Vec3 d(r * std::cos(golden * i), r * std::sin(golden * i), z);
+    points.push_back(sphere.center + (sphere.radius + deviation(i)) * d);
+  }
+}
+
+ArtefactPoints as_points(std::vector<Vec3> points) {
+  ArtefactPoints result;
+  result.source = "test";
+  result.points = std::move(points);
+  return result;
+}
+
+constexpr int kMany = 20'000;  // dense enough for whole coverage: 1 % of the diameter apart
+
+TEST(ArtefactSphere, FormIsTheRangeOfKnownDeviations) {
+  std::vector<Vec3> points;
+  // Rings of +a and -a in turn: the mean is none, so the fit is the nominal sphere.
+  add_ball(points, {{3, 4, 5}, 25}, kMany, [](int i) { return i % 2 == 0 ? 0.04 : -0.04; });
+  ArtefactOptions options;
+  options.diameter_mm = 49.9;
+  const BallFigures ball = measure_sphere(as_points(points), nullptr, options);
+  EXPECT_NEAR(ball.form_mm.all, 0.08, 1e-4);
+  // Any 60 of equal size are the worst: without them the rest leans a little.
+  EXPECT_NEAR(ball.form_mm.trimmed, 0.08, 1e-3);
+  ASSERT_TRUE(ball.size_mm);
+  EXPECT_NEAR(ball.size_mm->all, 0.1, 1e-4);
+  EXPECT_EQ(ball.removed, 60U);
+  EXPECT_DOUBLE_EQ(ball.coverage, 1);
+}
+
+TEST(ArtefactSphere, OnePointDecidesTheFormUntilItIsRemoved) {
+  std::vector<Vec3> points;
+  Random random(1);
+  add_ball(points, {{-30, 0, 700}, 20}, kMany, [&](int) { return random.uniform(-0.01, 0.01); });
+  points[777] = {90, 0, 700};  // 100 mm outside
+  const BallFigures ball = measure_sphere(as_points(points), nullptr, {});
+  EXPECT_NEAR(ball.form_mm.all, 100, 0.1);
+  EXPECT_LT(ball.form_mm.trimmed, 0.0201);
+  EXPECT_GT(ball.form_mm.trimmed, 0.018);
+  EXPECT_EQ(ball.worst.front().index, 777U);
+  EXPECT_NEAR(ball.worst.front().distance, 100, 0.1);
+  EXPECT_FALSE(ball.size_mm);
+}
+
+TEST(ArtefactSphere, CoverageIsTheShareOfTheBallThatHasPoints) {
+  std::vector<Vec3> points, upper;
+  add_ball(points, {{0, 0, 0}, 10}, 2 * kMany, [](int) { return 0.0; });
+  for (const Vec3& point : points)
+    if (point.z() > 5) upper.push_back(point);
+  // A cap above z = 5 is a quarter; 1 % of the diameter round it makes 0.2 sin 60 / 20 more.
+  const BallFigures ball = measure_sphere(as_points(upper), nullptr, {});
+  EXPECT_NEAR(ball.coverage, 0.25 + 0.2 * std::sin(std::numbers::pi / 3) / 20, 0.005);
+}
+
+TEST(ArtefactSphere, FiguresTurnScaleAndMoveWithThePoints) {
+  std::vector<Vec3> points, moved;
+  Random random(2);
+  add_ball(points, {{0, 0, 0}, 20}, 3000, [&](int) { return random.normal(0, 0.02); });
+  const Mat3 turn = Eigen::AngleAxisd(0.7, Vec3(1, 2, 3).normalized()).toRotationMatrix();
+  for (const Vec3& point : points) moved.push_back(1000 * (turn * point) + Vec3(5e3, -2e4, 1e5));
+  const BallFigures a = measure_sphere(as_points(points), nullptr, {});
+  const BallFigures b = measure_sphere(as_points(moved), nullptr, {});
+  EXPECT_NEAR(b.form_mm.all / a.form_mm.all, 1000, 1e-6 * 1000);
+  EXPECT_NEAR(b.form_mm.trimmed / a.form_mm.trimmed, 1000, 1e-6 * 1000);
+  EXPECT_NEAR(b.coverage, a.coverage, 0.01);
+}
+
+TEST(ArtefactSphere, AStemIsLeftOutAndCounted) {
+  std::vector<Vec3> points;
+  add_ball(points, {{0, 0, 0}, 10}, kMany, [](int) { return 0.0; });
+  for (int i = 0; i < 500; ++i)
+    points.emplace_back(2 * std::cos(0.1 * i), 2 * std::sin(0.1 * i), -10 - 0.05 * i);
+  ArtefactOptions options;
+  EXPECT_GT(measure_sphere(as_points(points), nullptr, options).form_mm.all, 10);
+  options.stem = LeftOutCone{-Vec3::UnitZ(), 20 * std::numbers::pi / 180};
+  const BallFigures ball = measure_sphere(as_points(points), nullptr, options);
+  EXPECT_LT(ball.form_mm.all, 1e-6);
+  EXPECT_NEAR(static_cast<double>(ball.left_out), 500 + kMany * 0.5 * (1 - std::cos(0.349)), 30);
+  EXPECT_LT(ball.coverage, 0.98);
+}
+
+TEST(ArtefactSphere, ScoresOfPointsThatKnowTheirErrorAreIdeal) {
+  Rig rig;
+  rig.cameras.resize(1);
+  rig.cameras[0].device_from_world = look_at({800, 0, 0}, Vec3::Zero());
+  const Sphere sphere{{0, 0, 0}, 25};
+  const Vec3 eye = rig.cameras[0].center();
+  Random random(5);
+  ArtefactPoints points;
+  points.source = "test";
+  while (points.points.size() < 4000) {
+    const Vec3 d = Vec3(random.normal(), random.normal(), random.normal()).normalized();
+    if (d.x() < 0.3) continue;  // turned away, or grazing
+    const Vec3 on = sphere.radius * d;
+    const double sigma = random.uniform(0.01, 0.05);
+    points.points.push_back(on + random.normal(0, sigma) * (on - eye).normalized());
+    points.sigma.push_back(static_cast<float>(sigma));
+    points.origins.push_back({});
+  }
+  const BallFigures ball = measure_sphere(points, &rig, {});
+  ASSERT_TRUE(ball.z);
+  EXPECT_EQ(ball.z->count, 4000U);
+  EXPECT_EQ(ball.z->missed, 0U);
+  EXPECT_NEAR(ball.z->below_1, 0.683, 0.03);
+  EXPECT_NEAR(ball.z->below_2, 0.954, 0.015);
+  EXPECT_NEAR(ball.z->rms, 1, 0.05);
+  EXPECT_FALSE(measure_sphere(points, nullptr, {}).z) << "where the cameras are is not known";
+}
+
+TEST(ArtefactBallBar, SpacingIsTheErrorOfTheDistance) {
+  std::vector<Vec3> points;
+  Random random(7);
+  const Vec3 along = Vec3(2, 1, -1).normalized();
+  add_ball(points, {100 * along, 15}, 4000, [&](int) { return random.normal(0, 0.01); });
+  add_ball(points, {-100.25 * along, 15}, 1500, [&](int) { return random.normal(0, 0.01); });
+  ArtefactOptions options;
+  options.diameter_mm = 30;
+  options.length_mm = 200;
+  const BallBarFigures bar = measure_ball_bar(as_points(points), nullptr, options);
+  ASSERT_TRUE(bar.spacing_mm);
+  EXPECT_NEAR(bar.spacing_mm->all, 0.25, 0.003);
+  EXPECT_NEAR(bar.spacing_mm->trimmed, 0.25, 0.003);
+  ASSERT_EQ(bar.balls.size(), 2U);
+  EXPECT_EQ(bar.balls[0].points.points.size() + bar.balls[1].points.points.size(), 5500U);
+  for (const BallFigures& ball : bar.balls) EXPECT_LT(ball.form_mm.all, 0.1);
+  EXPECT_EQ(bar.between, 0U);
+}
+
+TEST(ArtefactBallBar, HoldsTheCalibratedRadius) {
+  // Balls half a millimetre larger than calibrated, seen from one side only: a free radius would
+  // not move the centres, a held one moves both the same way, and the distance stays.
+  std::vector<Vec3> points, seen;
+  add_ball(points, {{-80, 0, 0}, 15.25}, 8000, [](int) { return 0.0; });
+  add_ball(points, {{80, 0, 0}, 15.25}, 8000, [](int) { return 0.0; });
+  for (const Vec3& point : points)
+    if (point.z() > 0) seen.push_back(point);
+  ArtefactOptions options;
+  options.diameter_mm = 30;
+  options.length_mm = 160;
+  const BallBarFigures bar = measure_ball_bar(as_points(seen), nullptr, options);
+  EXPECT_NEAR(bar.spacing_mm->all, 0, 1e-3);
+  EXPECT_NEAR(bar.balls[0].size_mm->all, 0.5, 1e-6);
+}
+
+TEST(ArtefactBallBar, TheBarIsLeftOutWhereItIsStatedAndElsewhereNoticed) {
+  std::vector<Vec3> points;
+  add_ball(points, {{-80, 0, 0}, 15}, 6000, [](int) { return 0.0; });
+  add_ball(points, {{80, 0, 0}, 15}, 6000, [](int) { return 0.0; });
+  for (int i = 0; i < 2000; ++i)
+    points.emplace_back(-65 + 0.065 * i, 3 * std::cos(0.1 * i), 3 * std::sin(0.1 * i));
+  ArtefactOptions options;
+  options.diameter_mm = 30;
+  options.length_mm = 160;
+  const BallBarFigures with = measure_ball_bar(as_points(points), nullptr, options);
+  EXPECT_GT(with.between, 1500U);
+  EXPECT_GT(std::abs(with.spacing_mm->all), 0.05);
+  options.bar_diameter_mm = 6;
+  const BallBarFigures without = measure_ball_bar(as_points(points), nullptr, options);
+  EXPECT_NEAR(without.spacing_mm->all, 0, 1e-6);
+  EXPECT_GT(without.balls[0].left_out, 900U);
+}
+
+std::vector<Vec3> plate_points(double thickness, const RigidTransform& world_from_plate,
+                               std::uint64_t seed) {
+  Random random(seed);
+  std::vector<Vec3> points;
+  for (int i = 0; i < 6000; ++i)
+    points.push_back(
+        {random.uniform(-100, 100), random.uniform(-60, 60), random.uniform(-0.02, 0.02)});
+  for (int i = 0; i < 4000 && thickness > 0; ++i)
+    points.push_back({random.uniform(-100, 100), random.uniform(-60, 60), -thickness});
+  for (int i = 0; i < 1000 && thickness > 0; ++i)
+    points.push_back({100, random.uniform(-60, 60), -random.uniform(0, thickness)});
+  for (Vec3& point : points) point = world_from_plate * point;
+  return points;
+}
+
+TEST(ArtefactPlate, FlatnessIsTheRangeOfKnownDeviations) {
+  const RigidTransform pose = look_at({300, 200, 500}, Vec3::Zero()).inverse();
+  std::vector<Vec3> points = plate_points(0, pose, 9);
+  const PlateFigures plate = measure_plate(as_points(points), nullptr, {});
+  EXPECT_NEAR(plate.flatness_mm.all, 0.04, 0.001);
+  EXPECT_LT(plate.flatness_mm.trimmed, plate.flatness_mm.all);
+  EXPECT_NEAR(plate.rectangle.length, 200, 0.5);
+  EXPECT_NEAR(plate.rectangle.width, 120, 0.5);
+  EXPECT_GT(plate.coverage, 0.9);
+  points.push_back(pose * Vec3(0, 0, 7));
+  EXPECT_NEAR(measure_plate(as_points(points), nullptr, {}).flatness_mm.all, 7, 0.05);
+}
+
+TEST(ArtefactPlate, OneOfTwoFacesIsMeasuredAndErrorsBeforeItStay) {
+  const RigidTransform pose = look_at({-300, 100, 400}, Vec3(5, 5, 5)).inverse();
+  std::vector<Vec3> points = plate_points(10, pose, 10);
+  EXPECT_GT(measure_plate(as_points(points), nullptr, {}).flatness_mm.all, 5);
+  ArtefactOptions options;
+  options.plate_thickness_mm = 10;
+  options.border_mm = 2;
+  const PlateFigures plate = measure_plate(as_points(points), nullptr, options);
+  EXPECT_NEAR(plate.flatness_mm.all, 0.04, 0.001);
+  EXPECT_EQ(plate.points.points.size() + plate.left_out, points.size());
+  points.push_back(pose * Vec3(0, 0, 45));
+  EXPECT_NEAR(measure_plate(as_points(points), nullptr, options).flatness_mm.all, 45, 0.1);
+}
+
+TEST(ArtefactPlate, CoverageIsTheShareOfTheStatedPlate) {
+  std::vector<Vec3> points;
+  for (int x = 0; x <= 200; ++x)
+    for (int y = 0; y <= 100; ++y) points.emplace_back(0.5 * x, y, 0);
+  ArtefactOptions options;
+  options.plate_length_mm = 200;  // half of it was measured
+  options.plate_width_mm = 100;
+  // The rectangle is centred on what was measured: 1 % of the diagonal is more on both sides.
+  const PlateFigures plate = measure_plate(as_points(points), nullptr, options);
+  EXPECT_NEAR(plate.coverage, (100 + 2 * 2.236) / 200, 0.01);
+}
+
+TEST(ArtefactFiles, AnyPlyIsReadAndPointsWithoutPositionAreCounted) {
+  const TemporaryFolder folder("artefact_files");
+  write_text(folder.path() / "rival.ply",
+             "ply\nformat ascii 1.0\nelement vertex 3\nproperty double x\nproperty double y\n"
+             "property double z\nproperty uchar red\nend_header\n1 2 3 255\nnan nan nan 0\n"
+             "4 5 6 1\n");
+  const ArtefactPoints rival = read_artefact_points(folder.path() / "rival.ply");
+  ASSERT_EQ(rival.points.size(), 2U);
+  EXPECT_EQ(rival.points[1], Vec3(4, 5, 6));
+  EXPECT_EQ(rival.not_finite, 1U);
+  EXPECT_TRUE(rival.sigma.empty());
+  EXPECT_FALSE(rival.is_mesh);
+  write_mesh(folder.path() / "mesh.ply", make_sphere(10));
+  EXPECT_TRUE(read_artefact_points(folder.path() / "mesh.ply").is_mesh);
+  EXPECT_THROW((void)read_artefact_points(folder.path() / "none.ply"), InputError);
+}
+
+TEST(ArtefactFiles, AnOutputFolderIsOnePositionPerFrame) {
+  const TemporaryFolder folder("artefact_folder");
+  for (const char* frame : {"000001", "000000"})
+    write_points(folder.path() / frame / "points.ply", {MeasuredPoint{}});
+  const auto files = artefact_files(folder.path(), FrameSurface::kPoints);
+  ASSERT_EQ(files.size(), 2U);
+  EXPECT_THAT(files[0].string(), HasSubstr("000000"));
+  EXPECT_EQ(artefact_files(files[0].parent_path(), FrameSurface::kPoints).size(), 1U);
+  EXPECT_THROW((void)artefact_files(folder.path(), FrameSurface::kMesh), InputError);
+  EXPECT_THROW((void)artefact_files(folder.path() / "nothing", FrameSurface::kPoints), InputError);
+}
+
+TEST(ArtefactReport, TheWorstPositionCounts) {
+  ArtefactTest test;
+  test.options.diameter_mm = 40;
+  for (const double error : {0.02, 0.05, 0.01}) {
+    std::vector<Vec3> points;
+    add_ball(points, {{0, 0, 0}, 20 - error}, 2000,
+             [&](int i) { return i % 2 == 0 ? error : -error; });
+    test.spheres.push_back(measure_sphere(as_points(points), nullptr, test.options));
+  }
+  const nlohmann::ordered_json json = artefact_json(test);
+  EXPECT_EQ(json["artefact"], "sphere");
+  EXPECT_EQ(json["positions"].size(), 3U);
+  EXPECT_NEAR(json["worst"]["PF_mm"].get<double>(), 0.1, 1e-3);
+  EXPECT_NEAR(json["worst"]["PS_mm"].get<double>(), -0.1, 1e-3);
+  EXPECT_EQ(json["worst"]["points"], 2000);
+  const std::string html = artefact_html(test, "a <program>");
+  for (const char* text : {"After the manner of", "a &lt;program&gt;", "PF 0.100"})
+    EXPECT_NE(html.find(text), std::string::npos) << text;
+  EXPECT_EQ(html.find("nan"), std::string::npos);
+}
+
+TEST(ArtefactFigures, SayWhenNothingFits) {
+  const ArtefactPoints few = as_points({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}});
+  EXPECT_THROW((void)measure_sphere(few, nullptr, {}), StageError);
+  ArtefactOptions bar;
+  bar.diameter_mm = 10;
+  EXPECT_THROW((void)measure_ball_bar(few, nullptr, bar), StageError);
+  EXPECT_THROW((void)measure_plate(as_points({{0, 0, 0}, {1, 1, 1}}), nullptr, {}), StageError);
+}
+
+}  // namespace
+}  // namespace pencilscan

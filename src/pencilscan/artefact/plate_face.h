@@ -1,0 +1,22 @@
+#pragma once
+
+#include <cstdint>
+
+#include "pencilscan/artefact/artefact_points.h"
+
+namespace pencilscan {
+
+/// A ring of cameras sees both faces of a plate and its rim; flatness is of one face.
+struct PlateFace {
+  double thickness_mm = 1;  ///< of the plate, > 0
+  double border_mm = 0;     ///< at the rim, left out; >= 0
+  std::uint64_t seed = 1;
+};
+
+/// The points of the face that has most of them. The other face lies a thickness behind it: what is
+/// nearer to that than to this face is left out, and so is what lies beyond the rim, less the
+/// border. What lies before the face stays, however far off: it is an error of this face. Where
+/// nothing lies a thickness off on either side, one face was measured and both sides stay.
+[[nodiscard]] ArtefactPoints points_of_face(const ArtefactPoints& points, const PlateFace& face);
+
+}  // namespace pencilscan
