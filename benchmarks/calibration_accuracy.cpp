@@ -10,9 +10,11 @@
 #include <cstdio>
 #include <vector>
 
-#include "pencilscan/calibration/structure.h"
+#include "pencilscan/bundle/bundle_device.h"
+#include "pencilscan/bundle/triangulation.h"
 #include "pencilscan/core/random.h"
 #include "pencilscan/geometry/least_squares.h"
+#include "pencilscan/rig/device_list.h"
 
 namespace {
 

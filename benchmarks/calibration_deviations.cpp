@@ -17,11 +17,13 @@
 #include <map>
 #include <vector>
 
-#include "pencilscan/calibration/priors.h"
-#include "pencilscan/calibration/sample_tracks.h"
-#include "pencilscan/calibration/structure.h"
-#include "pencilscan/calibration/uncertainty.h"
+#include "pencilscan/bundle/bundle_device.h"
+#include "pencilscan/bundle/priors.h"
+#include "pencilscan/bundle/uncertainty.h"
+#include "pencilscan/calibration/rig_frame.h"
+#include "pencilscan/calibration/sample_input.h"
 #include "pencilscan/core/parallel.h"
+#include "pencilscan/rig/sample_ring.h"
 
 namespace {
 

@@ -15,10 +15,11 @@
 #include <vector>
 
 #include "pencilscan/calibration/pair_matches.h"
-#include "pencilscan/calibration/sample_tracks.h"
+#include "pencilscan/calibration/sample_input.h"
 #include "pencilscan/calibration/suspects.h"
 #include "pencilscan/calibration/verdict.h"
 #include "pencilscan/core/parallel.h"
+#include "pencilscan/rig/sample_ring.h"
 
 namespace {
 

@@ -5,6 +5,7 @@ import type {App} from './app';
 import {table, tiles, type Tile} from './charts';
 import {dig, digList, digNumber, type CalibrationEntry, type Json} from './data';
 import {devicesInSpace} from './calibration3d';
+import {lesserParts} from './calibration_tables';
 import {byId, format, h, percent, svg} from './dom';
 import {css, sequential} from './palette';
 
@@ -276,6 +277,7 @@ function showOne(app: App, root: HTMLElement, entry: CalibrationEntry): void {
   if (!shared.length && !residuals.length) root.append(h('p', {}, 'The file holds no residuals and no overlap.'));
   const parameters = parameterTable(devices, unit);
   if (parameters) root.append(parameters);
+  root.append(...lesserParts(report, unit));
   root.append(h('details', {class: 'raw'}, h('summary', {}, `All numbers of ${entry.file} (JSON)`),
     h('pre', {tabindex: 0}, JSON.stringify(report, null, 1).slice(0, 200000))));
 }

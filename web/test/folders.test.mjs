@@ -139,7 +139,13 @@ function calibration(verdict) {
       {grade: verdict, what: 'planar scene: every rig sees a plane alike', advice: 'capture an object with depth'}],
     devices: [device('cam0', -100, 0), device('proj0', 100, 20), {name: 'cam1', width: 640, height: 480, placed: false}],
     points: Array.from({length: 300}, (_, i) => [60 * Math.sin(i), 60 * Math.cos(i), i / 5 - 30]),
-    pairs: [{camera: 'cam0', projector: 'proj0', correspondences: 100}, {camera: 'cam1', projector: 'proj0', correspondences: 0}]};
+    pairs: [{camera: 'cam0', projector: 'proj0', correspondences: 100, inlier_share: 0.93, planar_share: 0.21},
+      {camera: 'cam1', projector: 'proj0', correspondences: 0}],
+    loop: {closed_ring: true, devices: ['cam0', 'proj0'], rotation_deg: 0.01, scale: 1.002, gap: 0.3, gap_px: 0.4},
+    color: {remarks: ['captures are grey: lateral colour is not known'], registration: {devices: [
+      {name: 'cam0', red: {shift_px: [0.31, -0.02], shift_sigma_px: [0.01, 0.01]}, green: {}, blue: {}}]}},
+    decoding: [{capture: 0, projector: 'proj0', camera: 'cam0', valid_share_of_lit: 0.97, correspondences: 88,
+      pixels: {valid: 9700, unlit: 1200, saturated: 3}}]};
 }
 
 test('a calibration begins with its verdict, the gravest reason first, and shows its devices in space', async () => {
@@ -166,6 +172,9 @@ test('a calibration begins with its verdict, the gravest reason first, and shows
     await looksNew(page, '.space', seen, 'turned');
     assert.match(await page.locator('#calibration').innerText(), /2 of 3 devices placed/);
     assert.equal(await page.locator('.residuals').count(), 2);
+    const text = await page.locator('#calibration').innerText();
+    for (const part of [/Once round the ring \(cam0, proj0 and back to cam0\)/, /captures are grey/, /0\.31, -0\.02 ± 0\.01/,
+      /proj0 \/ cam0\s+100\s+93\.0\s%\s+21\.0\s%/, /1, proj0 \/ cam0\s+9\s700\s+1\s200\s+3\s+97\.0\s%\s+88/]) assert.match(text, part);
     await page.context().close();
   }
 });

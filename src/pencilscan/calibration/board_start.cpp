@@ -13,9 +13,10 @@
 #include <optional>
 #include <set>
 
-#include "pencilscan/calibration/board_corners.h"
-#include "pencilscan/calibration/priors.h"
-#include "pencilscan/calibration/structure.h"
+#include "pencilscan/bundle/board_corners.h"
+#include "pencilscan/bundle/bundle_device.h"
+#include "pencilscan/bundle/priors.h"
+#include "pencilscan/calibration/rig_frame.h"
 #include "pencilscan/core/median.h"
 
 namespace pencilscan {

@@ -4,12 +4,15 @@
 #include <cmath>
 #include <limits>
 
-#include "pencilscan/calibration/board_corners.h"
+#include "pencilscan/bundle/board_corners.h"
+#include "pencilscan/bundle/bundle_device.h"
+#include "pencilscan/bundle/priors.h"
+#include "pencilscan/bundle/triangulation.h"
+#include "pencilscan/bundle/uncertainty.h"
 #include "pencilscan/calibration/board_start.h"
-#include "pencilscan/calibration/priors.h"
+#include "pencilscan/calibration/rig_frame.h"
 #include "pencilscan/calibration/structure.h"
 #include "pencilscan/calibration/suspects.h"
-#include "pencilscan/calibration/uncertainty.h"
 #include "pencilscan/core/median.h"
 #include "pencilscan/core/parallel.h"
 

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "pencilscan/calibration/bundle.h"
+#include "pencilscan/bundle/bundle.h"
 #include "pencilscan/calibration/pair_geometry.h"
 #include "pencilscan/core/progress.h"
 #include "pencilscan/rig/rig.h"

@@ -7,7 +7,7 @@
 #include <numbers>
 #include <optional>
 
-#include "pencilscan/calibration/structure.h"
+#include "pencilscan/bundle/bundle_device.h"
 #include "pencilscan/core/median.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/geometry/least_squares.h"

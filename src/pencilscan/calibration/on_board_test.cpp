@@ -4,9 +4,10 @@
 #include <array>
 #include <cmath>
 
-#include "pencilscan/calibration/board.h"
+#include "pencilscan/boards/board.h"
+#include "pencilscan/bundle/bundle_device.h"
+#include "pencilscan/bundle/priors.h"
 #include "pencilscan/calibration/board_start.h"
-#include "pencilscan/calibration/priors.h"
 #include "pencilscan/calibration/verdict.h"
 #include "pencilscan/core/random.h"
 #include "pencilscan/rig/sample_devices.h"

@@ -1,7 +1,5 @@
 #include "pencilscan/calibration/structure.h"
 
-#include <ceres/rotation.h>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -10,6 +8,8 @@
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core/eigen.hpp>
 
+#include "pencilscan/bundle/bundle_device.h"
+#include "pencilscan/bundle/triangulation.h"
 #include "pencilscan/core/median.h"
 #include "pencilscan/geometry/least_squares.h"
 
@@ -217,73 +217,6 @@ void grow_from_present(BundleProblem& problem, const std::vector<std::size_t>& t
 }
 
 }  // namespace
-
-RigidTransform transform_from(const std::array<double, 6>& pose) {
-  RigidTransform transform;
-  ceres::AngleAxisToRotationMatrix(pose.data(), transform.rotation.data());
-  transform.translation = Vec3(pose[3], pose[4], pose[5]);
-  return transform;
-}
-
-std::array<double, 6> pose_from(const RigidTransform& transform) {
-  std::array<double, 6> pose{};
-  ceres::RotationMatrixToAngleAxis(transform.rotation.data(), pose.data());
-  std::copy_n(transform.translation.data(), 3, pose.begin() + 3);
-  return pose;
-}
-
-Mat3 rotation_of(const BundleDevice& device) { return transform_from(device.pose).rotation; }
-
-Vec3 center_of(const BundleDevice& device) {
-  return -rotation_of(device).transpose() * Vec3(device.pose[3], device.pose[4], device.pose[5]);
-}
-
-Vec3 device_ray(const BundleDevice& device, const Vec2& pixel) {
-  const Vec2 bent((pixel.x() - device.inner[kCx]) / device.inner[kFx],
-                  (pixel.y() - device.inner[kCy]) / device.inner[kFy]);
-  const std::array<double, 5> distortion{device.inner[kK1], device.inner[kK2], device.inner[kP1],
-                                         device.inner[kP2], device.inner[kK3]};
-  const Vec2 straight = undistort(distortion, bent);
-  return straight.allFinite() && straight.norm() < 10 ? straight.homogeneous() : bent.homogeneous();
-}
-
-std::optional<Vec3> triangulate(const BundleProblem& problem, const Track& track,
-                                double least_angle_rad) {
-  Mat3 normal = Mat3::Zero();
-  Vec3 right = Vec3::Zero();
-  std::vector<std::pair<Vec3, Vec3>> rays;
-  for (const TrackView& view : track.views) {
-    const BundleDevice& device = problem.devices[view.device];
-    if (!device.present) continue;
-    const Mat3 R = rotation_of(device);
-    const Vec3 direction = (R.transpose() * device_ray(device, view.pixel)).normalized();
-    const Vec3 center = -R.transpose() * Vec3(device.pose[3], device.pose[4], device.pose[5]);
-    const Mat3 across = Mat3::Identity() - direction * direction.transpose();
-    normal += across;
-    right += across * center;
-    rays.emplace_back(center, direction);
-  }
-  if (rays.size() < 2) return std::nullopt;
-  double widest = 0;
-  for (std::size_t i = 1; i < rays.size(); ++i)
-    widest = std::max(widest, rays[0].second.cross(rays[i].second).norm());
-  if (widest < std::sin(least_angle_rad)) return std::nullopt;
-  const Vec3 point = solve_symmetric(normal, right);
-  for (const auto& [center, direction] : rays)
-    if (!(direction.dot(point - center) > 0)) return std::nullopt;
-  return point;
-}
-
-void triangulate_all(BundleProblem& problem, double least_angle_rad) {
-  problem.used.assign(problem.tracks.size(), 0);
-  problem.points.resize(problem.tracks.size(), Vec3::Zero());
-  for (std::size_t t = 0; t < problem.tracks.size(); ++t) {
-    const auto point = triangulate(problem, problem.tracks[t], least_angle_rad);
-    if (!point) continue;
-    problem.points[t] = *point;
-    problem.used[t] = 1;
-  }
-}
 
 double build_structure(BundleProblem& problem, unsigned free_inner,
                        const StructureOptions& options) {

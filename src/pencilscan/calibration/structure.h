@@ -1,6 +1,6 @@
 #pragma once
 
-#include "pencilscan/calibration/bundle.h"
+#include "pencilscan/bundle/bundle.h"
 
 namespace pencilscan {
 
@@ -18,20 +18,5 @@ struct StructureOptions {
 /// Returns the robust cost per view; devices that cannot be joined stay absent.
 double build_structure(BundleProblem& problem, unsigned free_inner,
                        const StructureOptions& options = {});
-
-/// Point nearest to the rays of the present devices; nothing when they are parallel or it lies
-/// behind one.
-[[nodiscard]] std::optional<Vec3> triangulate(const BundleProblem& problem, const Track& track,
-                                              double least_angle_rad);
-/// Points of all tracks anew; those without one become unused.
-void triangulate_all(BundleProblem& problem, double least_angle_rad);
-
-/// Direction (z = 1) of a pixel in the device's frame.
-[[nodiscard]] Vec3 device_ray(const BundleDevice& device, const Vec2& pixel);
-/// Poses as the adjustment holds them (angle-axis, then translation), and back.
-[[nodiscard]] RigidTransform transform_from(const std::array<double, 6>& pose);
-[[nodiscard]] std::array<double, 6> pose_from(const RigidTransform& transform);
-[[nodiscard]] Mat3 rotation_of(const BundleDevice& device);
-[[nodiscard]] Vec3 center_of(const BundleDevice& device);
 
 }  // namespace pencilscan

@@ -5,7 +5,7 @@
 #include <map>
 #include <set>
 
-#include "pencilscan/calibration/structure.h"
+#include "pencilscan/bundle/bundle_device.h"
 
 namespace pencilscan {
 namespace {

@@ -6,9 +6,9 @@
 #include <optional>
 #include <tuple>
 
-#include "pencilscan/calibration/local_map.h"
 #include "pencilscan/core/check.h"
 #include "pencilscan/core/parallel.h"
+#include "pencilscan/gray/local_map.h"
 
 namespace pencilscan {
 namespace {

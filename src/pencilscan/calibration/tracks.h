@@ -1,37 +1,13 @@
 #pragma once
 
 #include <cstdint>
-#include <span>
 #include <vector>
 
-#include "pencilscan/calibration/gray_decode.h"
-#include "pencilscan/geometry/types.h"
+#include "pencilscan/bundle/observations.h"
+#include "pencilscan/gray/gray_decode.h"
 #include "pencilscan/rig/device_list.h"
 
 namespace pencilscan {
-
-/// One device's view of a surface point. Devices are numbered cameras first, then projectors.
-struct TrackView {
-  std::size_t device = 0;
-  Vec2 pixel = Vec2::Zero();
-  double sigma_px = 0;  ///< of each coordinate, one standard deviation, > 0
-};
-
-/// A surface point seen by two or more devices. All views but the hub are measured at the hub's
-/// pixel, which is exact by definition: a camera pixel that several projectors light, or a panel
-/// pixel that several cameras see. So camera-projector, camera-camera (through a panel pixel) and
-/// projector-projector correspondences (through a camera pixel) come together.
-struct Track {
-  std::vector<TrackView> views;  ///< views[0] is the hub
-  std::size_t capture = 0;       ///< object pose; pieces of one capture do not move
-};
-
-/// A device's view of a track; null when it has none.
-[[nodiscard]] inline const TrackView* view_in(const Track& track, std::size_t device) {
-  for (const TrackView& view : track.views)
-    if (view.device == device) return &view;
-  return nullptr;
-}
 
 struct GrayTrackOptions {
   int spacing_px = 16;             ///< of the lattices of hub pixels, >= 8: windows do not overlap

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "pencilscan/bundle/bundle_device.h"
 #include "pencilscan/calibration/suspects.h"
 
 namespace pencilscan {

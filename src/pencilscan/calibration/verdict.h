@@ -3,8 +3,8 @@
 #include <string>
 #include <vector>
 
+#include "pencilscan/bundle/uncertainty.h"
 #include "pencilscan/calibration/calibrate.h"
-#include "pencilscan/calibration/uncertainty.h"
 
 namespace pencilscan {
 

@@ -342,6 +342,20 @@ PageReport write_report(const fs::path& root, const fs::path& file, const PageOp
   return report;
 }
 
+std::string calibration_page(const ordered_json& calibration, const std::string& title,
+                             const std::string& program) {
+  const ordered_json none = ordered_json::array();
+  return served_page({{"format", "pencilscan-page/1"},
+                      {"mode", "report"},
+                      {"program", program},
+                      {"title", title},
+                      {"rigs", none},
+                      {"results", none},
+                      {"experiment", nullptr},
+                      {"failed", none},
+                      {"calibrations", {{{"file", "calibration.json"}, {"report", calibration}}}}});
+}
+
 std::string served_page(const ordered_json& index) {
   const PageAssets assets = page_assets();
   std::string page(assets.head);

@@ -68,6 +68,10 @@ class PageData {
                                       const PageOptions& options = {},
                                       const Progress& progress = {});
 
+/// The page of one calibration (calibration.json), whole in one HTML file.
+[[nodiscard]] std::string calibration_page(const nlohmann::ordered_json& calibration,
+                                           const std::string& title, const std::string& program);
+
 /// The page without data, which asks the server for it. `index` is embedded.
 [[nodiscard]] std::string served_page(const nlohmann::ordered_json& index);
 

@@ -303,6 +303,17 @@ TEST_F(Folder, AnEmptyFolderGivesAPage) {
   EXPECT_THROW(static_cast<void>(find_results(root_ / "none")), InputError);
 }
 
+TEST_F(Folder, ACalibrationsOwnPageHoldsWhatTheReportOfItsFolderDoes) {
+  const nlohmann::ordered_json calibration = {{"verdict", "good"}, {"rms_px", 0.125}};
+  write_json(root_ / "calibration.json", calibration);
+  const auto of_folder = index_of(report());
+  const auto alone = index_of(calibration_page(calibration, "Calibration", "pencilscan"));
+  EXPECT_EQ(alone["calibrations"], of_folder["calibrations"]);
+  for (const auto& [key, value] : of_folder.items()) EXPECT_TRUE(alone.contains(key)) << key;
+  EXPECT_EQ(alone["mode"], "report");
+  EXPECT_EQ(alone["title"], "Calibration");
+}
+
 TEST_F(Folder, NamesCannotLeaveTheirPlaceInThePage) {
   sample::write_output(root_, 1);
   PageOptions options;

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <optional>
 
-#include "pencilscan/calibration/local_map.h"
 #include "pencilscan/core/parallel.h"
+#include "pencilscan/gray/local_map.h"
 #include "pencilscan/surface/poisson.h"
 
 namespace pencilscan {

@@ -2,8 +2,8 @@
 
 #include <vector>
 
-#include "pencilscan/calibration/gray_decode.h"
 #include "pencilscan/geometry/mesh.h"
+#include "pencilscan/gray/gray_decode.h"
 #include "pencilscan/io/point_file.h"
 #include "pencilscan/rig/rig.h"
 #include "pencilscan/surface/sample.h"
@@ -24,7 +24,7 @@ struct GrayScan {
 };
 
 /// Triangulates every decoded pixel of a lattice: camera ray and panel ray, each panel coordinate
-/// from a quadratic through its surroundings (calibration/local_map.h). Normals come from the
+/// from a quadratic through its surroundings (gray/local_map.h). Normals come from the
 /// slopes of that quadratic. sigma is along the camera ray.
 [[nodiscard]] GrayScan gray_scan(const Rig& rig, std::size_t camera, std::size_t projector,
                                  const DecodedView& decoded, const GrayScanOptions& options = {});

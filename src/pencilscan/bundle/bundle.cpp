@@ -1,0 +1,232 @@
+#include "pencilscan/bundle/bundle.h"
+
+#include <ceres/ceres.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <memory>
+
+#include "pencilscan/bundle/board_corners.h"
+#include "pencilscan/bundle/bundle_device.h"
+#include "pencilscan/bundle/reprojection.h"
+#include "pencilscan/core/check.h"
+
+namespace pencilscan {
+namespace {
+
+/// (p - p0) / sigma per inner parameter, fy's on fy / fx.
+struct PriorCost {
+  std::array<double, kIntrinsics> value;
+  std::array<double, kIntrinsics> weight;  ///< 1 / sigma; 0 for none
+
+  template <typename T>
+  bool operator()(const T* inner, T* residual) const {
+    for (std::size_t i = 0; i < kIntrinsics; ++i) {
+      const T p = i == kFy ? inner[kFy] / inner[kFx] : inner[i];
+      residual[i] = (p - T(value[i])) * T(weight[i]);
+    }
+    return true;
+  }
+};
+
+Mat3 rotation(const BundleDevice& device) {
+  Mat3 R;
+  ceres::AngleAxisToRotationMatrix(device.pose.data(), R.data());
+  return R;
+}
+
+Vec3 center(const BundleDevice& device) {
+  return -rotation(device).transpose() * Vec3(device.pose[3], device.pose[4], device.pose[5]);
+}
+
+double prior_weight(double sigma) { return sigma > 0 && std::isfinite(sigma) ? 1 / sigma : 0; }
+
+/// Inner parameters that stay: not asked for, or known exactly.
+std::vector<int> constant_inner(const BundleDevice& device, unsigned free_inner) {
+  std::vector<int> constant;
+  for (int i = 0; i < kIntrinsics; ++i) {
+    const bool free = (free_inner >> static_cast<unsigned>(i) & 1U) != 0;
+    if (!free || device.prior_sigma[static_cast<std::size_t>(i)] == 0) constant.push_back(i);
+  }
+  return constant;
+}
+
+class ProblemBuilder {
+ public:
+  ProblemBuilder(BundleProblem& from, const BundleOptions& options)
+      : from_(from), options_(options), in_use_(from.devices.size(), 0) {
+    ceres::Problem::Options settings;
+    settings.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+    problem_ = std::make_unique<ceres::Problem>(settings);
+    loss_ = std::make_unique<ceres::CauchyLoss>(options.loss_scale);
+    track_loss_ = std::make_unique<ceres::ScaledLoss>(loss_.get(), options.track_weight,
+                                                      ceres::DO_NOT_TAKE_OWNERSHIP);
+    ordering_ = std::make_shared<ceres::ParameterBlockOrdering>();
+  }
+
+  void add_tracks() {
+    std::vector<std::size_t> chosen;
+    for (std::size_t t = 0; t < from_.tracks.size(); ++t)
+      if (from_.used[t] != 0) chosen.push_back(t);
+    const std::size_t count =
+        options_.max_tracks == 0 ? chosen.size() : std::min(options_.max_tracks, chosen.size());
+    for (std::size_t i = 0; i < count; ++i) add_track(chosen[i * chosen.size() / count]);
+  }
+
+  void add_boards() {
+    using Cost = ceres::AutoDiffCostFunction<BoardCost, 2, 6, kIntrinsics, 6>;
+    for (const BoardView& seen : from_.board_views) {
+      BundleDevice& device = from_.devices[seen.view.device];
+      if (!device.present) continue;
+      auto* cost = new Cost(new BoardCost{{seen.view.pixel, sigma(seen.view)}, seen.position_mm});
+      add(cost, loss_.get(), seen.view.device, from_.board_poses[seen.board].data());
+      ordering_->AddElementToGroup(from_.board_poses[seen.board].data(), 1);
+    }
+  }
+
+  void add_devices() {
+    std::size_t first = from_.devices.size();
+    for (std::size_t d = 0; d < from_.devices.size(); ++d) {
+      if (in_use_[d] == 0) continue;
+      BundleDevice& device = from_.devices[d];
+      add_prior(device);
+      const std::vector<int> constant = constant_inner(device, options_.free_inner);
+      if (constant.size() == kIntrinsics) {
+        problem_->SetParameterBlockConstant(device.inner.data());
+      } else if (!constant.empty()) {
+        problem_->SetManifold(device.inner.data(),
+                              new ceres::SubsetManifold(kIntrinsics, constant));
+      }
+      if (first == from_.devices.size() || !options_.free_poses)
+        problem_->SetParameterBlockConstant(device.pose.data());
+      if (first == from_.devices.size()) first = d;
+      ordering_->AddElementToGroup(device.pose.data(), 1);
+      ordering_->AddElementToGroup(device.inner.data(), 1);
+    }
+    if (options_.free_poses && !boards_join_devices(from_.board_views)) hold_scale(first);
+  }
+
+  /// Keeps the translation component that scaling the scene about the first device changes most.
+  void hold_scale(std::size_t first) {
+    if (first == from_.devices.size()) return;
+    const Vec3 origin = center(from_.devices[first]);
+    double farthest = 0;
+    std::size_t device = first;
+    int component = 0;
+    for (std::size_t d = first + 1; d < from_.devices.size(); ++d) {
+      if (in_use_[d] == 0) continue;
+      const Vec3 offset = rotation(from_.devices[d]) * (center(from_.devices[d]) - origin);
+      int largest = 0;
+      const double size = offset.cwiseAbs().maxCoeff(&largest);
+      if (size <= farthest) continue;
+      farthest = size;
+      device = d;
+      component = 3 + largest;
+    }
+    if (device != first)
+      problem_->SetManifold(from_.devices[device].pose.data(),
+                            new ceres::SubsetManifold(6, {component}));
+  }
+
+  BundleSummary solve() {
+    ceres::Solver::Options solver;
+    solver.linear_solver_type = ceres::DENSE_SCHUR;
+    solver.linear_solver_ordering = ordering_;
+    solver.num_threads = 1;
+    solver.max_num_iterations = options_.max_iterations;
+    solver.function_tolerance = options_.function_tolerance;
+    solver.parameter_tolerance = 1e-10;
+    solver.logging_type = ceres::SILENT;
+    ceres::Solver::Summary summary;
+    ceres::Solve(solver, problem_.get(), &summary);
+    const double cost =
+        summary.IsSolutionUsable() ? summary.final_cost : std::numeric_limits<double>::infinity();
+    return {cost, static_cast<int>(summary.iterations.size()), views_,
+            summary.termination_type == ceres::CONVERGENCE};
+  }
+
+  [[nodiscard]] bool empty() const { return views_ == 0; }
+
+ private:
+  [[nodiscard]] double sigma(const TrackView& view) const {
+    return std::hypot(view.sigma_px, options_.extra_sigma_px);
+  }
+
+  void add(ceres::CostFunction* cost, ceres::LossFunction* loss, std::size_t d, double* last) {
+    problem_->AddResidualBlock(cost, loss, from_.devices[d].pose.data(),
+                               from_.devices[d].inner.data(), last);
+    in_use_[d] = 1;
+    ++views_;
+  }
+
+  void add_track(std::size_t t) {
+    using Cost = ceres::AutoDiffCostFunction<ReprojectionCost, 2, 6, kIntrinsics, 3>;
+    for (const TrackView& view : from_.tracks[t].views) {
+      if (!from_.devices[view.device].present) continue;
+      const bool is_hub = &view == from_.tracks[t].views.data();
+      const double deviation = is_hub ? view.sigma_px : sigma(view);
+      // The hub's pixel is no measurement but the place where the others were taken.
+      add(new Cost(new ReprojectionCost{view.pixel, deviation}),
+          is_hub ? nullptr : track_loss_.get(), view.device, from_.points[t].data());
+    }
+    ordering_->AddElementToGroup(from_.points[t].data(), 0);
+  }
+
+  void add_prior(BundleDevice& device) {
+    using Cost = ceres::AutoDiffCostFunction<PriorCost, kIntrinsics, kIntrinsics>;
+    auto* prior = new PriorCost{device.prior, {}};
+    for (std::size_t i = 0; i < kIntrinsics; ++i)
+      prior->weight[i] = prior_weight(device.prior_sigma[i]);
+    problem_->AddResidualBlock(new Cost(prior), nullptr, device.inner.data());
+  }
+
+  BundleProblem& from_;
+  const BundleOptions& options_;
+  std::unique_ptr<ceres::LossFunction> loss_;
+  std::unique_ptr<ceres::LossFunction> track_loss_;
+  std::unique_ptr<ceres::Problem> problem_;
+  std::shared_ptr<ceres::ParameterBlockOrdering> ordering_;
+  std::vector<char> in_use_;
+  std::size_t views_ = 0;
+};
+
+}  // namespace
+
+BundleSummary adjust(BundleProblem& problem, const BundleOptions& options) {
+  PENCILSCAN_CHECK(problem.points.size() == problem.tracks.size());
+  PENCILSCAN_CHECK(problem.used.size() == problem.tracks.size());
+  ProblemBuilder builder(problem, options);
+  builder.add_tracks();
+  builder.add_boards();
+  if (builder.empty()) return {};
+  builder.add_devices();
+  return builder.solve();
+}
+
+std::size_t present_devices(const BundleProblem& problem) {
+  return static_cast<std::size_t>(std::count_if(problem.devices.begin(), problem.devices.end(),
+                                                [](const BundleDevice& d) { return d.present; }));
+}
+
+std::optional<Vec2> view_error(const BundleDevice& device, const Vec3& point,
+                               const TrackView& view) {
+  Vec2 pixel;
+  if (!project_point(device.pose.data(), device.inner.data(), point.data(), pixel.data()))
+    return std::nullopt;
+  return pixel - view.pixel;
+}
+
+ViewLinearization linearize(const BundleDevice& device, const Vec3& point, const TrackView& view,
+                            double extra_sigma_px) {
+  const ceres::AutoDiffCostFunction<ReprojectionCost, 2, 6, kIntrinsics, 3> cost(
+      new ReprojectionCost{view.pixel, std::hypot(view.sigma_px, extra_sigma_px)});
+  ViewLinearization result;
+  const std::array<const double*, 3> parameters{device.pose.data(), device.inner.data(),
+                                                point.data()};
+  std::array<double*, 3> jacobians{result.pose.data(), result.inner.data(), result.point.data()};
+  PENCILSCAN_CHECK(cost.Evaluate(parameters.data(), result.residual.data(), jacobians.data()));
+  return result;
+}
+
+}  // namespace pencilscan

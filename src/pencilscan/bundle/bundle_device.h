@@ -1,0 +1,40 @@
+#pragma once
+
+#include <array>
+
+#include "pencilscan/geometry/device.h"
+
+namespace pencilscan {
+
+/// Inner parameters of a device, in this order.
+enum Intrinsic { kFx, kFy, kCx, kCy, kK1, kK2, kP1, kP2, kK3, kIntrinsics };
+inline constexpr std::array<const char*, kIntrinsics> kIntrinsicNames{"fx", "fy", "cx", "cy", "k1",
+                                                                      "k2", "p1", "p2", "k3"};
+
+/// A device as the adjustment sees it.
+struct BundleDevice {
+  std::array<double, 6> pose{};  ///< device_from_world: angle-axis, then translation
+  std::array<double, kIntrinsics> inner{};
+  /// What is known beforehand: value and one standard deviation (0: held exactly at the value;
+  /// infinity: nothing known). fy's is on fy / fx.
+  std::array<double, kIntrinsics> prior{};
+  std::array<double, kIntrinsics> prior_sigma{};
+  bool present = false;  ///< has a pose and takes part
+};
+
+[[nodiscard]] BundleDevice bundle_device(const Device& device);
+/// Writes K, distortion and pose back.
+void set_device(const BundleDevice& from, Device& device);
+
+/// device_from_world.
+void set_pose(BundleDevice& device, const Mat3& rotation, const Vec3& translation);
+
+/// Direction (z = 1) of a pixel in the device's frame.
+[[nodiscard]] Vec3 device_ray(const BundleDevice& device, const Vec2& pixel);
+/// Poses as the adjustment holds them (angle-axis, then translation), and back.
+[[nodiscard]] RigidTransform transform_from(const std::array<double, 6>& pose);
+[[nodiscard]] std::array<double, 6> pose_from(const RigidTransform& transform);
+[[nodiscard]] Mat3 rotation_of(const BundleDevice& device);
+[[nodiscard]] Vec3 center_of(const BundleDevice& device);
+
+}  // namespace pencilscan

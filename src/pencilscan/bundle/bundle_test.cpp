@@ -1,0 +1,105 @@
+#include "pencilscan/bundle/bundle.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "pencilscan/bundle/sample_tracks.h"
+#include "pencilscan/bundle/triangulation.h"
+
+namespace pencilscan {
+namespace {
+
+using namespace sample;
+
+TEST(Reprojection, JacobianMatchesFiniteDifferences) {
+  const Rig rig = ring(1, 1);
+  BundleDevice device = bundle_device(rig.cameras[0]);
+  device.inner[kP1] = 0.01;
+  device.inner[kP2] = -0.02;
+  device.inner[kK3] = 0.05;
+  const Vec3 point(40, -60, 30);
+  const TrackView view{0, Vec2(600, 500), 0.1};
+  const ViewLinearization at = linearize(device, point, view);
+  constexpr double kTolerance = 1e-4;  // of central differences with these steps
+  for (Eigen::Index i = 0; i < 18; ++i) {
+    const double step = i < 6 ? 1e-6 : i < 10 ? 1e-3 : 1e-6;
+    const auto moved = [&](double by) {
+      BundleDevice d = device;
+      Vec3 x = point;
+      if (i < 6)
+        d.pose[static_cast<std::size_t>(i)] += by;
+      else if (i < 15)
+        d.inner[static_cast<std::size_t>(i - 6)] += by;
+      else
+        x[i - 15] += by;
+      return linearize(d, x, view).residual;
+    };
+    const Vec2 numeric = (moved(step) - moved(-step)) / (2 * step);
+    Vec2 analytic = at.point.col(std::max<Eigen::Index>(i - 15, 0));
+    if (i < 6) analytic = at.pose.col(i);
+    if (i >= 6 && i < 15) analytic = at.inner.col(i - 6);
+    EXPECT_LT((numeric - analytic).norm(), kTolerance * (1 + analytic.norm())) << i;
+  }
+}
+
+TEST(Reprojection, AgreesWithTheDeviceModel) {
+  const Rig rig = ring(1, 1);
+  const Vec3 point(40, -60, 30);
+  const auto error = view_error(bundle_device(rig.projectors[0]), point,
+                                {0, *rig.projectors[0].project(point), 1});
+  ASSERT_TRUE(error.has_value());
+  EXPECT_LT(error->norm(), 1e-9);
+}
+
+/// A start that cannot be adjusted must not look like the best one.
+TEST(Adjust, WhatCannotBeTakenCostsInfinitely) {
+  const Rig truth = ring(1, 1);
+  BundleProblem problem;
+  for (std::size_t d = 0; d < device_count(truth); ++d) {
+    problem.devices.push_back(bundle_device(device_at(truth, d)));
+    problem.devices.back().present = true;
+  }
+  problem.tracks = tracks_of(truth, {.count = 50});
+  triangulate_all(problem, 0.01);
+  EXPECT_TRUE(std::isfinite(adjust(problem, {}).cost));
+  const Device& camera = truth.cameras[0];
+  problem.points[0] = camera.center() - 100 * camera.forward();  // behind it
+  problem.used[0] = 1;
+  EXPECT_EQ(adjust(problem, {}).cost, std::numeric_limits<double>::infinity());
+}
+
+/// Against priors, a quarter of the weight is twice the deviation.
+TEST(Adjust, AQuarterOfTheWeightIsTwiceTheDeviation) {
+  const Rig truth = ring(2, 2);
+  const auto adjusted = [&](double noise_factor, double weight) {
+    BundleProblem problem;
+    for (std::size_t d = 0; d < device_count(truth); ++d) {
+      problem.devices.push_back(bundle_device(device_at(truth, d)));
+      BundleDevice& device = problem.devices.back();
+      device.present = true;
+      device.prior_sigma.fill(0);
+      device.prior_sigma[kFx] = 30;
+      device.prior_sigma[kFy] = 1e-6;
+      device.prior[kFx] += 30;  // data and prior disagree
+    }
+    problem.tracks = tracks_of(truth, {.count = 60, .noise_px = 0.5});
+    triangulate_all(problem, 0.01);
+    for (Track& track : problem.tracks)
+      for (std::size_t i = 1; i < track.views.size(); ++i) track.views[i].sigma_px *= noise_factor;
+    adjust(problem, {.free_inner = 1U << kFx | 1U << kFy,
+                     .loss_scale = 1e3,  // squares: the loss itself has no scale
+                     .track_weight = weight,
+                     .max_iterations = 200,
+                     .function_tolerance = 1e-14});
+    return problem.devices[0].inner[kFx];
+  };
+  const double truth_fx = truth.cameras[0].K(0, 0);
+  EXPECT_NEAR(adjusted(2, 1), adjusted(1, 0.25), 0.01);
+  EXPECT_GT(adjusted(2, 1), truth_fx + 1);  // not decided by the data alone
+  EXPECT_GT(std::abs(adjusted(2, 1) - adjusted(1, 1)), 0.1);
+}
+
+}  // namespace
+}  // namespace pencilscan

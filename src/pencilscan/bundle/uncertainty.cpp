@@ -1,0 +1,278 @@
+#include "pencilscan/bundle/uncertainty.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numeric>
+#include <tuple>
+
+#include "pencilscan/bundle/board_corners.h"
+#include "pencilscan/bundle/bundle_device.h"
+#include "pencilscan/bundle/reduced_equations.h"
+#include "pencilscan/bundle/triangulation.h"
+#include "pencilscan/core/median.h"
+#include "pencilscan/core/random.h"
+#include "pencilscan/geometry/least_squares.h"
+
+namespace pencilscan {
+namespace {
+
+constexpr Eigen::Index kPose = ReducedEquations::kPose;
+constexpr Eigen::Index kBlock = ReducedEquations::kBlock;
+
+/// How poses change under the similarities of the world about `middle`: turn, shift, and scale
+/// where no board gives it.
+Eigen::MatrixXd gauge(const BundleProblem& problem, const Vec3& middle) {
+  const auto count = static_cast<Eigen::Index>(problem.devices.size());
+  Eigen::MatrixXd G = Eigen::MatrixXd::Zero(kBlock * count, 7);
+  for (Eigen::Index d = 0; d < count; ++d) {
+    const BundleDevice& device = problem.devices[static_cast<std::size_t>(d)];
+    if (!device.present) continue;
+    const Mat3 R = rotation_of(device);
+    // X' = X + w x (X - m) + v + s (X - m); the device's frame turns and moves along.
+    G.block<3, 3>(kBlock * d, 0) = -R;
+    for (Eigen::Index k = 0; k < 3; ++k)
+      G.block<3, 1>(kBlock * d + 3, k) = R * middle.cross(Vec3::Unit(k)) * -1;
+    G.block<3, 3>(kBlock * d + 3, 3) = -R;
+    const Vec3 t(device.pose[3], device.pose[4], device.pose[5]);
+    G.block<3, 1>(kBlock * d + 3, 6) = t + R * middle;
+  }
+  if (boards_join_devices(problem.board_views)) G.conservativeResize(Eigen::NoChange, 6);
+  return G;
+}
+
+/// Error that neighbours in an image share, px, as far as residuals show it: what the means of
+/// cells scatter beyond what as many independent errors would. Lenses unlike the model, texture and
+/// light from elsewhere make neighbours err alike. 0 where chance explains the means (to one
+/// standard error).
+double visible_shared_error(const BundleProblem& problem) {
+  constexpr int kCells = 8;  // along an image's width
+  constexpr double kFewest = 5;
+  struct Cell {
+    Vec2 sum = Vec2::Zero();
+    double squares = 0;
+    double count = 0;
+  };
+  std::map<std::tuple<std::size_t, int, int>, Cell> cells;
+  for_each_residual(problem, [&](std::size_t, const TrackView& view, const Vec2& error) {
+    const double size = (2 * problem.devices[view.device].prior[kCx] + 1) / kCells;
+    Cell& cell = cells[{view.device, static_cast<int>(view.pixel.x() / size),
+                        static_cast<int>(view.pixel.y() / size)}];
+    cell.sum += error;
+    cell.squares += error.squaredNorm();
+    cell.count += 1;
+  });
+  double sum = 0;
+  double squares = 0;
+  double count = 0;
+  for (const auto& [key, cell] : cells) {
+    if (cell.count < kFewest) continue;
+    const double of_mean = cell.sum.squaredNorm() / (cell.count * cell.count);
+    const double by_chance = cell.squares / (cell.count * cell.count);
+    const double shared = (of_mean - by_chance) / 2;
+    sum += shared;
+    squares += shared * shared;
+    count += 1;
+  }
+  if (count < 2) return 0;
+  const double mean = sum / count;
+  const double error = std::sqrt(std::max(0.0, squares / count - mean * mean) / count);
+  return mean > error ? std::sqrt(mean) : 0;
+}
+
+/// R with R R' = a symmetric positive semi-definite matrix.
+Eigen::MatrixXd square_root(const Eigen::MatrixXd& matrix) {
+  const SymmetricEigen eigen = symmetric_eigen(matrix);
+  return eigen.vectors * eigen.values.cwiseMax(0).cwiseSqrt().asDiagonal();
+}
+
+struct Covariance {
+  std::vector<Eigen::Index> at;  ///< rows of the full system that are free
+  Eigen::MatrixXd matrix;
+  Eigen::MatrixXd root;  ///< matrix = root * root'
+};
+
+/// Of random errors and of systematic ones; `found.shared_px` and its weight are found on the way.
+Covariance invert(const ReducedEquations& normal, const BundleProblem& problem, const Vec3& middle,
+                  double distance, Uncertainty& found) {
+  Covariance result;
+  for (Eigen::Index i = 0; i < normal.H().rows(); ++i)
+    if (normal.is_free(i)) result.at.push_back(i);
+  const auto n = static_cast<Eigen::Index>(result.at.size());
+  // Scaled to comparable units: radians, shifts over the distance, focal lengths over themselves...
+  Eigen::VectorXd unit(n);
+  Eigen::MatrixXd H(n, n);
+  Eigen::MatrixXd noise(n, n);
+  const Eigen::MatrixXd noise_of_all = normal.random();
+  const Eigen::MatrixXd full_gauge = gauge(problem, middle);
+  Eigen::MatrixXd G(n, full_gauge.cols());
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const Eigen::Index at = result.at[static_cast<std::size_t>(i)];
+    const Eigen::Index kind = at % kBlock;
+    unit[i] = kind < 3 ? 1 : kind < 6 ? distance : kind < kPose + kK1 ? 1000 : 1;
+    G.row(i) = full_gauge.row(at) / unit[i];
+  }
+  for (Eigen::Index i = 0; i < n; ++i) {
+    for (Eigen::Index j = 0; j < n; ++j) {
+      const Eigen::Index row = result.at[static_cast<std::size_t>(i)];
+      const Eigen::Index column = result.at[static_cast<std::size_t>(j)];
+      H(i, j) = normal.H()(row, column) * unit[i] * unit[j];
+      noise(i, j) = noise_of_all(row, column) * unit[i] * unit[j];
+    }
+  }
+  const Eigen::MatrixXd Q = orthonormal_basis(G);
+  const Eigen::MatrixXd P = Eigen::MatrixXd::Identity(n, n) - Q * Q.transpose();
+  const double weight = H.diagonal().mean();
+  const Eigen::MatrixXd within = P * H * P + weight * Q * Q.transpose();
+  const SymmetricEigen eigen = symmetric_eigen(within);
+  Eigen::VectorXd values = eigen.values;
+  const double least = 1e-14 * values.maxCoeff();
+  for (double& v : values) v = 1 / std::max(v, least);
+  const Eigen::MatrixXd root = P * eigen.vectors * values.cwiseSqrt().asDiagonal();
+  found.shared_px = normal.shared_error(visible_shared_error(problem), unit.asDiagonal() * root);
+  found.track_weight = normal.fair_track_weight(found.shared_px);
+  const Eigen::MatrixXd of_all = normal.systematic(found.shared_px);
+  Eigen::MatrixXd systematic(n, of_all.cols());
+  for (Eigen::Index i = 0; i < n; ++i)
+    systematic.row(i) = unit[i] * of_all.row(result.at[static_cast<std::size_t>(i)]);
+  result.root.resize(n, n + of_all.cols());
+  result.root << root * (root.transpose() * square_root(noise)),
+      root * (root.transpose() * systematic);
+  result.root = unit.asDiagonal() * result.root;
+  result.matrix = result.root * result.root.transpose();
+  return result;
+}
+
+/// The problem's devices moved by one draw of the covariance.
+std::vector<BundleDevice> drawn_devices(const BundleProblem& problem, const Covariance& covariance,
+                                        Random& random) {
+  Eigen::VectorXd z(covariance.root.cols());
+  for (double& v : z) v = random.normal();
+  const Eigen::VectorXd change = covariance.root * z;
+  std::vector<BundleDevice> devices = problem.devices;
+  std::vector<Eigen::Matrix<double, kBlock, 1>> changes(devices.size());
+  for (auto& c : changes) c.setZero();
+  for (std::size_t i = 0; i < covariance.at.size(); ++i)
+    changes[static_cast<std::size_t>(covariance.at[i] / kBlock)][covariance.at[i] % kBlock] =
+        change[static_cast<Eigen::Index>(i)];
+  for (std::size_t d = 0; d < devices.size(); ++d) {
+    if (!devices[d].present) continue;
+    const Vec3 turn = changes[d].head<3>();
+    const Mat3 R =
+        (turn.norm() > 0 ? Eigen::AngleAxisd(turn.norm(), turn.normalized()).toRotationMatrix()
+                         : Mat3::Identity().eval()) *
+        rotation_of(devices[d]);
+    const Eigen::AngleAxisd axis(R);
+    for (Eigen::Index k = 0; k < 3; ++k) {
+      devices[d].pose[static_cast<std::size_t>(k)] = axis.angle() * axis.axis()[k];
+      devices[d].pose[static_cast<std::size_t>(3 + k)] += changes[d][3 + k];
+    }
+    for (std::size_t i = 0; i < kIntrinsics; ++i)
+      devices[d].inner[i] += changes[d][kPose + static_cast<Eigen::Index>(i)];
+  }
+  return devices;
+}
+
+/// Errors of points measured with drawn rigs.
+void measure_volume(const BundleProblem& problem, const Covariance& covariance, std::uint64_t seed,
+                    Uncertainty& result) {
+  constexpr std::size_t kPoints = 200;
+  constexpr int kDraws = 30;
+  BundleProblem exact;
+  exact.devices = problem.devices;
+  std::vector<std::size_t> used;
+  for (std::size_t t = 0; t < problem.tracks.size(); ++t)
+    if (problem.used[t] != 0) used.push_back(t);
+  const std::size_t count = std::min(used.size(), kPoints);
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::size_t t = used[i * used.size() / count];
+    Track track = problem.tracks[t];
+    for (TrackView& view : track.views) {  // as the rig itself would see the point
+      const auto error = view_error(problem.devices[view.device], problem.points[t], view);
+      if (error) view.pixel += *error;
+    }
+    exact.tracks.push_back(track);
+    exact.points.push_back(problem.points[t]);
+  }
+  std::vector<double> squares(count, 0);
+  std::vector<int> draws(count, 0);
+  Random random(seed);
+  for (int draw = 0; draw < kDraws; ++draw) {
+    BundleProblem moved = exact;
+    moved.devices = drawn_devices(problem, covariance, random);
+    std::vector<std::size_t> found;
+    Eigen::Matrix3Xd a(3, count);
+    Eigen::Matrix3Xd b(3, count);
+    for (std::size_t i = 0; i < count; ++i) {
+      const auto point = triangulate(moved, moved.tracks[i], 0.02);
+      if (!point) continue;
+      a.col(static_cast<Eigen::Index>(found.size())) = *point;
+      b.col(static_cast<Eigen::Index>(found.size())) = exact.points[i];
+      found.push_back(i);
+    }
+    if (found.size() < 4) continue;
+    const auto n = static_cast<Eigen::Index>(found.size());
+    const Eigen::Matrix4d S = fit_similarity(a.leftCols(n), b.leftCols(n), true);
+    for (Eigen::Index i = 0; i < n; ++i) {
+      const Vec3 error = (S * a.col(i).homogeneous()).head<3>() - b.col(i);
+      squares[found[static_cast<std::size_t>(i)]] += error.squaredNorm();
+      ++draws[found[static_cast<std::size_t>(i)]];
+    }
+  }
+  std::vector<double> sigmas;
+  for (std::size_t i = 0; i < count; ++i)
+    if (draws[i] > 0) sigmas.push_back(std::sqrt(squares[i] / draws[i]));
+  result.volume_median = lower_quantile(sigmas, 0.5);
+  result.volume_p95 = lower_quantile(sigmas, 0.95);
+}
+
+}  // namespace
+
+Uncertainty uncertainty(const BundleProblem& problem, const BundleOptions& adjusted,
+                        std::uint64_t seed) {
+  Uncertainty result;
+  result.devices.resize(problem.devices.size());
+  Vec3 middle = Vec3::Zero();
+  std::size_t points = 0;
+  for (std::size_t t = 0; t < problem.points.size(); ++t) {
+    if (problem.used[t] == 0) continue;
+    middle += problem.points[t];
+    ++points;
+  }
+  if (points == 0) return result;
+  middle /= static_cast<double>(points);
+  std::vector<double> radii;
+  for (std::size_t t = 0; t < problem.points.size(); ++t)
+    if (problem.used[t] != 0) radii.push_back((problem.points[t] - middle).norm());
+  result.volume_radius = lower_quantile(radii, 0.9);
+  double distance = 0;
+  for (const BundleDevice& device : problem.devices)
+    if (device.present) distance = std::max(distance, (center_of(device) - middle).norm());
+
+  const ReducedEquations normal(problem, adjusted);
+  result.variance_factor = normal.variance_factor();
+  const Covariance covariance = invert(normal, problem, middle, distance, result);
+  for (std::size_t i = 0; i < covariance.at.size(); ++i) {
+    const auto row = static_cast<Eigen::Index>(i);
+    const auto d = static_cast<std::size_t>(covariance.at[i] / kBlock);
+    const auto kind = covariance.at[i] % kBlock;
+    const double sigma = std::sqrt(covariance.matrix(row, row));
+    DeviceUncertainty& device = result.devices[d];
+    if (kind < 3) device.rotation[kind] = sigma;
+    if (kind >= 3 && kind < kPose) device.position[kind - 3] = sigma;
+    if (kind >= kPose) device.inner[static_cast<std::size_t>(kind - kPose)] = sigma;
+  }
+  for (std::size_t d = 0; d < result.devices.size(); ++d) {
+    for (std::size_t i = 0; i < kIntrinsics; ++i) {
+      double prior = problem.devices[d].prior_sigma[i];
+      if (i == kFy) prior *= problem.devices[d].inner[kFx];
+      // fy moves with fx: its prior says nothing about it alone.
+      result.devices[d].is_prior[i] =
+          i != kFy && result.devices[d].inner[i] > 0 && result.devices[d].inner[i] > 0.6 * prior;
+    }
+  }
+  measure_volume(problem, covariance, seed, result);
+  return result;
+}
+
+}  // namespace pencilscan

@@ -1,0 +1,81 @@
+#include "pencilscan/gray/image_order.h"
+
+#include <array>
+
+#include "pencilscan/gray/local_map.h"
+#include "pencilscan/pattern/gray_code.h"
+
+namespace pencilscan {
+namespace {
+
+/// Codes make sense where they vary smoothly: shares of the lit pixels.
+constexpr double kSenselessShare = 0.35;
+constexpr double kSensibleShare = 0.5;
+
+double sensible_share(const DecodedView& view) { return view.valid_share() * smooth_share(view); }
+
+/// The file that holds image i of the sequence, in a capture of some wrong order.
+struct WrongOrder {
+  const char* words;
+  std::size_t (*file)(std::size_t i, std::size_t count, std::size_t column_bits, std::size_t step);
+};
+
+std::size_t swap_pair(std::size_t i) { return i < 2 ? i : 2 + ((i - 2) ^ 1U); }
+
+constexpr std::array<WrongOrder, 6> kWrongOrders{{
+    {"each inverse comes before its pattern",
+     [](std::size_t i, std::size_t, std::size_t, std::size_t step) {
+       return step == 2 ? swap_pair(i) : i;
+     }},
+    {"black comes before white",
+     [](std::size_t i, std::size_t, std::size_t, std::size_t) { return i < 2 ? 1 - i : i; }},
+    {"black comes before white and each inverse before its pattern",
+     [](std::size_t i, std::size_t, std::size_t, std::size_t) { return i ^ 1U; }},
+    {"the files are in reverse order",
+     [](std::size_t i, std::size_t count, std::size_t, std::size_t) { return count - 1 - i; }},
+    {"the bits go from the least to the most significant",
+     [](std::size_t i, std::size_t count, std::size_t column_bits, std::size_t step) {
+       if (i < 2) return i;
+       const std::size_t row_bits = (count - 2) / step - column_bits;
+       const std::size_t bit = (i - 2) / step;
+       const std::size_t part = (i - 2) % step;
+       const std::size_t turned =
+           bit < column_bits ? column_bits - 1 - bit : 2 * column_bits + row_bits - 1 - bit;
+       return 2 + turned * step + part;
+     }},
+    {"the row bits come before the column bits",
+     [](std::size_t i, std::size_t count, std::size_t column_bits, std::size_t step) {
+       if (i < 2) return i;
+       const std::size_t row_bits = (count - 2) / step - column_bits;
+       const std::size_t bit = (i - 2) / step;
+       return 2 + (bit < column_bits ? bit + row_bits : bit - column_bits) * step + (i - 2) % step;
+     }},
+}};
+
+}  // namespace
+
+std::string explain_wrong_order(int panel_width, int panel_height, bool inverses,
+                                const GrayImageSource& image, const DecodedView& decoded,
+                                const GrayDecodeOptions& options) {
+  if (sensible_share(decoded) > kSenselessShare && decoded.inverted_share < 0.5) return {};
+  const auto columns = static_cast<std::size_t>(gray_code_bits(panel_width));
+  const auto rows = static_cast<std::size_t>(gray_code_bits(panel_height));
+  const std::size_t step = inverses ? 2 : 1;
+  const std::size_t count = 2 + step * (columns + rows);
+  std::string explanation;
+  double most = kSensibleShare;
+  for (const WrongOrder& order : kWrongOrders) {
+    const GrayStack stack =
+        make_gray_stack(panel_width, panel_height, inverses,
+                        [&](std::size_t i) { return image(order.file(i, count, columns, step)); });
+    const DecodedView view = decode_gray_stack(stack, options);
+    const double share = sensible_share(view);
+    // Unlit pixels count against an order that takes black for white.
+    if (share <= most || 2 * view.counts[0] < decoded.counts[0]) continue;
+    most = share;
+    explanation = order.words;
+  }
+  return explanation;
+}
+
+}  // namespace pencilscan
