@@ -7,6 +7,7 @@ import argparse
 import csv
 import json
 import math
+import resource
 import subprocess
 import sys
 import tempfile
@@ -21,9 +22,10 @@ BUNNY = Path("/usr/share/glmark2/models/bunny.obj")  # of Debian's glmark2-data
 # ---- the script -----------------------------------------------------------------------------------
 
 
-def arguments(name, description, **numbers):
-    """Command line of an experiment; `numbers` are further options: name=(default, small default)."""
-    parser = argparse.ArgumentParser(description=description)
+def arguments(name, description, parents=(), **numbers):
+    """Command line of an experiment; `numbers` are further options: name=(default, small default),
+    `parents` parsers of others."""
+    parser = argparse.ArgumentParser(description=description, parents=parents)
     parser.add_argument("--small", action="store_true", help="a setting of less than a minute")
     parser.add_argument("--out", type=Path, default=ROOT / "out" / "experiments" / name)
     parser.add_argument("--program", type=Path, default=ROOT / "build/release/pencilscan")
@@ -49,20 +51,26 @@ def arguments(name, description, **numbers):
 class Program:
     """pencilscan, one command a call; figures come back as a dict, None where a stage failed."""
 
-    def __init__(self, args):
+    def __init__(self, args, memory_gb=0):
         self.path = args.program.resolve()
         self.threads = args.threads
+        self.memory = int(memory_gb * 2**30)  # address space that a command may take; 0: any
         self.log = open(args.out / "commands.log", "a")
 
-    def __call__(self, *words, may_fail=False, json_output=True):
+    def _limit(self):
+        if self.memory:
+            resource.setrlimit(resource.RLIMIT_AS, (self.memory, self.memory))
+
+    def __call__(self, *words, may_fail=False, may_crash=False, json_output=True):
         command = [str(self.path), *[str(w) for w in words], "--threads", str(self.threads)]
         with tempfile.TemporaryDirectory() as folder:
             figures = Path(folder) / "figures.json"
             if json_output:
                 command += ["--json", str(figures)]
             print(" ".join(command), file=self.log, flush=True)
-            run = subprocess.run(command, capture_output=True, text=True)
-            if run.returncode == 1 and may_fail:
+            run = subprocess.run(command, capture_output=True, text=True, preexec_fn=self._limit)
+            if (run.returncode == 1 and may_fail) or (run.returncode != 0 and may_crash):
+                print(f"exit {run.returncode}: {run.stderr[-300:]}", file=self.log, flush=True)
                 return None
             if run.returncode != 0:
                 raise SystemExit(f"{' '.join(command)}\n{run.stderr}")

@@ -9,7 +9,10 @@ import numpy as np
 
 import common
 import fig7_hand
+import heldout
 import shapes
+import solids
+import statues
 import table1_cube
 
 
@@ -107,6 +110,96 @@ class ObjectsTest(unittest.TestCase):
         line = vertices.reshape(600, 48, 3).mean(1)
         length = np.linalg.norm(np.roll(line, -1, 0) - line, axis=1).sum()
         self.assertAlmostEqual(self.volume(vertices, triangles) / (np.pi * 13**2 * length), 1, delta=0.02)
+
+
+def edge_counts(triangles):
+    edges = np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]),
+                    axis=1)
+    return np.unique(edges, axis=0, return_counts=True)[1]
+
+
+class SolidsTest(unittest.TestCase):
+    def test_the_surface_of_a_ball_is_closed_and_lies_on_it(self):
+        vertices, triangles = solids.mesh_of(solids.ellipsoid((1, 2, 3), (30, 30, 30)), (-35,) * 3,
+                                             (40,) * 3, 1.5)
+        self.assertLess(np.abs(np.linalg.norm(vertices - [1, 2, 3], axis=1) - 30).max(), 1e-3)
+        self.assertTrue((edge_counts(triangles) == 2).all())
+        a, b, c = (vertices[triangles[:, k]] for k in range(3))
+        # A facet of 1.5 mm lies up to 1.5^2 / (8 * 30) mm below the ball: .1 % of its volume.
+        self.assertAlmostEqual(np.sum(np.cross(a, b) * c) / 6 / (4 / 3 * np.pi * 30**3), 1, delta=2e-3)
+
+    def test_bounds_of_distance_miss_no_part_far_from_the_middle_of_a_block(self):
+        thin = solids.rod((-30, -3, 4), (31, 5, 2), 1.2)
+        vertices, triangles = solids.mesh_of(thin, (-40, -20, -20), (40, 20, 20), 0.8)
+        self.assertLess(vertices[:, 0].min(), -30.9)
+        self.assertGreater(vertices[:, 0].max(), 31.9)
+        self.assertTrue((edge_counts(triangles) == 2).all())
+
+    def test_statues_are_turned_outwards_and_nearly_everywhere_of_one_sheet(self):
+        for make in (statues.bent_hand, statues.part, statues.person, statues.dragon):
+            vertices, triangles = make(2)
+            a, b, c = (vertices[triangles[:, k]] for k in range(3))
+            self.assertGreater(np.sum(np.cross(a, b) * c), 0, make.__name__)
+            counts = edge_counts(triangles)
+            self.assertEqual(counts.min(), 2, make.__name__)
+            # Two sheets may pass one cell of the lattice: an edge of four facets.
+            self.assertLess((counts > 2).mean(), 1e-3, make.__name__)
+
+
+class HeldOutTest(unittest.TestCase):
+    def test_the_splits_have_no_object_and_no_setting_in_common(self):
+        fit, held = ({s.object for s in heldout.SPLITS[k].values()} for k in ("fit", "held"))
+        self.assertFalse(fit & held)
+        self.assertFalse(heldout.SPLITS["fit"].keys() & heldout.SPLITS["held"].keys())
+
+    def test_a_scaled_rig_takes_the_same_pictures(self):
+        rig = table1_cube.fig6_rig()
+        scaled = heldout.scaled_rig(rig, 0.01)
+        points = np.random.default_rng(1).normal(size=(20, 3)) * 50
+        for kind in ("cameras", "projectors"):
+            for a, b in zip(rig[kind], scaled[kind]):
+                np.testing.assert_allclose(common.project(a, points), common.project(b, 0.01 * points))
+
+    def test_a_scaled_result_keeps_all_but_lengths(self):
+        kind = [(n, "<f4") for n in "xyz"] + [("camera", "u1"), ("sigma", "<f4")]
+        points = np.array([(1, 2, 3, 4, 0.5), (5, 6, 7, 8, 0.25)], kind)
+        header = "ply\nformat binary_little_endian 1.0\nelement vertex 2\n" + "".join(
+            f"property {'uchar' if n == 'camera' else 'float'} {n}\n" for n, _ in kind) + "end_header\n"
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "p.ply"
+            path.write_bytes(header.encode() + points.tobytes())
+            heldout.scale_ply(path, path, 10)
+            back, _ = common.read_ply(path)
+        np.testing.assert_allclose(common.positions(back), 10 * common.positions(points))
+        np.testing.assert_allclose(back["sigma"], [5, 2.5])
+        np.testing.assert_array_equal(back["camera"], [4, 8])
+
+    def test_sure_points_are_judged_by_what_they_say(self):
+        figures = {"right_by_confidence": [{"confidence": 0.9, "right": 0.5, "points": 100},
+                                           {"confidence": 0.9995, "right": 0.998, "points": 1000}]}
+        wrong, said = heldout.confident_wrong(figures)
+        self.assertAlmostEqual(wrong, 0.002)
+        self.assertAlmostEqual(said, 0.0005)
+        self.assertFalse(heldout.in_bounds({"sure_wrong": wrong, "sure_said": said}, "sure_wrong",
+                                           heldout.sure_bound))
+
+    def test_edges_of_one_and_of_four_facets_are_found(self):
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "m.ply"
+            vertices, triangles = shapes.cube(10)
+            common.write_ply(path, vertices, triangles)
+            self.assertEqual(heldout.open_edges(path), 0)
+            common.write_ply(path, vertices, triangles[1:])
+            self.assertEqual(heldout.open_edges(path), 3)
+            common.write_ply(path, vertices, np.concatenate([triangles, triangles[:1]]))
+            self.assertEqual(heldout.open_edges(path), 3)
+
+    def test_an_object_stands_in_its_volume_and_a_person_keeps_his_size(self):
+        volume = {"center": [10, 0, 0], "radius": 170}
+        vertices, _ = heldout.placed(heldout.SPLITS["fit"]["balls"], 1, volume)
+        self.assertAlmostEqual(np.linalg.norm(vertices - [10, 0, 0], axis=1).max(), 0.95 * 170, places=6)
+        vertices, _ = heldout.placed(heldout.SPLITS["held"]["person"], 1, {"center": [0, 0, 0], "radius": 950})
+        self.assertAlmostEqual(np.ptp(vertices[:, 2]), 1702, delta=15)
 
 
 class FilesTest(unittest.TestCase):

@@ -69,6 +69,27 @@ TEST(Ring, DevicesStandWhereAskedAndLookAtTheCentre) {
   }
 }
 
+TEST(Ring, LinesColoursAndRollsGoRoundTheProjectors) {
+  RingOptions options;
+  options.projectors = 3;
+  options.axes = {Axis::kColumn};
+  options.colors = {{"red", "green", "blue"}, {"white"}};
+  options.rolls_rad = {0, 40 * kDegree, -40 * kDegree};
+  const Rig rig = make_ring(options);
+  for (std::size_t i = 0; i < 3; ++i) {
+    const LinePattern& pattern = rig.projectors[i].patterns[0];
+    EXPECT_EQ(pattern.axis, Axis::kColumn);
+    EXPECT_EQ(pattern.period(), i == 1 ? 1 : 27) << "three colours, order 3";
+    // The panel's y axis leaves the vertical plane through the optical axis by the roll.
+    const Vec3 down = rig.projectors[i].device_from_world.rotation.row(1);
+    const Vec3 side = rig.projectors[i].center().cross(Vec3::UnitZ()).normalized();
+    EXPECT_NEAR(std::asin(std::abs(down.dot(side))), i == 0 ? 0 : 40 * kDegree, 1e-9);
+  }
+  const Vec3 first = rig.projectors[1].device_from_world.rotation.row(0);
+  const Vec3 second = rig.projectors[2].device_from_world.rotation.row(0);
+  EXPECT_LT(first.z() * second.z(), 0) << "tilted to both sides";
+}
+
 TEST(RigCheck, DefaultRingHasNoWarning) {
   const RigCheck check = check_rig(make_ring());
   EXPECT_TRUE(check.warnings.empty())

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "pencilscan/core/check.h"
+#include "pencilscan/pattern/de_bruijn.h"
 
 namespace pencilscan {
 namespace {
@@ -11,7 +12,8 @@ namespace {
 constexpr double kFullCircle = 2 * std::numbers::pi;
 
 Device device_at(const std::string& name, std::pair<int, int> size, double focal_px,
-                 double distance_mm, double azimuth_rad, double elevation_rad) {
+                 double distance_mm, double azimuth_rad, double elevation_rad,
+                 double roll_rad = 0) {
   Device device;
   device.name = name;
   device.width = size.first;
@@ -19,7 +21,7 @@ Device device_at(const std::string& name, std::pair<int, int> size, double focal
   device.K << focal_px, 0, 0.5 * (size.first - 1), 0, focal_px, 0.5 * (size.second - 1), 0, 0, 1;
   const Vec3 eye(std::cos(elevation_rad) * std::cos(azimuth_rad),
                  std::cos(elevation_rad) * std::sin(azimuth_rad), std::sin(elevation_rad));
-  device.device_from_world = look_at(distance_mm * eye, Vec3::Zero());
+  device.device_from_world = look_at(distance_mm * eye, Vec3::Zero(), roll_rad);
   return device;
 }
 
@@ -31,11 +33,20 @@ double azimuth(int i, int count, double arc_rad, double shift) {
   return step * (i + 0.5) - 0.5 * arc_rad + step * (shift - 0.25);
 }
 
-LinePattern ring_pattern(const RingOptions& options, bool vertical) {
-  LinePattern pattern;  // period 8: order 3 over two colours
-  pattern.axis = vertical ? Axis::kColumn : Axis::kRow;
-  pattern.colors = vertical ? std::vector<std::string>{"blue", "cyan"}
-                            : std::vector<std::string>{"red", "yellow"};
+/// The entry of projector i in a list that repeats.
+template <typename Entry>
+const Entry& in_turn(const std::vector<Entry>& entries, int i) {
+  return entries[static_cast<std::size_t>(i) % entries.size()];
+}
+
+LinePattern ring_pattern(const RingOptions& options, int projector) {
+  LinePattern pattern;
+  pattern.axis = in_turn(options.axes, projector);
+  pattern.colors = in_turn(options.colors, projector);
+  pattern.alphabet = static_cast<int>(pattern.colors.size());
+  pattern.order = pattern.alphabet == 1 ? 1 : options.order;
+  pattern.sequence = pattern.alphabet == 1 ? std::vector<int>{0}
+                                           : de_bruijn_sequence(pattern.alphabet, pattern.order);
   pattern.pitch_px = options.pitch_px;
   pattern.line_width_px = options.line_width_px;
   pattern.offset_px = options.offset_px;
@@ -48,6 +59,7 @@ Rig make_ring(const RingOptions& options) {
   PENCILSCAN_CHECK(options.cameras >= 1 && options.projectors >= 1);
   PENCILSCAN_CHECK(options.distance_mm > options.volume_radius_mm && options.volume_radius_mm > 0);
   PENCILSCAN_CHECK(options.arc_rad > 0 && options.arc_rad <= kFullCircle);
+  PENCILSCAN_CHECK(!options.axes.empty() && !options.colors.empty() && !options.rolls_rad.empty());
   Rig rig;
   // On an arc, equal numbers would put each projector right above a camera: move both by a quarter.
   const bool full = options.arc_rad >= kFullCircle;
@@ -63,14 +75,15 @@ Rig make_ring(const RingOptions& options) {
     rig.cameras.push_back(std::move(camera));
   }
   for (int i = 0; i < options.projectors; ++i) {
-    const bool vertical = i % 2 == 0;
+    const bool vertical = in_turn(options.axes, i) == Axis::kColumn;
     Projector projector;
     static_cast<Device&>(projector) =
         device_at("proj" + std::to_string(i), {options.projector_width, options.projector_height},
                   options.projector_focal_px, options.distance_mm,
                   azimuth(i, options.projectors, options.arc_rad, projector_shift),
-                  vertical ? options.vertical_elevation_rad : options.horizontal_elevation_rad);
-    projector.patterns = {ring_pattern(options, vertical)};
+                  vertical ? options.vertical_elevation_rad : options.horizontal_elevation_rad,
+                  in_turn(options.rolls_rad, i));
+    projector.patterns = {ring_pattern(options, i)};
     rig.projectors.push_back(std::move(projector));
   }
   rig.volume = Sphere{Vec3::Zero(), options.volume_radius_mm};

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <numbers>
+#include <string>
+#include <vector>
 
 #include "pencilscan/rig/rig.h"
 
@@ -11,7 +13,7 @@ namespace pencilscan {
 /// own height the planes of their lines hold the camera centres and give no depth.
 struct RingOptions {
   int cameras = 6;                               ///< >= 1
-  int projectors = 6;                            ///< >= 1; even ones vertical, odd ones horizontal
+  int projectors = 6;                            ///< >= 1
   double distance_mm = 1100;                     ///< of every device to the origin, > volume radius
   double arc_rad = 2 * std::numbers::pi;         ///< in (0, 2 pi]: how much of the circle is used
   double camera_elevation_rad = 0.262;           ///< 15 degrees
@@ -25,6 +27,12 @@ struct RingOptions {
   double pitch_px = 12;      ///< > 0
   double line_width_px = 4;  ///< in (0, pitch_px]
   double offset_px = 6;      ///< of line 0
+  int order = 3;             ///< of the code, >= 1; nothing to a pattern of one colour
+
+  // What differs from projector to projector: projector i has entry i mod size, none may be empty.
+  std::vector<Axis> axes{Axis::kColumn, Axis::kRow};  ///< vertical and horizontal lines
+  std::vector<std::vector<std::string>> colors{{"blue", "cyan"}, {"red", "yellow"}};
+  std::vector<double> rolls_rad{0};  ///< about its optical axis: its lines are tilted by so much
 };
 
 [[nodiscard]] Rig make_ring(const RingOptions& options = {});

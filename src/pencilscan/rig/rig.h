@@ -30,6 +30,7 @@ struct Camera : Device {
 struct Projector : Device {
   std::vector<LinePattern> patterns;  ///< empty where nothing needs it (calibration)
   ColorRegistration color_registration;
+  std::string output;  ///< the computer's video output that feeds it ("HDMI-1"); empty: not stated
 
   /// Panel size across the lines of a pattern, px.
   [[nodiscard]] int size_across(const LinePattern& pattern) const {

@@ -201,9 +201,13 @@ LinePattern parse_pattern(const JsonField& field, const Projector& projector) {
 }
 
 Projector parse_projector(const JsonField& field, GivenCalibration* given) {
-  check_device_keys(field, {"pattern", "color_registration"}, given == nullptr);
+  check_device_keys(field, {"pattern", "color_registration", "output"}, given == nullptr);
   Projector projector;
   parse_device(field, projector, given);
+  if (field.has("output")) {
+    projector.output = field.at("output").text();
+    if (projector.output.empty()) field.at("output").fail("must not be empty");
+  }
   if (field.has("color_registration"))
     projector.color_registration = parse_color_registration(field.at("color_registration"));
   if (!field.has("pattern")) return projector;
@@ -337,6 +341,7 @@ Json camera_to_json(const Camera& camera, const GivenCalibration& given) {
 
 Json projector_to_json(const Projector& projector, const GivenCalibration& given) {
   Json json = device_to_json(projector, given);
+  if (!projector.output.empty()) json["output"] = projector.output;
   add_color_registration(projector.color_registration, json);
   if (projector.patterns.size() == 1) {
     json["pattern"] = pattern_to_json(projector.patterns.front());

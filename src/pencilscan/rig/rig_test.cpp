@@ -62,6 +62,7 @@ Rig example_rig() {
   rig.cameras[1].color_matrix_by_projector["proj1"] = 0.8 * Mat3::Identity();
   rig.cameras[0].color_registration.colors[0] = {Vec2(0.3, -1.0 / 3), 1.0001};
   rig.projectors[1].color_registration.colors[2] = {Vec2(-0.25, 0), 1};
+  rig.projectors[0].output = "HDMI-1";
   rig.volume = Sphere{{1, 2, 3}, 1.0 / 3};
   return rig;
 }
@@ -114,6 +115,7 @@ TEST_F(RigFile, RoundTripGivesTheSameDoubles) {
   }
   for (std::size_t i = 0; i < rig.projectors.size(); ++i) {
     expect_equal(rig.projectors[i], back.projectors[i]);
+    EXPECT_EQ(back.projectors[i].output, rig.projectors[i].output);
     ASSERT_EQ(back.projectors[i].patterns.size(), rig.projectors[i].patterns.size());
     for (std::size_t p = 0; p < rig.projectors[i].patterns.size(); ++p) {
       const LinePattern &a = rig.projectors[i].patterns[p], &b = back.projectors[i].patterns[p];
@@ -284,6 +286,15 @@ TEST_F(RigFile, OptionalCameraKeysAreChecked) {
               HasSubstr("color_matrix.nobody = 1: there is no projector of this name"));
   EXPECT_THAT(error_after([](auto& j) { j["volume"]["radius"] = 0; }),
               HasSubstr("volume.radius = 0: must be > 0"));
+}
+
+TEST_F(RigFile, OutputsOfProjectorsAreChecked) {
+  const auto output_error = [&](const nlohmann::json& value) {
+    return error_after([&](auto& j) { j["projectors"][1]["output"] = value; });
+  };
+  EXPECT_EQ(output_error("DP-2"), "accepted");
+  EXPECT_THAT(output_error(""), HasSubstr("projectors[1].output = \"\": must not be empty"));
+  EXPECT_THAT(output_error(2), HasSubstr("projectors[1].output = 2"));
 }
 
 TEST_F(RigFile, DevicesMayLackTheirCalibration) {
