@@ -124,6 +124,15 @@ TEST_F(Program, CommandLineErrorsAreBadInput) {
   expect_bad("rig ring --out rig.json --distance-mm 100", "--distance-mm = 100.0: must be");
 }
 
+TEST_F(Program, ArtefactsThatAreNoneAreBadInput) {
+  expect_bad("artefact sphere none.ply", "none.ply: no such file or folder");
+  expect_bad("artefact ballbar a.ply", "--diameter");
+  std::ofstream(folder_ / "a.ply") << "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\n"
+                                      "property float y\nproperty float z\nend_header\nnan 0 0\n";
+  expect_bad("artefact plate a.ply", "must hold points with finite positions");
+  expect_bad("artefact plate . ", "must be a PLY file, or hold points.ply");
+}
+
 TEST_F(Program, MissingOrBrokenRigFilesAreBadInput) {
   expect_bad("pattern --rig none.json --out out", "none.json: the file does not exist");
   expect_bad("rig check --rig .", "must be a file");

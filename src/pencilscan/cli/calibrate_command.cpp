@@ -3,16 +3,18 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "pencilscan/calibration/board.h"
+#include "pencilscan/boards/board.h"
 #include "pencilscan/calibration/calibration_report.h"
-#include "pencilscan/calibration/gray_decode.h"
 #include "pencilscan/calibration/tracks.h"
 #include "pencilscan/cli/command.h"
 #include "pencilscan/cli/device_arguments.h"
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/core/stopwatch.h"
+#include "pencilscan/gray/gray_decode.h"
+#include "pencilscan/gray/image_order.h"
 #include "pencilscan/io/file.h"
+#include "pencilscan/page/page.h"
 
 namespace pencilscan::cli {
 namespace {
@@ -171,8 +173,10 @@ void run_calibrate(const CalibrateCommand& command) {
   progress("judging", 1);
   const CalibrationReport report{input, result, sigma, verdict, decoded, loop, color};
   const fs::path folder = fs::path(command.out).parent_path();
-  write_json(folder / "calibration.json", calibration_json(report));
-  write_text(folder / "calibration.html", calibration_html(report));
+  const nlohmann::ordered_json report_json = calibration_json(report);
+  write_json(folder / "calibration.json", report_json);
+  write_text(folder / "calibration.html",
+             calibration_page(report_json, "Calibration", "pencilscan " PENCILSCAN_VERSION));
   if (verdict.grade != Grade::kUnusable) write_rig(result.rig, command.out);
   print_verdict(verdict);
   print_remarks(color);

@@ -98,6 +98,10 @@ void print_figures(const CommonOptions& options, const nlohmann::ordered_json& f
   for (const auto& [key, value] : lines) {
     std::cout << std::left << std::setw(static_cast<int>(width)) << key << "  " << value << "\n";
   }
+  write_figures(options, figures);
+}
+
+void write_figures(const CommonOptions& options, const nlohmann::ordered_json& figures) {
   if (!options.json_path.empty()) write_json(options.json_path, figures);
 }
 

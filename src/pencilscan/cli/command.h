@@ -24,6 +24,8 @@ void add_common_options(CLI::App& command, CommonOptions& options, const std::st
 
 /// Prints figures to stdout as aligned "key value" lines and writes --json when asked for.
 void print_figures(const CommonOptions& options, const nlohmann::ordered_json& figures);
+/// The second half of it.
+void write_figures(const CommonOptions& options, const nlohmann::ordered_json& figures);
 
 // One per command, each in its own <name>_command.cpp. They register a sub-command whose callback
 // runs it; bad input is thrown as InputError, a failed stage as StageError, both caught in main().
@@ -33,7 +35,11 @@ void add_simulate_command(CLI::App& app);
 void add_calibrate_command(CLI::App& app);
 void add_scan_command(CLI::App& app);
 void add_reconstruct_command(CLI::App& app);
+void add_sequence_command(CLI::App& app);
 void add_evaluate_command(CLI::App& app);
+void add_artefact_command(CLI::App& app);
+void add_show_command(CLI::App& app);
+void add_capture_command(CLI::App& app);
 void add_report_command(CLI::App& app);
 void add_view_command(CLI::App& app);
 

@@ -24,6 +24,7 @@ struct ReconstructOptions {
   bool depth_maps = false;
   std::vector<std::string> mesh_formats;
   bool refine_rig = false;
+  std::string shard;
   bool overwrite = false;
 };
 
@@ -56,6 +57,8 @@ void reconstruct(const ReconstructOptions& options) {
   sequence.depth_maps = options.depth_maps;
   sequence.mesh_formats = options.mesh_formats;
   sequence.overwrite = options.overwrite;
+  if (!options.shard.empty())
+    sequence.shard = shard_from_text(options.shard, process_environment());
   sequence.description = "method=" + options.method + " multiview-cost=" + options.cost +
                          " pictures=" + (options.no_pictures ? "no" : "yes") +
                          " depth=" + (sequence.shape.depth.enabled ? "yes" : "no") +
@@ -104,7 +107,9 @@ void add_reconstruct_command(CLI::App& app) {
       "reconstruct", "The shape in every frame: labelled points, closed mesh, report, pictures.");
   auto options = std::make_shared<ReconstructOptions>();
   command->add_option("--rig", options->rig, "rig.json of the calibrated devices")->required();
-  command->add_option("--frames", options->frames, "folder that holds the frame folders")
+  command
+      ->add_option("--frames", options->frames,
+                   "folder that holds the frame folders, or a recording")
       ->required();
   command->add_option("--out", options->out, "output folder, one folder per frame")->required();
   command->add_option(
@@ -136,6 +141,9 @@ void add_reconstruct_command(CLI::App& app) {
   command->add_flag("--refine-rig", options->refine_rig,
                     "correct the poses of the devices from the lines that cross in the frames");
   command->add_flag("--no-pictures", options->no_pictures, "leave overlays and views out");
+  command->add_option("--shard", options->shard,
+                      "i/n: every n-th chunk of 50 frames, from the i-th (from 0); auto: as the "
+                      "array of jobs of Slurm, PBS, Grid Engine and others says");
   command->add_flag("--overwrite", options->overwrite, "replace output of other inputs or options");
   add_common_options(*command, options->common,
                      "pencilscan reconstruct --rig rig.json --frames frames --out result");

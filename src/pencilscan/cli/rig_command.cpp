@@ -1,9 +1,11 @@
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <numbers>
+#include <sstream>
 
 #include "pencilscan/cli/command.h"
 #include "pencilscan/cli/rig_files.h"
@@ -30,7 +32,42 @@ struct RingCommand {
   double camera_elevation_deg = 15;
   double vertical_elevation_deg = 8;
   double horizontal_elevation_deg = 34;
+  std::vector<std::string> lines{"vertical", "horizontal"};
+  std::vector<std::string> colors{"blue,cyan", "red,yellow"};
+  std::vector<double> rolls_deg{0};
 };
+
+/// "red,green,blue" as the colours of a pattern.
+std::vector<std::string> color_list(const std::string& text) {
+  std::vector<std::string> names;
+  std::istringstream words(text);
+  for (std::string name; std::getline(words, name, ',');) {
+    if (!color_from_name(name)) {
+      throw InputError("command line", "--colors", name,
+                       "must be blue, cyan, red, yellow, green, magenta or white, with commas");
+    }
+    names.push_back(name);
+  }
+  return names;
+}
+
+/// What goes round the projectors.
+void set_patterns(const RingCommand& command, RingOptions& ring) {
+  constexpr double kLongestCode = 1 << 20;  // symbols, as rig.json takes them
+  ring.axes.clear();
+  ring.colors.clear();
+  ring.rolls_rad.clear();
+  for (const std::string& lines : command.lines)
+    ring.axes.push_back(lines == "vertical" ? Axis::kColumn : Axis::kRow);
+  for (const std::string& colors : command.colors) {
+    ring.colors.push_back(color_list(colors));
+    if (std::pow(ring.colors.back().size(), ring.order) > kLongestCode) {
+      throw InputError("command line", "--order", std::to_string(ring.order),
+                       "colours^order must be <= 2^20");
+    }
+  }
+  for (const double roll : command.rolls_deg) ring.rolls_rad.push_back(roll * kDegree);
+}
 
 void run_ring(RingCommand command) {
   const ThreadLimit threads(command.common.threads);
@@ -48,6 +85,7 @@ void run_ring(RingCommand command) {
   ring.camera_elevation_rad = command.camera_elevation_deg * kDegree;
   ring.vertical_elevation_rad = command.vertical_elevation_deg * kDegree;
   ring.horizontal_elevation_rad = command.horizontal_elevation_deg * kDegree;
+  set_patterns(command, ring);
   write_rig(make_ring(ring), command.out);
   print_figures(command.common, {{"rig", command.out},
                                  {"cameras", ring.cameras},
@@ -66,8 +104,7 @@ void add_ring(CLI::App& group) {
   };
   command->add_option("--out", options->out, "The rig file to write (rig.json)")->required();
   number("--cameras", ring.cameras, 1, 256, "Number of cameras");
-  number("--projectors", ring.projectors, 1, 256,
-         "Number of projectors: vertical and horizontal lines in turn");
+  number("--projectors", ring.projectors, 1, 256, "Number of projectors");
   number("--distance-mm", ring.distance_mm, 1, 1e6, "Distance of the devices to the centre");
   number("--volume-radius-mm", ring.volume_radius_mm, 0.1, 1e6, "Radius of the working volume");
   number("--arc-deg", options->arc_deg, 1, 360, "Part of the circle to use");
@@ -85,6 +122,18 @@ void add_ring(CLI::App& group) {
   number("--pitch-px", ring.pitch_px, 1, 1e4, "Distance of neighbouring lines");
   number("--line-width-px", ring.line_width_px, 0.1, 1e4, "Width of a line");
   number("--offset-px", ring.offset_px, -0.5, 1e5, "Centre of the first line");
+  number("--order", ring.order, 1, 20, "Lines in a row whose colours tell where they are");
+  command
+      ->add_option("--lines", options->lines,
+                   "Lines of the projectors in turn: vertical, horizontal")
+      ->check(CLI::IsMember({"vertical", "horizontal"}))
+      ->capture_default_str();
+  command->add_option("--colors", options->colors, "Colours of the projectors in turn, with commas")
+      ->capture_default_str();
+  command
+      ->add_option("--roll-deg", options->rolls_deg,
+                   "Rolls of the projectors in turn: tilted lines")
+      ->capture_default_str();
   add_common_options(*command, options->common, "pencilscan rig ring --out rig.json");
   command->callback([options] { run_ring(*options); });
 }
