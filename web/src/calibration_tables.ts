@@ -52,7 +52,8 @@ function pairTable(report: Json): HTMLElement | null {
 function decodingTable(report: Json): HTMLElement | null {
   const entries = digList(report, 'decoding').filter((entry) => dig(entry, 'pixels') !== undefined);
   if (!entries.length) return null;
-  const states = Object.keys((dig(entries[0], 'pixels') ?? {}) as object);
+  // The good ones first; the file's own order is the alphabet's.
+  const states = Object.keys((dig(entries[0], 'pixels') ?? {}) as object).sort((a, b) => Number(b === 'valid') - Number(a === 'valid'));
   return table(['Capture, pair', ...states, 'of lit', 'Correspondences'],
     entries.map((entry) => [`${format((digNumber(entry, 'capture') ?? 0) + 1)}, ${textOf(dig(entry, 'projector'))} / ${textOf(dig(entry, 'camera'))}`,
       ...states.map((state) => format(digNumber(entry, 'pixels', state))),
