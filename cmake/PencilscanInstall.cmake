@@ -13,8 +13,26 @@ target_link_libraries(pencilscan_all INTERFACE ${libraries})
 
 install(TARGETS ${libraries} pencilscan_all EXPORT pencilscan-targets
         ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
-install(DIRECTORY ${PROJECT_SOURCE_DIR}/src/pencilscan DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}
-        FILES_MATCHING PATTERN "*.h" PATTERN cli EXCLUDE)
+# Of the headers, <pencilscan/pencilscan.h> and what it includes.
+set(public_headers "")
+set(unread pencilscan/pencilscan.h)
+while(unread)
+  list(POP_FRONT unread header)
+  if(header IN_LIST public_headers)
+    continue()
+  endif()
+  list(APPEND public_headers ${header})
+  set(file ${PROJECT_SOURCE_DIR}/src/${header})
+  set_property(DIRECTORY ${PROJECT_SOURCE_DIR} APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${file})
+  file(STRINGS ${file} includes REGEX "^#include \"pencilscan/")
+  list(TRANSFORM includes REPLACE "^#include \"(.*)\".*$" "\\1")
+  list(APPEND unread ${includes})
+endwhile()
+foreach(header IN LISTS public_headers)
+  get_filename_component(folder ${header} DIRECTORY)
+  install(FILES ${PROJECT_SOURCE_DIR}/src/${header}
+          DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/${folder})
+endforeach()
 install(FILES ${PROJECT_SOURCE_DIR}/LICENSE ${PROJECT_SOURCE_DIR}/NOTICE
         DESTINATION ${CMAKE_INSTALL_DOCDIR})
 if(TARGET pencilscan)

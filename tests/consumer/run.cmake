@@ -15,4 +15,14 @@ run_step(${CMAKE_COMMAND} -S ${CMAKE_CURRENT_LIST_DIR} -B ${WORK_DIR}/build -G $
          -D CMAKE_CXX_COMPILER_LAUNCHER=${LAUNCHER}
          -D CMAKE_PREFIX_PATH=${WORK_DIR}/prefix -D CMAKE_FIND_USE_PACKAGE_REGISTRY=OFF)
 run_step(${CMAKE_COMMAND} --build ${WORK_DIR}/build)
-run_step(${WORK_DIR}/build/consumer)
+# Only the front door and what it includes is there.
+file(GLOB_RECURSE headers RELATIVE ${WORK_DIR}/prefix/include ${WORK_DIR}/prefix/include/*.h)
+list(LENGTH headers count)
+message("${count} headers")
+foreach(inner IN ITEMS solution detection cli capture)
+  if(EXISTS ${WORK_DIR}/prefix/include/pencilscan/${inner})
+    message(FATAL_ERROR "headers of ${inner} are installed, which the front door does not need")
+  endif()
+endforeach()
+file(MAKE_DIRECTORY ${WORK_DIR}/run)
+run_step(${WORK_DIR}/build/consumer ${WORK_DIR}/prefix/bin/pencilscan ${WORK_DIR}/run)

@@ -14,10 +14,8 @@
 #include "pencilscan/io/file.h"
 #include "pencilscan/io/image.h"
 #include "pencilscan/io/mesh_file.h"
-#include "pencilscan/simulation/placement.h"
+#include "pencilscan/simulation/photography.h"
 #include "pencilscan/simulation/povray.h"
-#include "pencilscan/simulation/render.h"
-#include "pencilscan/simulation/sensor.h"
 #include "pencilscan/simulation/truth.h"
 
 namespace pencilscan::cli {
@@ -45,19 +43,8 @@ struct SimulateOptions {
 
   Reflectance surface;
   bool flat = false;
-  RenderOptions render;
   bool no_falloff = false;
-  FilmOptions film;
-  std::optional<double> black_level;
-
-  std::string noise = "none";
-  std::optional<double> crosstalk;
-  std::optional<double> ambient;
-  std::optional<double> blur_px;
-  std::optional<double> full_well;
-  std::optional<double> read_noise;
-  double gain = 1;
-  int bits = 8;
+  PhotographyOptions photo;
 };
 
 /// Light that a projector shows where its panel is black, in Gray-code captures.
@@ -71,44 +58,12 @@ std::string frame_name(int frame) {
   return name.str();
 }
 
-SensorOptions sensor_of(const SimulateOptions& options, const Camera& camera) {
-  SensorOptions sensor = sensor_preset(options.noise)->sensor;
-  // A rig that states how colours mix describes its cameras whole; a preset adds nothing to it.
-  if (camera.states_color_matrix()) sensor.crosstalk = 0;
-  sensor.crosstalk = options.crosstalk.value_or(sensor.crosstalk);
-  sensor.blur_px = options.blur_px.value_or(sensor.blur_px);
-  sensor.full_well = options.full_well.value_or(sensor.full_well);
-  sensor.read_noise = options.read_noise.value_or(sensor.read_noise);
-  sensor.gain = options.gain;
-  sensor.gamma = camera.gamma;
-  sensor.bit_depth = options.bits;
-  return sensor;
-}
-
-void check_rig(const SimulateOptions& options, const Rig& rig) {
-  for (std::size_t p = 0; p < rig.projectors.size(); ++p) {
-    if (rig.projectors[p].patterns.empty()) {
-      throw InputError(options.rig_path, "projectors[" + std::to_string(p) + "].pattern", "",
-                       "this key is missing: there is nothing to show");
-    }
-  }
-}
-
 /// The mesh where frame 0 has it; InputError when no camera would see any of it.
 TriangleMesh placed_mesh(const SimulateOptions& options, const Rig& rig) {
   TriangleMesh mesh = turned_upright(read_mesh(options.mesh_path), options.up);
   if (options.fit) mesh = fitted(std::move(mesh), working_volume(rig));
-  for (const Camera& camera : rig.cameras) {
-    for (const Vec3& vertex : mesh.vertices) {
-      const auto pixel = camera.project(vertex);
-      if (pixel && camera.contains(*pixel)) return mesh;
-    }
-  }
-  const BoundingBox box = bounding_box(mesh);
-  std::ostringstream extent;
-  extent << "[" << box.low.transpose() << "] to [" << box.high.transpose() << "] mm";
-  throw InputError(options.mesh_path, "vertices", extent.str(),
-                   "must lie in the view of at least one camera (--fit moves them there)");
+  check_scene(rig, mesh, options.mesh_path, options.rig_path);
+  return mesh;
 }
 
 /// Refuses, or with --overwrite clears, what an earlier run left.
@@ -149,21 +104,9 @@ void write_truth_maps(const fs::path& folder, const Rig& rig, std::size_t c,
   }
 }
 
-/// What each camera's picture is lit with: a texture camera sees white light instead of patterns.
-std::vector<PanelLight> lights_for(const Camera& camera, const Rig& rig, const FilmOptions& film) {
-  std::vector<PanelLight> lights = line_lights(rig, film);
-  if (!camera.sees_texture_only) return lights;
-  for (std::size_t p = 0; p < lights.size(); ++p) {
-    lights[p] = gray_code_light(rig.projectors[p], {GrayCodeImage::Kind::kWhite});
-  }
-  return lights;
-}
-
 void write_frames(const SimulateOptions& options, const Rig& rig, const TriangleMesh& mesh,
                   const Progress& progress) {
   const fs::path out(options.out);
-  FilmOptions film = options.film;
-  film.black_level = options.black_level.value_or(0);
   const Motion motion{
       options.rotate_deg * M_PI / 180,
       Vec3(options.translate_mm[0], options.translate_mm[1], options.translate_mm[2]),
@@ -179,15 +122,13 @@ void write_frames(const SimulateOptions& options, const Rig& rig, const Triangle
       const auto image =
           static_cast<std::uint32_t>(static_cast<std::size_t>(frame) * rig.cameras.size() + c);
       progress("rendering frames", static_cast<double>(image) / static_cast<double>(total));
-      const cv::Mat light =
-          render_camera(rig, c, object, lights_for(camera, rig, film), options.render);
       write_image(out / "frames" / frame_name(frame) / (camera.name + ".png"),
-                  apply_sensor(light, sensor_of(options, camera), options.common.seed, image),
-                  options.bits);
+                  photograph(rig, c, object, options.photo, image), options.photo.bits);
       if (options.truth_maps) write_truth_maps(truth, rig, c, camera_truth(rig, c, object));
     }
     if (options.export_povray) {
-      write_povray_scene(out / "povray" / frame_name(frame), rig, object, options.render);
+      write_povray_scene(out / "povray" / frame_name(frame), rig, object,
+                         scene_light(options.photo));
     }
   }
   progress("rendering frames", 1);
@@ -197,8 +138,9 @@ void write_frames(const SimulateOptions& options, const Rig& rig, const Triangle
 int write_captures(const SimulateOptions& options, const Rig& rig, const TriangleMesh& mesh,
                    const Progress& progress) {
   const SimulatedObject object(mesh, options.surface);
-  FilmOptions film = options.film;
-  film.black_level = options.black_level.value_or(kCaptureBlackLevel);
+  FilmOptions film = options.photo.film;
+  film.black_level = options.photo.black_level.value_or(kCaptureBlackLevel);
+  const RenderOptions light = scene_light(options.photo);
   const std::size_t pairs = rig.projectors.size() * rig.cameras.size();
   int written = 0;
   for (std::size_t pair = 0; pair < pairs; ++pair) {
@@ -218,16 +160,16 @@ int write_captures(const SimulateOptions& options, const Rig& rig, const Triangl
       }
     }
     const auto render = options.color_captures ? render_color_sequence : render_sequence;
-    const auto images = render(rig, c, pair / rig.cameras.size(), object, sequence, options.render);
+    const auto images = render(rig, c, pair / rig.cameras.size(), object, sequence, light);
     if (images.empty()) continue;  // the camera cannot see this projector's light
     ++written;
     const fs::path folder =
         fs::path(options.out) / "captures" / projector.name / rig.cameras[c].name;
-    const SensorOptions sensor = sensor_of(options, rig.cameras[c]);
+    const SensorOptions sensor = camera_sensor(options.photo, rig.cameras[c]);
     parallel_for(images.size(), [&](std::size_t i) {
       const auto number = kFirstCaptureImage + static_cast<std::uint32_t>(pair * 64 + i);
       write_image(folder / (names[i] + ".png"),
-                  apply_sensor(images[i], sensor, options.common.seed, number), options.bits);
+                  apply_sensor(images[i], sensor, options.common.seed, number), options.photo.bits);
     });
   }
   progress("rendering captures", 1);
@@ -238,10 +180,9 @@ void run_simulate(SimulateOptions options) {
   const ThreadLimit threads(options.common.threads);
   const Stopwatch watch;
   options.surface.smooth = !options.flat;
-  options.render.inverse_square = !options.no_falloff;
-  options.render.ambient = options.ambient.value_or(sensor_preset(options.noise)->ambient);
+  options.photo.render.inverse_square = !options.no_falloff;
+  options.photo.seed = options.common.seed;
   const Rig rig = read_rig(options.rig_path);
-  check_rig(options, rig);
   const TriangleMesh mesh = placed_mesh(options, rig);
   if (options.export_povray) check_povray_can_show(rig, options.surface, options.rig_path);
   const std::string rig_text = read_file(options.rig_path);  // before an --overwrite may touch it
@@ -297,41 +238,48 @@ void add_scene_options(CLI::App& command, SimulateOptions& options) {
 }
 
 void add_device_options(CLI::App& command, SimulateOptions& options) {
-  command.add_option("--samples", options.render.samples, "Rays per pixel and axis")
+  command.add_option("--samples", options.photo.render.samples, "Rays per pixel and axis")
       ->check(CLI::Range(1, 16))
       ->capture_default_str();
   command
-      .add_option("--exposure", options.render.exposure,
+      .add_option("--exposure", options.photo.render.exposure,
                   "Image value of a white surface that faces a projector at the centre")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   command.add_flag("--no-falloff", options.no_falloff, "Light does not weaken with distance");
-  command.add_flag("--pixelated", options.film.pixelated, "Projector pixels, no continuous film");
-  command.add_option("--projector-blur", options.film.blur_px, "Standard deviation, panel px")
+  command.add_flag("--pixelated", options.photo.film.pixelated,
+                   "Projector pixels, no continuous film");
+  command
+      .add_option("--projector-blur", options.photo.film.blur_px, "Standard deviation, panel px")
       ->check(CLI::Range(0.0, 50.0));
   command
-      .add_option("--black-level", options.black_level,
+      .add_option("--black-level", options.photo.black_level,
                   "Light of a black panel pixel (default 0; 0.004 in captures)")
       ->check(CLI::Range(0.0, 0.9));
   command
-      .add_option("--noise", options.noise,
+      .add_option("--noise", options.photo.noise,
                   "Sensor preset: crosstalk, ambient light, blur and noise together")
       ->check(CLI::IsMember({"none", "low", "medium", "high"}))
       ->capture_default_str();
-  command.add_option("--crosstalk", options.crosstalk, "Share that colour filters leak")
+  command.add_option("--crosstalk", options.photo.crosstalk, "Share that colour filters leak")
       ->check(CLI::Range(0.0, 0.5));
   command
-      .add_option("--ambient", options.ambient,
+      .add_option("--ambient", options.photo.ambient,
                   "Even light on all surfaces, image value of a white one")
       ->check(CLI::Range(0.0, 1.0));
-  command.add_option("--blur", options.blur_px, "Camera blur, standard deviation, px")
+  command.add_option("--blur", options.photo.blur_px, "Camera blur, standard deviation, px")
       ->check(CLI::Range(0.0, 50.0));
-  command.add_option("--full-well", options.full_well, "Electrons at value 1; 0: no shot noise")
+  command
+      .add_option("--full-well", options.photo.full_well, "Electrons at value 1; 0: no shot noise")
       ->check(CLI::NonNegativeNumber);
-  command.add_option("--read-noise", options.read_noise, "Standard deviation, 1/255 of the range")
+  command
+      .add_option("--read-noise", options.photo.read_noise,
+                  "Standard deviation, 1/255 of the range")
       ->check(CLI::NonNegativeNumber);
-  command.add_option("--gain", options.gain)->check(CLI::PositiveNumber)->capture_default_str();
-  command.add_option("--bits", options.bits, "8 or 16")
+  command.add_option("--gain", options.photo.gain)
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  command.add_option("--bits", options.photo.bits, "8 or 16")
       ->check(CLI::IsMember({8, 16}))
       ->capture_default_str();
 }

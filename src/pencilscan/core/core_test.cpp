@@ -1,11 +1,13 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <numeric>
 #include <stdexcept>
 #include <vector>
 
+#include "pencilscan/core/cancellation.h"
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/lanes.h"
 #include "pencilscan/core/parallel.h"
@@ -30,6 +32,27 @@ TEST(ParallelFor, PassesExceptionsOn) {
                               if (i == 7) throw StageError("seven");
                             }),
                StageError);
+}
+
+TEST(ParallelFor, StopsNestedLoopsWhenAsked) {
+  std::atomic<bool> stop{false};
+  std::atomic<int> bodies{0};
+  constexpr int kOuter = 100;
+  constexpr int kInner = 1000;
+  {
+    const CancelScope scope(stop);
+    EXPECT_THROW(parallel_for(kOuter,
+                              [&](std::size_t) {
+                                parallel_for(kInner, [&](std::size_t) {
+                                  if (++bodies == kInner / 2) stop = true;
+                                });
+                              }),
+                 Cancelled);
+    EXPECT_THROW(parallel_for(1, [](std::size_t) {}), Cancelled);
+  }
+  EXPECT_LT(bodies, 2 * kInner);
+  parallel_for(1, [&](std::size_t) { bodies = 0; });  // outside the scope
+  EXPECT_EQ(bodies, 0);
 }
 
 TEST(Random, NormalHasUnitVarianceAndUniformItsMoments) {

@@ -7,6 +7,8 @@
 #include <thread>
 #include <vector>
 
+#include "pencilscan/core/cancellation.h"
+
 #ifndef PENCILSCAN_STD_THREADS
 #include <tbb/global_control.h>
 #include <tbb/parallel_for.h>
@@ -23,7 +25,41 @@ int hardware_threads() {
 std::atomic<int> limit{0};
 #endif
 
+thread_local const std::atomic<bool>* current_stop = nullptr;
+
 }  // namespace
+
+CancelScope::CancelScope(const std::atomic<bool>& stop) : outer_(current_stop) {
+  current_stop = &stop;
+}
+CancelScope::~CancelScope() { current_stop = outer_; }
+const std::atomic<bool>* CancelScope::current() { return current_stop; }
+
+void stop_if_cancelled() {
+  if (current_stop != nullptr && current_stop->load(std::memory_order_relaxed)) throw Cancelled();
+}
+
+namespace {
+
+void run_loop(std::size_t count, const std::function<void(std::size_t)>& body);
+
+}  // namespace
+
+void parallel_for(std::size_t count, const std::function<void(std::size_t)>& body) {
+  const std::atomic<bool>* stop = current_stop;
+  if (stop == nullptr) {
+    run_loop(count, body);
+    return;
+  }
+  stop_if_cancelled();
+  run_loop(count, [&](std::size_t i) {
+    const CancelScope scope(*stop);  // the loop's threads are not its caller's
+    stop_if_cancelled();
+    body(i);
+  });
+  // An exception elsewhere ends oneTBB's nested loops early and silently.
+  stop_if_cancelled();
+}
 
 #ifdef PENCILSCAN_STD_THREADS
 
@@ -34,7 +70,9 @@ ThreadLimit::~ThreadLimit() { limit = 0; }
 
 int thread_count() { return limit > 0 ? limit.load() : hardware_threads(); }
 
-void parallel_for(std::size_t count, const std::function<void(std::size_t)>& body) {
+namespace {
+
+void run_loop(std::size_t count, const std::function<void(std::size_t)>& body) {
   const std::size_t threads =
       std::min<std::size_t>(count, static_cast<std::size_t>(thread_count()));
   std::atomic<std::size_t> next{0};
@@ -57,6 +95,8 @@ void parallel_for(std::size_t count, const std::function<void(std::size_t)>& bod
   if (failure) std::rethrow_exception(failure);
 }
 
+}  // namespace
+
 #else
 
 ThreadLimit::ThreadLimit(int threads)
@@ -71,9 +111,13 @@ int thread_count() {
       tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism));
 }
 
-void parallel_for(std::size_t count, const std::function<void(std::size_t)>& body) {
+namespace {
+
+void run_loop(std::size_t count, const std::function<void(std::size_t)>& body) {
   tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) { body(i); });
 }
+
+}  // namespace
 
 #endif
 

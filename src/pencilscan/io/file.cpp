@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "pencilscan/core/error.h"
+#include "pencilscan/io/json_text.h"
 
 namespace pencilscan {
 namespace {
@@ -130,8 +131,10 @@ void write_text(const std::filesystem::path& path, const std::string& text, Dura
 
 void write_json(const std::filesystem::path& path, const nlohmann::ordered_json& value,
                 Durability durability) {
-  write_text(path, value.dump(2) + "\n", durability);
+  write_text(path, json_text(value), durability);
 }
+
+std::string json_text(const nlohmann::ordered_json& value) { return value.dump(2) + "\n"; }
 
 std::string read_file(const std::filesystem::path& path) {
   std::error_code error;
@@ -187,19 +190,21 @@ struct DuplicateKeyFinder {
 
 }  // namespace
 
-nlohmann::json read_json(const std::filesystem::path& path) {
-  const std::string text = read_file(path);
+nlohmann::json parse_json(const std::string& text, const std::string& name) {
   DuplicateKeyFinder finder;
   try {
     nlohmann::json value = nlohmann::json::parse(text, std::ref(finder));
-    if (!finder.duplicate.empty()) {
-      throw InputError(path.string(), finder.duplicate, "", "this key must not stand twice");
-    }
+    if (!finder.duplicate.empty())
+      throw InputError(name, finder.duplicate, "", "this key must not stand twice");
     return value;
   } catch (const nlohmann::json::exception& error) {
-    throw InputError(path.string(), "", "",
+    throw InputError(name, "", "",
                      "must be JSON (which has no NaN or Infinity): " + without_tag(error.what()));
   }
+}
+
+nlohmann::json read_json(const std::filesystem::path& path) {
+  return parse_json(read_file(path), path.string());
 }
 
 }  // namespace pencilscan

@@ -17,6 +17,10 @@
 namespace pencilscan {
 namespace {
 
+void announce(const Progress& progress, const char* stage) {
+  if (progress) progress(stage, 0);
+}
+
 std::vector<std::string> detection_warnings(const Rig& rig, const Frame& frame,
                                             const std::vector<ColorFamily>& families,
                                             const std::vector<CameraDetection>& detections) {
@@ -151,6 +155,7 @@ PointResult detect_frame(const Rig& rig, const Frame& frame, const PointOptions&
   result.families = color_families(rig);
   const std::size_t cameras = rig.cameras.size();
 
+  announce(options.progress, "detection");
   Stopwatch detection_watch;
   result.detections.resize(cameras);
   parallel_for(cameras, [&](std::size_t c) {
@@ -161,6 +166,7 @@ PointResult detect_frame(const Rig& rig, const Frame& frame, const PointOptions&
   result.warnings = detection_warnings(rig, frame, result.families, result.detections);
   result.times.push_back({"detection", detection_watch.seconds()});
 
+  announce(options.progress, "grid");
   Stopwatch grid_watch;
   GridOptions grid = options.grid;
   // The joint solution decides pattern and line at once.
@@ -177,6 +183,7 @@ PointResult detect_frame(const Rig& rig, const Frame& frame, const PointOptions&
 PointResult measure_points(const Rig& stated, const Frame& frame, const PointOptions& options) {
   const Rig rig = with_registered_patterns(stated);
   PointResult result = detect_frame(rig, frame, options);
+  announce(options.progress, "solution");
   Stopwatch solution_watch;
   if (options.solution.method != Method::kJoint) {
     result.labeling = solve(rig, result.families, result.graphs, options.solution);
@@ -194,12 +201,14 @@ PointResult measure_points(const Rig& stated, const Frame& frame, const PointOpt
   result.rig_is_off = corrected.has_value();
   result.times.push_back({"solution", solution_watch.seconds()});
 
+  announce(options.progress, "second look");
   const Stopwatch second_look_watch;
   std::vector<LocalSurface> surfaces =
       second_look(corrected ? *corrected : rig, result.families, presence_images(result.detections),
                   result.graphs, result.labeling, options.second_look);
   result.times.push_back({"second look", second_look_watch.seconds()});
 
+  announce(options.progress, "triangulation");
   const Stopwatch triangulation_watch;
   TriangulationOptions triangulation = options.triangulation;
   SettleOptions settle = options.settle;
@@ -220,6 +229,7 @@ ShapeResult measure_shape(const Rig& stated, const Frame& frame, const PointResu
   const Rig rig = with_registered_patterns(stated);
   ShapeResult result;
   if (options.depth.enabled) {
+    announce(options.progress, "depth");
     const Stopwatch depth_watch;
     std::vector<Unmixing> unmixings;
     for (const CameraDetection& detection : points.detections)
@@ -227,6 +237,7 @@ ShapeResult measure_shape(const Rig& stated, const Frame& frame, const PointResu
     result.depth =
         measure_depth(rig, points.families, frame.images, unmixings, points.points, options.depth);
     result.times.push_back({"depth", depth_watch.seconds()});
+    announce(options.progress, "surface");
     const Stopwatch surface_watch;
     const std::vector<ColorView> views = color_views(rig, frame, points, result.depth.report);
     std::vector<Silhouette> silhouettes;
@@ -256,6 +267,7 @@ ShapeResult measure_shape(const Rig& stated, const Frame& frame, const PointResu
       return result;
     }
   }
+  announce(options.progress, "surface");
   const Stopwatch surface_watch;
   result.surface = reconstruct_surface(rig, points.points, options.surface);
   result.times.push_back({"surface", surface_watch.seconds()});
@@ -269,6 +281,7 @@ ShapeResult measure_shape(const Rig& stated, const Frame& frame, const PointResu
 void look_again(const Rig& stated, const PointOptions& options, PointResult& points,
                 ShapeResult& shape) {
   if (options.solution.method != Method::kJoint || points.rig_is_off || !shape.scene) return;
+  announce(options.progress, "look again");
   const Stopwatch watch;
   const Rig rig = with_registered_patterns(stated);
   points.contradicted = drop_contradicted(rig, *shape.scene, points.graphs, points.labeling);
@@ -287,6 +300,23 @@ void look_again(const Rig& stated, const PointOptions& options, PointResult& poi
   report.points_used =
       static_cast<std::size_t>(std::count(shape.surface.used.begin(), shape.surface.used.end(), 1));
   points.times.push_back({"look again", watch.seconds()});
+}
+
+FrameResult reconstruct_frame(const Rig& rig, const Frame& frame, const PointOptions& points,
+                              const ShapeOptions& shape, bool meshes) {
+  if (std::all_of(frame.images.begin(), frame.images.end(),
+                  [](const cv::Mat& image) { return image.empty(); })) {
+    throw NothingFound("no camera of the rig has a picture of this moment");
+  }
+  FrameResult result;
+  result.points = measure_points(rig, frame, points);
+  if (result.points.points.empty())
+    throw NothingFound("no curve could be given its projector line");
+  if (meshes) result.shape = measure_shape(rig, frame, result.points, shape);
+  std::vector<StageTime>& times = result.points.times;
+  times.insert(times.end(), result.shape.times.begin(), result.shape.times.end());
+  look_again(rig, points, result.points, result.shape);
+  return result;
 }
 
 }  // namespace pencilscan

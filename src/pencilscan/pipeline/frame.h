@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "pencilscan/core/error.h"
 #include "pencilscan/core/progress.h"
 #include "pencilscan/depth/depth.h"
 #include "pencilscan/detection/detect.h"
@@ -43,6 +44,7 @@ struct PointOptions {
   SecondLookOptions second_look;  ///< joint only
   TriangulationOptions triangulation;
   SettleOptions settle;  ///< joint only: the paper's methods are triangulated as they are
+  Progress progress;     ///< hears of every stage as it starts, with fraction 0
 };
 
 /// How the labelled points become a surface.
@@ -50,6 +52,7 @@ struct ShapeOptions {
   DepthStageOptions depth;
   FusionOptions fusion;    ///< of dense depth
   SurfaceOptions surface;  ///< of the curves alone, where dense depth is off or finds nothing
+  Progress progress;       ///< as in PointOptions
 };
 
 /// Seconds of one stage, wall clock.
@@ -105,5 +108,21 @@ struct ShapeResult {
 /// the paper's methods, and all where the rig is off, stay as they are.
 void look_again(const Rig& rig, const PointOptions& options, PointResult& points,
                 ShapeResult& shape);
+
+/// What a whole frame gives.
+struct FrameResult {
+  PointResult points;
+  ShapeResult shape;  ///< empty without meshes
+};
+
+/// No curve of a frame could be given its line: the pictures themselves are why.
+struct NothingFound : StageError {
+  using StageError::StageError;
+};
+
+/// All of the above in order. NothingFound when no camera has a picture, or no curve a label.
+[[nodiscard]] FrameResult reconstruct_frame(const Rig& rig, const Frame& frame,
+                                            const PointOptions& points, const ShapeOptions& shape,
+                                            bool meshes = true);
 
 }  // namespace pencilscan

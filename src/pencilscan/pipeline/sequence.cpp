@@ -28,11 +28,6 @@ constexpr const char* kDevicesFile = "devices.json";
 constexpr const char* kRigFile = "rig.json";
 constexpr const char* kRefinementFile = "refinement.json";
 
-/// The pictures themselves are why a frame cannot be done: no other time will do better.
-struct NothingFound : StageError {
-  using StageError::StageError;
-};
-
 /// The frames that a rig is refined from: evenly picked.
 std::vector<std::size_t> refinement_frames(std::size_t frames) {
   constexpr std::size_t kMaxFrames = 24;  // more add little but time
@@ -114,26 +109,13 @@ void check_images(const Rig& rig, const FrameSource& frames, const Progress& pro
   }
 }
 
-bool has_picture(const Frame& frame) {
-  return std::any_of(frame.images.begin(), frame.images.end(),
-                     [](const cv::Mat& image) { return !image.empty(); });
-}
-
-void reconstruct_frame(const Rig& rig, const FrameSource& frames, std::size_t index,
-                       const fs::path& folder, const SequenceOptions& options,
-                       FrameOutcome& outcome) {
+void write_frame(const Rig& rig, const FrameSource& frames, std::size_t index,
+                 const fs::path& folder, const SequenceOptions& options, FrameOutcome& outcome) {
   const Stopwatch total;
   const Frame frame = frames.read(rig, index);
-  if (!has_picture(frame)) throw NothingFound("no camera of the rig has a picture of this moment");
   const double reading = total.seconds();
-  PointResult points = measure_points(rig, frame, options.points);
-  if (points.points.empty()) {
-    throw NothingFound("no curve could be given its projector line");
-  }
-  ShapeResult shape =
-      options.meshes ? measure_shape(rig, frame, points, options.shape) : ShapeResult{};
-  points.times.insert(points.times.end(), shape.times.begin(), shape.times.end());
-  look_again(rig, options.points, points, shape);
+  auto [points, shape] =
+      reconstruct_frame(rig, frame, options.points, options.shape, options.meshes);
   const SurfaceResult& surface = shape.surface;
   write_points(folder / "points.ply", points.points);
   write_curves(folder / "curves.ply", describe_curves(points));
@@ -222,7 +204,7 @@ FrameOutcome frame_outcome(const Rig& rig, const FrameSource& frames, std::size_
   FrameFailure failure;
   try {
     FrameFolder folder(out, outcome.name, settings, images);
-    reconstruct_frame(rig, frames, index, folder.path(), options, outcome);
+    write_frame(rig, frames, index, folder.path(), options, outcome);
     folder.publish();
     outcome.done = true;
     return outcome;

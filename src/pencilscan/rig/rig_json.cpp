@@ -3,12 +3,15 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <set>
+#include <span>
 
 #include "pencilscan/io/file.h"
+#include "pencilscan/io/json_text.h"
 #include "pencilscan/pattern/de_bruijn.h"
 #include "pencilscan/rig/devices_file.h"
 #include "pencilscan/rig/json_field.h"
 #include "pencilscan/rig/rig.h"
+#include "pencilscan/rig/rig_text.h"
 
 namespace pencilscan {
 namespace {
@@ -383,9 +386,9 @@ std::string pretty(const Json& value, int depth = 0) {
 namespace {
 
 /// A rig, or with `given` one whose devices may lack their calibration.
-Rig parse_rig(const std::filesystem::path& path, std::vector<GivenCalibration>* given) {
-  const nlohmann::json json = read_json(path);
-  const JsonField root(path.string(), json);
+Rig parse_rig(const std::string& name, const nlohmann::json& json,
+              std::vector<GivenCalibration>* given) {
+  const JsonField root(name, json);
   root.check_keys({"format", "unit", "cameras", "projectors"}, {"volume"});
   if (root.at("format").text() != "rig/1") root.at("format").fail("must be \"rig/1\"");
   const std::string unit = root.at("unit").text();
@@ -408,17 +411,30 @@ Rig parse_rig(const std::filesystem::path& path, std::vector<GivenCalibration>* 
 
 }  // namespace
 
-Rig read_rig(const std::filesystem::path& path) { return parse_rig(path, nullptr); }
+Rig read_rig(const std::filesystem::path& path) {
+  return parse_rig(path.string(), read_json(path), nullptr);
+}
+
+Rig rig_from_text(const std::string& text, const std::string& name) {
+  return parse_rig(name, parse_json(text, name), nullptr);
+}
 
 UncalibratedRig read_devices(const std::filesystem::path& path) {
   UncalibratedRig result;
-  result.rig = parse_rig(path, &result.given);
+  result.rig = parse_rig(path.string(), read_json(path), &result.given);
   return result;
 }
 
-void write_devices(const UncalibratedRig& devices, const std::filesystem::path& path) {
-  const Rig& rig = devices.rig;
-  auto given = devices.given.begin();
+UncalibratedRig devices_from_text(const std::string& text, const std::string& name) {
+  UncalibratedRig result;
+  result.rig = parse_rig(name, parse_json(text, name), &result.given);
+  return result;
+}
+
+namespace {
+
+std::string devices_text(const Rig& rig, std::span<const GivenCalibration> all_given) {
+  auto given = all_given.begin();
   Json json;
   json["format"] = "rig/1";
   json["unit"] = rig.unit_known ? "mm" : "unknown";
@@ -431,12 +447,22 @@ void write_devices(const UncalibratedRig& devices, const std::filesystem::path& 
   if (rig.volume) {
     json["volume"] = {{"center", to_json(rig.volume->center)}, {"radius", rig.volume->radius}};
   }
-  write_text(path, pretty(json) + "\n");
+  return pretty(json) + "\n";
+}
+
+}  // namespace
+
+void write_devices(const UncalibratedRig& devices, const std::filesystem::path& path) {
+  write_text(path, devices_text(devices.rig, devices.given));
+}
+
+std::string rig_text(const Rig& rig) {
+  constexpr GivenCalibration kAll{true, true, true};
+  return devices_text(rig, std::vector(rig.cameras.size() + rig.projectors.size(), kAll));
 }
 
 void write_rig(const Rig& rig, const std::filesystem::path& path) {
-  constexpr GivenCalibration kAll{true, true, true};
-  write_devices({rig, std::vector(rig.cameras.size() + rig.projectors.size(), kAll)}, path);
+  write_text(path, rig_text(rig));
 }
 
 }  // namespace pencilscan

@@ -1,0 +1,134 @@
+#include "pencilscan/api/reconstruct.h"
+
+#include <algorithm>
+#include <array>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "pencilscan/api/run_stages.h"
+#include "pencilscan/core/error.h"
+#include "pencilscan/core/parallel.h"
+#include "pencilscan/depth/depth_image.h"
+#include "pencilscan/io/file.h"
+#include "pencilscan/io/image.h"
+#include "pencilscan/io/json_text.h"
+#include "pencilscan/io/mesh_file.h"
+#include "pencilscan/pipeline/curve_output.h"
+#include "pencilscan/pipeline/frame.h"
+#include "pencilscan/pipeline/frame_files.h"
+#include "pencilscan/pipeline/frame_output.h"
+#include "pencilscan/solution/single_projector.h"
+
+namespace pencilscan {
+namespace {
+
+constexpr std::array<std::string_view, 8> kStages = {"detection",   "grid",          "solution",
+                                                     "second look", "triangulation", "depth",
+                                                     "surface",     "look again"};
+
+/// One image per camera of the rig, CV_32FC3; empty where there is none.
+std::vector<cv::Mat> camera_images(const Rig& rig, const Images& images) {
+  std::vector<cv::Mat> result(rig.cameras.size());
+  std::size_t known = 0;
+  for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
+    const Camera& camera = rig.cameras[c];
+    const auto at = images.find(camera.name);
+    if (at == images.end()) continue;
+    ++known;
+    const cv::Mat& stored = at->second.stored();
+    if (stored.cols != camera.width || stored.rows != camera.height) {
+      throw InputError("images", camera.name,
+                       std::to_string(stored.cols) + "x" + std::to_string(stored.rows),
+                       "must be " + std::to_string(camera.width) + "x" +
+                           std::to_string(camera.height) + " (width x height) as the rig's camera");
+    }
+    // Pixels of the right type stay where they are.
+    result[c] = stored.type() == CV_32FC3 ? stored : unit_image(stored);
+  }
+  if (known == images.size()) return result;
+  for (const auto& [name, image] : images) {
+    const bool is_known = std::any_of(rig.cameras.begin(), rig.cameras.end(),
+                                      [&](const Camera& camera) { return camera.name == name; });
+    if (!is_known)
+      throw InputError("images", "camera", name, "must be one of the rig: " + camera_names(rig));
+  }
+  return result;
+}
+
+PointOptions point_options(const Rig& rig, const ReconstructionOptions& options) {
+  PointOptions points;
+  const std::optional<Method> method = method_from_name(options.method);
+  if (!method) {
+    throw InputError("options", "method", options.method,
+                     "must be joint, linear, multiview or single-projector");
+  }
+  points.solution.method = *method;
+  if (options.multiview_cost != "normalized" && options.multiview_cost != "published") {
+    throw InputError("options", "multiview_cost", options.multiview_cost,
+                     "must be normalized or published");
+  }
+  points.solution.cost = options.multiview_cost == "published" ? MultiviewCost::kPublished
+                                                               : MultiviewCost::kNormalized;
+  for (std::size_t p = 0; p < rig.projectors.size(); ++p) {
+    if (rig.projectors[p].patterns.empty())
+      throw InputError("rig", "projectors[" + std::to_string(p) + "].pattern", "",
+                       "this key is missing: there is nothing to see of this projector");
+  }
+  if (*method == Method::kSingleProjector && !shows_grid(rig)) {
+    throw InputError("rig", "projectors", "",
+                     "must hold one with a vertical and a horizontal pattern, which the method "
+                     "single-projector needs");
+  }
+  return points;
+}
+
+std::vector<CameraDepth> depth_of(const Rig& rig, const DepthResult& depth) {
+  std::vector<CameraDepth> result;
+  for (const DepthMap& map : depth.maps) {
+    const Camera& camera = rig.cameras[static_cast<std::size_t>(map.camera)];
+    DepthImage image = depth_image(camera, map);
+    result.push_back({camera.name, std::move(image.depth), std::move(image.sigma)});
+  }
+  return result;
+}
+
+}  // namespace
+
+Reconstruction reconstruct(const Rig& rig, const Images& images,
+                           const ReconstructionOptions& options) {
+  PointOptions points = point_options(rig, options);
+  ShapeOptions shape;
+  // The paper's two methods keep their own, continuous planes: their surface rests on the curves.
+  shape.depth.enabled = options.depth && points.solution.method == Method::kJoint;
+  Frame frame;
+  frame.name = options.frame;
+  frame.images = camera_images(rig, images);
+  if (!options.plain.empty()) frame.plain = camera_images(rig, options.plain);
+  std::optional<ThreadLimit> limit;
+  if (options.threads > 0) limit.emplace(options.threads);
+
+  Reconstruction result;
+  run_stages(options.progress, kStages, [&](const Progress& progress) {
+    points.progress = shape.progress = progress;
+    FrameResult found = reconstruct_frame(rig, frame, points, shape, options.mesh);
+    result.report = json_text(frame_report(rig, frame, found.points, found.shape));
+    result.curves = describe_curves(found.points);
+    if (options.depth_maps) result.depth = depth_of(rig, found.shape.depth);
+    result.points = std::move(found.points.points);
+    result.mesh = std::move(found.shape.surface.mesh);
+    result.measured = std::move(found.shape.surface.measured);
+  });
+  return result;
+}
+
+void write_reconstruction(const std::filesystem::path& folder, const Reconstruction& result) {
+  write_points(folder / "points.ply", result.points);
+  write_curves(folder / "curves.ply", result.curves);
+  if (!result.mesh.faces.empty()) {
+    write_mesh(folder / "mesh.ply", result.mesh);
+    write_mesh(folder / "mesh_measured.ply", result.measured);
+  }
+  write_text(folder / "report.json", result.report);
+}
+
+}  // namespace pencilscan

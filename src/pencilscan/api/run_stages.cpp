@@ -1,0 +1,94 @@
+#include "pencilscan/api/run_stages.h"
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <exception>
+#include <mutex>
+#include <string>
+#include <thread>
+
+#include "pencilscan/core/cancellation.h"
+
+namespace pencilscan {
+namespace {
+
+constexpr auto kInterval = std::chrono::milliseconds(50);  // Ctrl-C is noticed within it
+
+/// What the working thread and the waiting one share.
+class Work {
+ public:
+  explicit Work(std::string_view first_stage) : stage_(first_stage) {}
+
+  void announce(std::string_view stage) {
+    {
+      const std::lock_guard lock(mutex_);
+      stage_ = stage;
+    }
+    changed_.notify_one();
+    if (stop) throw Cancelled();
+  }
+  void finish() {
+    {
+      const std::lock_guard lock(mutex_);
+      finished_ = true;
+    }
+    changed_.notify_one();
+  }
+  /// The stage at work, after a while or when it is another than `known`; false once it is done.
+  bool wait(std::string& known) {
+    std::unique_lock lock(mutex_);
+    changed_.wait_for(lock, kInterval, [&] { return finished_ || stage_ != known; });
+    known = stage_;
+    return !finished_;
+  }
+
+  std::atomic<bool> stop{false};
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::string stage_;
+  bool finished_ = false;
+};
+
+}  // namespace
+
+void run_stages(const StageListener& listener, std::span<const std::string_view> stages,
+                const std::function<void(const Progress&)>& work) {
+  if (!listener) {
+    work({});
+    return;
+  }
+  Work shared(stages.front());
+  std::exception_ptr failure;
+  std::thread worker([&] {
+    try {
+      const CancelScope scope(shared.stop);
+      work([&](std::string_view stage, double) { shared.announce(stage); });
+    } catch (...) {
+      failure = std::current_exception();
+    }
+    shared.finish();
+  });
+  std::exception_ptr refusal;
+  std::string stage(stages.front());
+  while (shared.wait(stage)) {
+    if (shared.stop) continue;
+    try {
+      const auto at = std::find(stages.begin(), stages.end(), stage) - stages.begin();
+      if (!listener(stage, static_cast<double>(at) / static_cast<double>(stages.size())))
+        shared.stop = true;
+    } catch (...) {
+      refusal = std::current_exception();
+      shared.stop = true;
+    }
+  }
+  worker.join();
+  if (refusal) std::rethrow_exception(refusal);
+  if (failure) std::rethrow_exception(failure);
+  if (shared.stop) throw Cancelled();
+}
+
+}  // namespace pencilscan

@@ -1,0 +1,80 @@
+#include "pencilscan/simulation/photography.h"
+
+#include <sstream>
+#include <vector>
+
+#include "pencilscan/core/error.h"
+
+namespace pencilscan {
+namespace {
+
+SensorPreset preset_of(const PhotographyOptions& options) {
+  const std::optional<SensorPreset> preset = sensor_preset(options.noise);
+  if (!preset)
+    throw InputError("options", "noise", options.noise, "must be none, low, medium or high");
+  return *preset;
+}
+
+/// What each camera's picture is lit with: a texture camera sees white light instead of patterns.
+std::vector<PanelLight> lights_for(const Camera& camera, const Rig& rig, const FilmOptions& film) {
+  std::vector<PanelLight> lights = line_lights(rig, film);
+  if (!camera.sees_texture_only) return lights;
+  for (std::size_t p = 0; p < lights.size(); ++p)
+    lights[p] = gray_code_light(rig.projectors[p], {GrayCodeImage::Kind::kWhite});
+  return lights;
+}
+
+}  // namespace
+
+SensorOptions camera_sensor(const PhotographyOptions& options, const Camera& camera) {
+  SensorOptions sensor = preset_of(options).sensor;
+  // A rig that states how colours mix describes its cameras whole; a preset adds nothing to it.
+  if (camera.states_color_matrix()) sensor.crosstalk = 0;
+  sensor.crosstalk = options.crosstalk.value_or(sensor.crosstalk);
+  sensor.blur_px = options.blur_px.value_or(sensor.blur_px);
+  sensor.full_well = options.full_well.value_or(sensor.full_well);
+  sensor.read_noise = options.read_noise.value_or(sensor.read_noise);
+  sensor.gain = options.gain;
+  sensor.gamma = camera.gamma;
+  sensor.bit_depth = options.bits;
+  return sensor;
+}
+
+RenderOptions scene_light(const PhotographyOptions& options) {
+  RenderOptions render = options.render;
+  render.ambient = options.ambient.value_or(preset_of(options).ambient);
+  return render;
+}
+
+cv::Mat photograph(const Rig& rig, std::size_t c, const SimulatedObject& object,
+                   const PhotographyOptions& options, std::uint32_t image) {
+  const Camera& camera = rig.cameras[c];
+  FilmOptions film = options.film;
+  film.black_level = options.black_level.value_or(0);
+  const cv::Mat light =
+      render_camera(rig, c, object, lights_for(camera, rig, film), scene_light(options));
+  return apply_sensor(light, camera_sensor(options, camera), options.seed, image);
+}
+
+void check_scene(const Rig& rig, const TriangleMesh& mesh, const std::string& name,
+                 const std::string& rig_name) {
+  for (std::size_t p = 0; p < rig.projectors.size(); ++p) {
+    if (rig.projectors[p].patterns.empty()) {
+      throw InputError(rig_name, "projectors[" + std::to_string(p) + "].pattern", "",
+                       "this key is missing: there is nothing to show");
+    }
+  }
+  for (const Camera& camera : rig.cameras) {
+    for (const Vec3& vertex : mesh.vertices) {
+      const auto pixel = camera.project(vertex);
+      if (pixel && camera.contains(*pixel)) return;
+    }
+  }
+  const BoundingBox box = bounding_box(mesh);
+  std::ostringstream extent;
+  extent << "[" << box.low.transpose() << "] to [" << box.high.transpose() << "] mm";
+  throw InputError(name, "vertices", extent.str(),
+                   "must lie in the view of at least one camera (--fit moves them there)");
+}
+
+}  // namespace pencilscan
