@@ -10,6 +10,7 @@
 /// a Cancelled. Nothing prints and nothing ends the caller's process. Lengths are millimetres,
 /// angles radians, images in RGB order (docs/library.md).
 
+#include "pencilscan/api/calibrate.h"
 #include "pencilscan/api/evaluate.h"
 #include "pencilscan/api/images.h"
 #include "pencilscan/api/reconstruct.h"

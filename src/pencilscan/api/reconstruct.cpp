@@ -42,6 +42,10 @@ std::vector<cv::Mat> camera_images(const Rig& rig, const Images& images) {
                        "must be " + std::to_string(camera.width) + "x" +
                            std::to_string(camera.height) + " (width x height) as the rig's camera");
     }
+    // Far outside [0, 1] means bytes as numbers; a little above it an image that was worked on.
+    if (stored.depth() == CV_32F && !cv::checkRange(stored, true, nullptr, -1, 2)) {
+      throw InputError("images", camera.name, "", "float pixels must be finite and lie in [0, 1]");
+    }
     // Pixels of the right type stay where they are.
     result[c] = stored.type() == CV_32FC3 ? stored : unit_image(stored);
   }

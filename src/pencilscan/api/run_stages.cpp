@@ -74,12 +74,14 @@ void run_stages(const StageListener& listener, std::span<const std::string_view>
   });
   std::exception_ptr refusal;
   std::string stage(stages.front());
+  double done = 0;
   while (shared.wait(stage)) {
     if (shared.stop) continue;
     try {
-      const auto at = std::find(stages.begin(), stages.end(), stage) - stages.begin();
-      if (!listener(stage, static_cast<double>(at) / static_cast<double>(stages.size())))
-        shared.stop = true;
+      const auto at = std::find(stages.begin(), stages.end(), stage);
+      if (at != stages.end())
+        done = static_cast<double>(at - stages.begin()) / static_cast<double>(stages.size());
+      if (!listener(stage, done)) shared.stop = true;
     } catch (...) {
       refusal = std::current_exception();
       shared.stop = true;

@@ -3,16 +3,12 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "pencilscan/boards/board.h"
-#include "pencilscan/calibration/calibration_report.h"
-#include "pencilscan/calibration/tracks.h"
+#include "pencilscan/calibration/from_captures.h"
 #include "pencilscan/cli/command.h"
 #include "pencilscan/cli/device_arguments.h"
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/core/stopwatch.h"
-#include "pencilscan/gray/gray_decode.h"
-#include "pencilscan/gray/image_order.h"
 #include "pencilscan/io/file.h"
 #include "pencilscan/page/page.h"
 
@@ -45,37 +41,6 @@ std::optional<KnownDistance> known_distance(const CalibrateCommand& command, con
   return distance;
 }
 
-/// Decodes one pair and adds its correspondences, unless the codes make no sense; looks for the
-/// board where all of the panel is lit.
-DecodeSummary decode_pair(const CapturePair& pair, std::size_t capture, const Rig& rig,
-                          TrackBuilder& tracks, ColorCollector& colors, BoardFinder* boards,
-                          std::vector<Finding>& findings) {
-  const Projector& projector = rig.projectors[pair.projector];
-  const GrayStack stack = read_gray_stack(pair, rig);
-  if (boards != nullptr) boards->look(capture, pair.camera, stack.white);
-  const DecodedView view = decode_gray_stack(stack);
-  DecodeSummary summary{capture, pair.projector, pair.camera, view.counts, view.valid_share(), 0,
-                        {}};
-  summary.wrong_order = explain_wrong_order(
-      projector.width, projector.height, pair.inverses,
-      [&](std::size_t i) { return read_gray_image(pair, rig, i); }, view);
-  if (!summary.wrong_order.empty()) {
-    findings.push_back({Grade::kDoubtful,
-                        "the images of " + projector.name + "/" + rig.cameras[pair.camera].name +
-                            " (--captures number " + std::to_string(capture + 1) +
-                            ") are in the wrong order: " + summary.wrong_order,
-                        "put them in the documented order; they were left out"});
-    return summary;
-  }
-  const std::size_t before = tracks.samples();
-  tracks.add(capture, pair.camera, pair.projector, view);
-  colors.add(pair, view);
-  if (boards != nullptr)
-    boards->project(capture, pair.camera, rig.cameras.size() + pair.projector, view);
-  summary.samples = tracks.samples() - before;
-  return summary;
-}
-
 void check_command(const CalibrateCommand& command) {
   std::error_code ignored;
   if (fs::equivalent(command.out, command.devices, ignored))
@@ -96,92 +61,31 @@ void print_verdict(const Verdict& verdict) {
   }
 }
 
-nlohmann::ordered_json figures_of(const CalibrationResult& result, const Uncertainty& uncertainty,
-                                  const Verdict& verdict, double seconds) {
-  nlohmann::ordered_json figures;
-  figures["verdict"] = to_string(verdict.grade);
-  for (std::size_t i = 0; i < verdict.findings.size(); ++i)
-    if (verdict.findings[i].grade == verdict.grade && verdict.grade != Grade::kGood)
-      figures["reasons"].push_back(verdict.findings[i].what);
-  figures["rms_px"] = result.rms_px;
-  figures["held_out_rms_px"] = result.held_out_rms_px;
-  if (!result.problem.board_views.empty()) figures["board_rms_px"] = result.board_rms_px;
-  figures["views"] = result.views;
-  figures["views_dropped"] = result.views_dropped;
-  figures["point_sigma"] = uncertainty.volume_median;
-  figures["unit"] = result.rig.unit_known ? "mm" : "unknown";
-  figures["seconds"] = seconds;
-  return figures;
-}
-
 void run_calibrate(const CalibrateCommand& command) {
   const ThreadLimit threads(command.common.threads);
   const Stopwatch watch;
   check_command(command);
   const UncalibratedRig devices = read_devices(command.devices);
-  CalibrationInput input;
-  input.rig = devices.rig;
-  input.known = devices.given;
-  input.distance = known_distance(command, input.rig);
-
-  std::optional<BoardFinder> boards;
-  if (!command.board.empty()) boards.emplace(board_from_text(command.board, "--board"));
-
-  const Progress progress = stderr_progress();
-  GrayTrackOptions track_options;
-  track_options.max_tracks = command.max_tracks;
-  TrackBuilder tracks(input.rig, track_options);
-  ColorCollector colors(input.rig);
-  std::vector<DecodeSummary> decoded;
-  std::vector<Finding> findings;
-  std::vector<std::vector<CapturePair>> captures;
-  for (const std::string& folder : command.captures)
-    captures.push_back(list_captures(folder, input.rig));
-  for (std::size_t k = 0; k < captures.size(); ++k) {
-    for (std::size_t i = 0; i < captures[k].size(); ++i) {
-      progress("decoding", (static_cast<double>(k) +
-                            static_cast<double>(i) / static_cast<double>(captures[k].size())) /
-                               static_cast<double>(captures.size()));
-      decoded.push_back(decode_pair(captures[k][i], k, input.rig, tracks, colors,
-                                    boards ? &*boards : nullptr, findings));
-    }
-  }
-  input.tracks = tracks.tracks();
-  if (boards) {
-    input.board_views = boards->views();
-    input.projected_corners = boards->projected_views();
-    input.boards = command.captures.size();
-    if (boards->found() == 0)
-      findings.push_back({Grade::kDoubtful,
-                          "the board " + command.board + " is in no picture of any camera",
-                          "count its inner corners, and let a camera see all of it lit"});
-  }
-
-  CalibrateOptions options;
-  CalibrationResult result = calibrate(input, options, progress);
-  const ColorCalibration color = colors.result();
-  set_colors(color, result.rig);
-  progress("judging", 0.9);
-  Uncertainty sigma;
-  sigma.devices.resize(device_count(input.rig));
-  if (result.solved) {
-    sigma = uncertainty(result.problem, result.adjustment, command.common.seed);
-  }
-  const LoopClosure loop = close_loop(result);
-  if (const auto finding = judge_loop(result, loop)) findings.push_back(*finding);
-  const Verdict verdict = judge(input, result, sigma, std::move(findings));
-  progress("judging", 1);
-  const CalibrationReport report{input, result, sigma, verdict, decoded, loop, color};
+  CapturesOptions options;
+  options.distance = known_distance(command, devices.rig);
+  options.board = command.board;
+  options.max_tracks = command.max_tracks;
+  options.seed = command.common.seed;
+  const CapturesCalibration calibration = calibrate_captures(
+      devices, {command.captures.begin(), command.captures.end()}, options, stderr_progress());
+  const Verdict& verdict = calibration.verdict;
   const fs::path folder = fs::path(command.out).parent_path();
-  const nlohmann::ordered_json report_json = calibration_json(report);
+  const nlohmann::ordered_json report_json = calibration_json(calibration);
   write_json(folder / "calibration.json", report_json);
   write_text(folder / "calibration.html",
              calibration_page(report_json, "Calibration", "pencilscan " PENCILSCAN_VERSION));
-  if (verdict.grade != Grade::kUnusable) write_rig(result.rig, command.out);
+  if (calibration.is_usable()) write_rig(calibration.result.rig, command.out);
   print_verdict(verdict);
-  print_remarks(color);
-  print_figures(command.common, figures_of(result, sigma, verdict, watch.seconds()));
-  if (verdict.grade == Grade::kUnusable) {
+  print_remarks(calibration.color);
+  nlohmann::ordered_json figures = calibration_figures(calibration);
+  figures["seconds"] = watch.seconds();
+  print_figures(command.common, figures);
+  if (!calibration.is_usable()) {
     std::cout.flush();
     throw StageError("unusable: " + verdict.findings.front().what);
   }

@@ -1,0 +1,56 @@
+"""Entire shapes from one frame of a ring of cameras and projectors.
+
+    import pencilscan as ps
+
+    rig = ps.read_rig("rig.json")                     # or ps.ring(), ps.calibrate(...)
+    result = ps.reconstruct(rig, {"cam0": image0, "cam1": image1})
+    result.points.xyz                                 # (n, 3) float32, mm
+    result.mesh.vertices, result.mesh.faces           # the closed surface
+
+Lengths are mm, images RGB with pixel centres at whole numbers, world z is up. Arrays that the
+library gives are views of its memory. `help(ps.reconstruct)` tells all options.
+"""
+
+from . import _core
+from ._errors import Cancelled, InputError, StageError
+from ._rig import Rig, read_rig, ring
+from ._scan import (
+    CalibratedRig,
+    CameraDepth,
+    Crossings,
+    Curves,
+    Mesh,
+    Points,
+    Result,
+    SimulatedFrame,
+    calibrate,
+    evaluate,
+    make_sphere,
+    read_mesh,
+    reconstruct,
+    simulate,
+)
+
+__version__: str = _core.version
+__all__ = [
+    "CalibratedRig",
+    "CameraDepth",
+    "Cancelled",
+    "Crossings",
+    "Curves",
+    "InputError",
+    "Mesh",
+    "Points",
+    "Result",
+    "Rig",
+    "SimulatedFrame",
+    "StageError",
+    "calibrate",
+    "evaluate",
+    "make_sphere",
+    "read_mesh",
+    "read_rig",
+    "reconstruct",
+    "ring",
+    "simulate",
+]

@@ -1,0 +1,169 @@
+"""Rigs: cameras, projectors and what they show."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from typing import Any, Union
+
+from . import _core
+
+PathLike = Union[str, "os.PathLike[str]"]
+
+
+class Rig:
+    """All cameras and projectors with their patterns: rig.json as a value.
+
+    Lengths are mm, angles radians, `x_device = R x_world + t`; pixel centres are at whole numbers.
+    """
+
+    def __init__(self, rig: Union[dict, str, PathLike]) -> None:
+        """From a dictionary with the keys of rig.json, or the path of such a file."""
+        if isinstance(rig, dict):
+            self._core = _core.Rig(json.dumps(rig), "rig")
+        else:
+            self._core = _core.read_rig(os.fspath(rig))
+
+    @classmethod
+    def _of(cls, core: Any) -> "Rig":
+        rig = cls.__new__(cls)
+        rig._core = core
+        return rig
+
+    @property
+    def cameras(self) -> list[str]:
+        """The names of the cameras; `points.camera` holds places in this list."""
+        return self._core.cameras
+
+    @property
+    def projectors(self) -> list[str]:
+        """The names of the projectors; `points.projector` holds places in this list."""
+        return self._core.projectors
+
+    @property
+    def volume(self) -> tuple[tuple[float, float, float], float]:
+        """Centre (x, y, z) and radius, mm, of the sphere that holds the object."""
+        *center, radius = self._core.volume()
+        return tuple(center), radius
+
+    def to_dict(self) -> dict:
+        """The contents of rig.json."""
+        return json.loads(self._core.text())
+
+    def write(self, path: PathLike) -> None:
+        """Writes rig.json, whole or not at all; replaces a file that is there."""
+        self._core.write(os.fspath(path))
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Rig) and self._core.text() == other._core.text()
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __reduce__(self):
+        return _unpickled, (self.to_dict(),)
+
+    def __repr__(self) -> str:
+        return (
+            f"<pencilscan.Rig: {len(self.cameras)} cameras, {len(self.projectors)} projectors>"
+        )
+
+
+def _unpickled(contents: dict) -> Rig:
+    return Rig(contents)
+
+
+def as_rig(rig: Union[Rig, dict, PathLike]) -> Rig:
+    return rig if isinstance(rig, Rig) else Rig(rig)
+
+
+def read_rig(path: PathLike) -> Rig:
+    """Reads rig.json. InputError names file, field, value and rule of what is wrong in it."""
+    return Rig._of(_core.read_rig(os.fspath(path)))
+
+
+def ring(
+    cameras: int = 6,
+    projectors: int = 6,
+    *,
+    distance_mm: float = 1100,
+    volume_radius_mm: float = 170,
+    arc_deg: float = 360,
+    camera_elevation_deg: float = 15,
+    vertical_elevation_deg: float = 8,
+    horizontal_elevation_deg: float = 34,
+    camera_size: tuple[int, int] = (1280, 960),
+    camera_focal_px: float = 2300,
+    projector_size: tuple[int, int] = (1280, 1024),
+    projector_focal_px: float = 2430,
+    pitch_px: float = 12,
+    line_width_px: float = 4,
+    offset_px: float = 6,
+    order: int = 3,
+    colors: tuple = (("blue", "cyan"), ("red", "yellow")),
+) -> Rig:
+    """A ring of cameras and projectors in turn that look at the origin, world z up.
+
+    Parameters
+    ----------
+    cameras, projectors
+        How many, 1 to 256.
+    distance_mm
+        Of every device to the origin.
+    volume_radius_mm
+        Radius of the sphere that holds the object.
+    arc_deg
+        How much of the circle is used.
+    camera_elevation_deg, vertical_elevation_deg, horizontal_elevation_deg
+        Of cameras, projectors of vertical lines and projectors of horizontal lines.
+    camera_size, projector_size
+        (width, height), px.
+    camera_focal_px, projector_focal_px
+        Focal lengths, px.
+    pitch_px, line_width_px, offset_px
+        Distance of neighbouring lines, width of a line, centre of the first one: projector px.
+    order
+        Lines in a row whose colours tell where they are.
+    colors
+        Of the projectors in turn.
+    """
+    from ._errors import InputError
+
+    def require(holds: bool, field: str, value: object, rule: str) -> None:
+        if not holds:
+            raise InputError("ring", field, str(value), rule)
+
+    require(1 <= cameras <= 256, "cameras", cameras, "must be 1 to 256")
+    require(1 <= projectors <= 256, "projectors", projectors, "must be 1 to 256")
+    require(volume_radius_mm > 0, "volume_radius_mm", volume_radius_mm, "must be > 0")
+    require(distance_mm > volume_radius_mm, "distance_mm", distance_mm,
+            "must be larger than volume_radius_mm")
+    require(0 < arc_deg <= 360, "arc_deg", arc_deg, "must be in (0, 360]")
+    require(pitch_px > 0, "pitch_px", pitch_px, "must be > 0")
+    require(0 < line_width_px <= pitch_px, "line_width_px", line_width_px,
+            "must be in (0, pitch_px]")
+    require(len(colors) > 0, "colors", colors, "must have at least one list of colours")
+    longest = max(len(entry) for entry in colors)
+    require(1 <= order <= 20 and longest**order <= 2**20, "order", order,
+            "must be 1 to 20, and colours^order <= 2^20")
+    options = _core.RingOptions()
+    options.cameras = cameras
+    options.projectors = projectors
+    options.distance_mm = distance_mm
+    options.volume_radius_mm = volume_radius_mm
+    degree = math.pi / 180  # the program's way to round
+    options.arc_rad = min(arc_deg * degree, 2 * math.pi)
+    options.camera_elevation_rad = camera_elevation_deg * degree
+    options.vertical_elevation_rad = vertical_elevation_deg * degree
+    options.horizontal_elevation_rad = horizontal_elevation_deg * degree
+    options.camera_width, options.camera_height = camera_size
+    options.camera_focal_px = camera_focal_px
+    options.projector_width, options.projector_height = projector_size
+    options.projector_focal_px = projector_focal_px
+    options.pitch_px = pitch_px
+    options.line_width_px = line_width_px
+    options.offset_px = offset_px
+    options.order = order
+    options.colors = [list(entry) for entry in colors]
+    # Once through the text, which checks every number as it checks those of a file.
+    return Rig._of(_core.Rig(_core.make_ring(options).text(), "ring"))

@@ -1,0 +1,564 @@
+"""From pictures to shape, from shape to pictures, and how good the shape is."""
+
+from __future__ import annotations
+
+import json
+import os
+from typing import Any, Callable, Mapping, NamedTuple, Optional, Sequence, Union
+
+import numpy as np
+
+from . import _core
+from ._errors import InputError, StageError
+from ._rig import PathLike, Rig, as_rig
+
+Progress = Callable[[str, float], Optional[bool]]
+MeshLike = Union["Mesh", PathLike, tuple, Any]
+
+
+class Mesh:
+    """A triangle mesh. Its arrays are views of the library's memory.
+
+    Attributes
+    ----------
+    vertices : (n, 3) float64
+        World, mm.
+    faces : (m, 3) int32
+        Indices of vertices, counter-clockwise seen from outside.
+    sigma : (n,) float32, or None
+        One standard deviation along the normal, mm.
+    confidence : (n,) float32, or None
+        0 to 1; 0 where nobody measured.
+    color : (n, 3) float32, or None
+        Albedo in linear light: red, green, blue in [0, 1].
+    hole : (n,) uint8, or None
+        Why nobody measured the vertex; 0 where it was measured.
+
+    Other programs take the arrays as they are: `trimesh.Trimesh(mesh.vertices, mesh.faces)`,
+    `open3d.utility.Vector3dVector(mesh.vertices)`.
+    """
+
+    def __init__(self, vertices: Any, faces: Any) -> None:
+        """From arrays of the shapes (n, 3), mm, and (m, 3); they are copied."""
+        self._core = _core.Mesh(np.asarray(vertices, dtype=np.float64), _whole(faces))
+
+    @classmethod
+    def _of(cls, core: Any) -> Optional["Mesh"]:
+        if core is None:
+            return None
+        mesh = cls.__new__(cls)
+        mesh._core = core
+        return mesh
+
+    @property
+    def vertices(self) -> np.ndarray:
+        return self._core.vertices
+
+    @property
+    def faces(self) -> np.ndarray:
+        return self._core.faces
+
+    @property
+    def sigma(self) -> Optional[np.ndarray]:
+        return self._core.sigma
+
+    @property
+    def confidence(self) -> Optional[np.ndarray]:
+        return self._core.confidence
+
+    @property
+    def color(self) -> Optional[np.ndarray]:
+        return self._core.color
+
+    @property
+    def hole(self) -> Optional[np.ndarray]:
+        return self._core.hole
+
+    @property
+    def normals(self) -> np.ndarray:
+        """(n, 3) float64: unit normals of the vertices, outward; computed when asked for."""
+        return self._core.normals()
+
+    @property
+    def area_mm2(self) -> float:
+        return self._core.area_mm2
+
+    @property
+    def volume_mm3(self) -> float:
+        """Above 0 for a closed mesh with outward faces."""
+        return self._core.volume_mm3
+
+    def write(self, path: PathLike) -> None:
+        """Writes .ply (all there is), .obj, .stl (mm) or .glb (metres, y up)."""
+        self._core.write(os.fspath(path))
+
+    def __repr__(self) -> str:
+        return f"<pencilscan.Mesh: {len(self.vertices)} vertices, {len(self.faces)} faces>"
+
+
+def _whole(faces: Any) -> np.ndarray:
+    faces = np.asarray(faces)
+    if faces.size and not np.issubdtype(faces.dtype, np.integer):
+        raise InputError("mesh", "faces", str(faces.dtype), "must be whole numbers")
+    return faces.astype(np.int32) if faces.size else np.empty((0, 3), np.int32)
+
+
+def read_mesh(path: PathLike) -> Mesh:
+    """Reads PLY (with sigma, confidence, hole and colour), OBJ, STL or OFF, in mm."""
+    return Mesh._of(_core.read_mesh(os.fspath(path)))
+
+
+def make_sphere(radius_mm: float, rings: int = 32) -> Mesh:
+    """A closed sphere around the origin."""
+    if not radius_mm > 0:
+        raise InputError("make_sphere", "radius_mm", str(radius_mm), "must be > 0")
+    if rings < 3:
+        raise InputError("make_sphere", "rings", str(rings), "must be >= 3")
+    return Mesh._of(_core.make_sphere(radius_mm, rings))
+
+
+def _as_mesh(mesh: MeshLike) -> Mesh:
+    if isinstance(mesh, Mesh):
+        return mesh
+    if isinstance(mesh, (str, os.PathLike)):
+        return read_mesh(mesh)
+    if isinstance(mesh, tuple) and len(mesh) == 2:
+        return Mesh(*mesh)
+    faces = getattr(mesh, "faces", getattr(mesh, "triangles", None))
+    if hasattr(mesh, "vertices") and faces is not None:
+        return Mesh(np.asarray(mesh.vertices), np.asarray(faces))
+    raise InputError(
+        "mesh", "", type(mesh).__name__,
+        "must be a Mesh, a path, (vertices, faces), or have .vertices and .faces",
+    )
+
+
+class _Table:
+    """Arrays of one length by name, as attributes too."""
+
+    def __init__(self, arrays: dict) -> None:
+        self._arrays = arrays
+
+    def __getattr__(self, name: str) -> np.ndarray:
+        if name.startswith("_") or name not in self._arrays:
+            raise AttributeError(f"no property {name}; there are {', '.join(self.names)}")
+        return self._arrays[name]
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        return self._arrays[name]
+
+    @property
+    def names(self) -> list[str]:
+        return list(self._arrays)
+
+    def __dir__(self):
+        return [*super().__dir__(), *self._arrays]
+
+    def __len__(self) -> int:
+        return len(next(iter(self._arrays.values())))
+
+    def __repr__(self) -> str:
+        return f"<pencilscan.{type(self).__name__}: {len(self)} of {', '.join(self.names)}>"
+
+
+class Points(_Table):
+    """Measured curve pixels: one array per property of points.ply, views of one memory.
+
+    Attributes
+    ----------
+    xyz : (n, 3) float32
+        World, mm; also as x, y, z.
+    uv : (n, 2) float32
+        Camera pixel; also as u, v.
+    camera, projector, pattern : (n,) uint8
+        Places in `rig.cameras`, `rig.projectors`, and in the projector's patterns.
+    line : (n,) uint16
+        Which line of the pattern.
+    sigma : (n,) float32
+        mm, one standard deviation along the camera ray.
+    confidence : (n,) float32
+        0 to 1.
+    plane : (n,) float32
+        The line coordinate that was triangulated.
+    """
+
+    xyz: np.ndarray
+    x: np.ndarray
+    y: np.ndarray
+    z: np.ndarray
+    uv: np.ndarray
+    u: np.ndarray
+    v: np.ndarray
+    camera: np.ndarray
+    projector: np.ndarray
+    pattern: np.ndarray
+    line: np.ndarray
+    sigma: np.ndarray
+    confidence: np.ndarray
+    plane: np.ndarray
+
+
+class Curves(_Table):
+    """Points of all detected curves, one array per property of curves.ply.
+
+    Attributes
+    ----------
+    uv : (n, 2) float32
+        Camera pixel, sub-pixel; also as u, v.
+    sigma_px, amplitude : (n,) float32
+        One standard deviation across the curve, px; height of the line above its surroundings.
+    camera, curve : (n,) uint8, uint32
+        Which camera; which curve of it. Points of a curve follow each other.
+    family, color, color_lead : (n,) uint8, uint8, float32
+        Set of colours, likeliest colour in it, log-likelihood by which it leads.
+    state : (n,) uint8
+        0 labelled, 1 nothing crosses it, 2 ambiguous, 3 contradicted, 4 outside the volume,
+        5 undecided.
+    projector, pattern, line, confidence
+        The label where state is 0.
+    """
+
+    uv: np.ndarray
+    u: np.ndarray
+    v: np.ndarray
+    sigma_px: np.ndarray
+    amplitude: np.ndarray
+    camera: np.ndarray
+    curve: np.ndarray
+    family: np.ndarray
+    color: np.ndarray
+    color_lead: np.ndarray
+    state: np.ndarray
+    projector: np.ndarray
+    pattern: np.ndarray
+    line: np.ndarray
+    confidence: np.ndarray
+
+
+class Crossings(_Table):
+    """Where two curves of a camera cross: uv (n, 2) float32, camera, curve_a, curve_b."""
+
+    uv: np.ndarray
+    u: np.ndarray
+    v: np.ndarray
+    camera: np.ndarray
+    curve_a: np.ndarray
+    curve_b: np.ndarray
+
+
+class CameraDepth(NamedTuple):
+    """Depth of one camera at its full resolution; NaN where there is none."""
+
+    z: np.ndarray
+    """(height, width) float32: camera z, mm."""
+    sigma: np.ndarray
+    """(height, width) float32: one standard deviation of z, mm."""
+
+
+class Result:
+    """What one frame gives. All arrays are views of one memory, which lives as long as any of them.
+
+    Attributes
+    ----------
+    points : Points
+        points.ply.
+    curves : Curves
+        curves.ply.
+    crossings : Crossings
+        Its crossings.
+    mesh : Mesh, or None without mesh=True
+        The closed surface, mesh.ply.
+    measured : Mesh, or None
+        The same without what nobody measured, mesh_measured.ply.
+    depth : dict of CameraDepth by camera
+        Filled with depth_maps=True.
+    report : dict
+        report.json: counts, residuals, warnings.
+    """
+
+    def __init__(self, core: Any) -> None:
+        self._core = core
+        self.points = Points(core.points)
+        self.curves = Curves(core.curves)
+        self.crossings = Crossings(core.crossings)
+        self.mesh = Mesh._of(core.mesh)
+        self.measured = Mesh._of(core.measured)
+        self.depth = {name: CameraDepth(*maps) for name, maps in core.depth.items()}
+        self.report: dict = json.loads(core.report)
+
+    @property
+    def warnings(self) -> list[str]:
+        """What to know about this result, in plain words."""
+        return self.report["warnings"]
+
+    def write(self, folder: PathLike) -> None:
+        """points.ply, curves.ply, report.json, mesh.ply and mesh_measured.ply, as the program."""
+        self._core.write(os.fspath(folder))
+
+    def __repr__(self) -> str:
+        faces = len(self.mesh.faces) if self.mesh else 0
+        return f"<pencilscan.Result: {len(self.points)} points, {faces} faces>"
+
+
+def reconstruct(
+    rig: Union[Rig, dict, PathLike],
+    images: Mapping[str, np.ndarray],
+    method: str = "joint",
+    mesh: bool = True,
+    progress: Optional[Progress] = None,
+    *,
+    depth: bool = True,
+    depth_maps: bool = False,
+    plain: Optional[Mapping[str, np.ndarray]] = None,
+    multiview_cost: str = "normalized",
+    frame: str = "000000",
+    threads: int = 0,
+) -> Result:
+    """The shape in one frame, with the values of `pencilscan reconstruct`.
+
+    Parameters
+    ----------
+    rig
+        The calibrated devices.
+    images
+        Array per camera name: (height, width, 3) RGB or (height, width); uint8 or uint16, or
+        float32 in [0, 1]; as the camera gave them. Float arrays of three channels are used where
+        they lie. OpenCV's BGR becomes RGB by `image[..., ::-1]`. Cameras may be absent.
+    method
+        joint, or the paper's linear and multiview, or single-projector.
+    mesh
+        False: points and curves alone, much faster.
+    progress
+        Called as progress(stage, done) with the stage at work and the share of stages that are
+        done, in the caller's thread. False ends the call with Cancelled. Ctrl-C works without it.
+    depth
+        Dense depth between the curves (joint only); else the surface rests on the curves.
+    depth_maps
+        Keep them in the result.
+    plain
+        The same moment in plain light, for the colour of the mesh.
+    multiview_cost
+        published or normalized.
+    frame
+        What the report calls it.
+    threads
+        Of the whole process meanwhile; 0: as it is. Results do not depend on it.
+
+    Raises
+    ------
+    InputError
+        Pictures that do not fit the rig, an unknown method.
+    StageError
+        No curve could be given its line.
+    Cancelled
+        `progress` returned False.
+
+    Other Python threads run meanwhile.
+    """
+    return Result(
+        _core.reconstruct(
+            as_rig(rig)._core, _core.Pictures(dict(images)), _core.Pictures(dict(plain or {})),
+            method, multiview_cost, mesh, depth, depth_maps, frame, threads, progress,
+        )
+    )
+
+
+class SimulatedFrame(dict):
+    """The pictures of one moment by camera name: (height, width, 3) uint8 or uint16, RGB.
+
+    `truth` is the mesh where this frame has it.
+    """
+
+    truth: Mesh
+
+    @property
+    def images(self) -> dict:
+        return dict(self)
+
+
+def simulate(
+    rig: Union[Rig, dict, PathLike],
+    mesh: MeshLike,
+    noise: str = "medium",
+    seed: int = 1,
+    *,
+    fit: bool = False,
+    up: str = "z",
+    bits: int = 8,
+    albedo: float = 0.8,
+    smooth: bool = True,
+    frame: int = 0,
+    rotate_deg: float = 0,
+    translate_mm: Sequence[float] = (0, 0, 0),
+    progress: Optional[Progress] = None,
+) -> SimulatedFrame:
+    """What the cameras of a rig would see of a mesh: the pictures of `pencilscan simulate`.
+
+    Parameters
+    ----------
+    mesh
+        A Mesh, the path of one, (vertices, faces), or anything with .vertices and .faces; mm.
+    noise
+        Sensor and room: none, low, medium, high.
+    seed
+        Of the noise.
+    fit
+        Centre and scale the mesh into the rig's volume.
+    up
+        Axis of the mesh that points up: x, y, z.
+    bits
+        8 or 16.
+    albedo
+        In [0, 1].
+    smooth
+        Interpolated normals; False: one normal per face (cubes).
+    frame, rotate_deg, translate_mm
+        Of a moving object: the frame's number, its turn about the vertical and its shift per frame.
+    progress
+        As in `reconstruct`.
+    """
+    shift = tuple(float(x) for x in translate_mm)
+    if len(shift) != 3:
+        raise InputError("simulate", "translate_mm", str(shift), "must have three numbers")
+    images, truth = _core.simulate(
+        as_rig(rig)._core, _as_mesh(mesh)._core, noise, seed, fit, up, bits, albedo, smooth, frame,
+        rotate_deg * np.pi / 180, shift, progress,
+    )
+    simulated = SimulatedFrame(images)
+    simulated.truth = Mesh._of(truth)
+    return simulated
+
+
+def evaluate(
+    truth: MeshLike,
+    rig: Union[Rig, dict, PathLike],
+    result: Union[Result, Mesh, PathLike],
+    align: str = "none",
+    *,
+    seed: int = 1,
+    progress: Optional[Progress] = None,
+) -> dict:
+    """Measures a result against the truth: the figures of `pencilscan evaluate --json`.
+
+    Parameters
+    ----------
+    truth
+        The true mesh, in any of the forms that `simulate` takes.
+    rig
+        The rig that the result was made with.
+    result
+        A Result, a mesh, or the path of a frame's output folder, a points.ply or a mesh.
+    align
+        Move the result onto the truth first: none, rigid, similarity.
+    seed
+        Of the surface samples.
+    """
+    core, points, measured = None, "", None
+    if isinstance(result, Result):
+        core = result._core
+    elif isinstance(result, Mesh):
+        measured = result._core
+    else:
+        points, measured = _result_files(os.fspath(result))
+    text = _core.judge(
+        _as_mesh(truth)._core, as_rig(rig)._core, core, points, measured, align, seed, progress
+    )
+    return json.loads(text)
+
+
+def _result_files(path: str) -> tuple[str, Any]:
+    """The points and the mesh of a frame's folder, or of one file."""
+    if not os.path.exists(path):
+        raise InputError(path, "", "", "no such file or folder")
+    if not os.path.isdir(path):
+        try:
+            return "", _core.read_mesh(path)
+        except InputError as error:
+            if error.field != "faces":
+                raise
+            return path, None
+    points = os.path.join(path, "points.ply")
+    mesh = os.path.join(path, "mesh_measured.ply")
+    if not os.path.exists(points) and not os.path.exists(mesh):
+        raise InputError(path, "", "", "must hold points.ply or mesh_measured.ply")
+    return (
+        points if os.path.exists(points) else "",
+        _core.read_mesh(mesh) if os.path.exists(mesh) else None,
+    )
+
+
+class CalibratedRig(Rig):
+    """A rig with what its calibration says of it.
+
+    Attributes
+    ----------
+    verdict : str
+        good or doubtful.
+    reasons : list of str
+        Why it is doubtful, in plain words.
+    figures : dict
+        What `pencilscan calibrate --json` writes.
+    report : dict
+        calibration.json.
+    """
+
+    verdict: str
+    reasons: list[str]
+    figures: dict
+    report: dict
+
+
+def calibrate(
+    captures: Union[PathLike, Sequence[PathLike]],
+    devices: Union[Rig, dict, PathLike],
+    *,
+    known_distance: Optional[tuple[str, str, float]] = None,
+    board: str = "",
+    max_tracks: int = 0,
+    seed: int = 1,
+    progress: Optional[Progress] = None,
+) -> CalibratedRig:
+    """The rig from Gray-code captures, as `pencilscan calibrate`.
+
+    Parameters
+    ----------
+    captures
+        Folder with <projector>/<camera>/NNN.png, or a list of them: one per pose of the object.
+    devices
+        A rig.json, or a dictionary like it, in which K, distortion, R and t may be missing.
+    known_distance
+        ("cam0", "cam1", 850.0): two devices and the distance of their centres, mm. Without it or a
+        board the rig has no scale.
+    board
+        In the captures: "chessboard:9x7:75" or "charuco:10x8:75:56:DICT_5X5_100".
+    max_tracks
+        Surface points to use at most; 0: the program's default.
+    seed
+        Of everything random.
+
+    Raises
+    ------
+    StageError
+        The captures determine no usable rig; the report is its attribute `report`.
+    """
+    if isinstance(captures, (str, os.PathLike)):
+        captures = [captures]
+    path, text = None, ""
+    if isinstance(devices, Rig):
+        text = devices._core.text()
+    elif isinstance(devices, dict):
+        text = json.dumps(devices)
+    else:
+        path = os.fspath(devices)
+    core, verdict, reasons, figures, report = _core.calibrate(
+        path, text, [os.fspath(folder) for folder in captures], known_distance, board, max_tracks,
+        seed, progress,
+    )
+    if verdict == "unusable":
+        error = StageError("unusable: " + "; ".join(reasons))
+        error.report = json.loads(report)  # type: ignore[attr-defined]
+        raise error
+    rig = CalibratedRig._of(core)
+    rig.verdict, rig.reasons = verdict, reasons
+    rig.figures, rig.report = json.loads(figures), json.loads(report)
+    return rig

@@ -1,0 +1,331 @@
+"""The package against the program, and what a Python user counts on.
+
+Run with PYTHONPATH=build/<preset>/python and PENCILSCAN_PROGRAM.
+"""
+
+import gc
+import inspect
+import json
+import os
+import pathlib
+import pickle
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+import unittest
+
+import numpy as np
+
+import pencilscan as ps
+from pencilscan import _core
+
+PROGRAM = os.environ["PENCILSCAN_PROGRAM"]
+POINT_PROPERTIES = "x y z u v camera projector pattern line sigma confidence plane".split()
+
+
+def small_ring() -> ps.Rig:
+    """Small pictures, so that the tests are quick."""
+    return ps.ring(
+        4, 4, camera_size=(480, 360), camera_focal_px=860, pitch_px=24, line_width_px=8
+    )
+
+
+def address(array: np.ndarray) -> int:
+    return array.__array_interface__["data"][0]
+
+
+def run(*arguments) -> None:
+    subprocess.run([PROGRAM, *map(str, arguments)], check=True, capture_output=True)
+
+
+class Scene:
+    """A ball before the ring, by the program and by the package."""
+
+    def __init__(self) -> None:
+        self.kept = tempfile.TemporaryDirectory()
+        self.folder = pathlib.Path(self.kept.name)
+        self.rig = small_ring()
+        self.rig.write(self.folder / "rig.json")
+        ps.make_sphere(120, 48).write(self.folder / "ball.ply")
+        run("simulate", "--rig", self.folder / "rig.json", "--mesh", self.folder / "ball.ply",
+            "--noise", "medium", "--out", self.folder / "scene")
+        run("reconstruct", "--rig", self.folder / "rig.json", "--depth-maps", "--no-pictures",
+            "--frames", self.folder / "scene" / "frames", "--out", self.folder / "out")
+        self.frame = ps.simulate(self.rig, self.folder / "ball.ply")
+        self.stages: list = []
+        self.result = ps.reconstruct(
+            self.rig, self.frame, depth_maps=True, progress=self.listen
+        )
+
+    def listen(self, stage: str, done: float) -> None:
+        self.stages.append((stage, done, threading.get_ident()))
+
+
+class PackageTest(unittest.TestCase):
+    scene: Scene
+
+    @classmethod
+    def setUpClass(cls) -> None:
+        cls.scene = Scene()
+
+    @classmethod
+    def tearDownClass(cls) -> None:
+        cls.scene.kept.cleanup()
+
+    # ---- against the program --------------------------------------------------------------------
+
+    def test_files_have_the_programs_bytes(self) -> None:
+        ours = self.scene.folder / "ours"
+        self.scene.result.write(ours)
+        theirs = self.scene.folder / "out" / "000000"
+        for name in ("points.ply", "curves.ply", "mesh.ply", "mesh_measured.ply", "report.json"):
+            self.assertEqual((ours / name).read_bytes(), (theirs / name).read_bytes(), name)
+
+    def test_arrays_have_the_programs_bytes(self) -> None:
+        points = self.scene.result.points
+        content = (self.scene.folder / "out" / "000000" / "points.ply").read_bytes()
+        header, body = content.split(b"end_header\n", 1)
+        types = {b"float": "<f4", b"uchar": "u1", b"ushort": "<u2"}
+        fields = [
+            (words[2].decode(), types[words[1]])
+            for words in (line.split() for line in header.splitlines())
+            if words[0] == b"property"
+        ]
+        stored = np.frombuffer(body, dtype=fields)
+        for name in POINT_PROPERTIES:
+            self.assertEqual(points[name].tobytes(), stored[name].tobytes(), name)
+        self.assertEqual(points.xyz.dtype, np.float32)
+        self.assertEqual(points.xyz.shape, (len(stored), 3))
+
+    def test_the_figures_are_the_programs(self) -> None:
+        folder = self.scene.folder
+        run("evaluate", "--truth", folder / "ball.ply", "--rig", folder / "rig.json", "--result",
+            folder / "out" / "000000", "--json", folder / "figures.json")
+        theirs = json.loads((folder / "figures.json").read_text())
+        self.assertEqual(ps.evaluate(folder / "ball.ply", self.scene.rig, folder / "out/000000"), theirs)
+        ours = ps.evaluate(folder / "ball.ply", self.scene.rig, self.scene.result)
+        self.assertEqual(list(ours), list(theirs))
+        self.assertEqual(ours["label_error"], theirs["label_error"])
+        self.assertLess(ours["distance_median_mm"], 0.1)
+
+    def test_a_ring_is_the_programs(self) -> None:
+        path = self.scene.folder / "ring.json"
+        run("rig", "ring", "--cameras", 5, "--projectors", 4, "--arc-deg", 200, "--out", path)
+        self.assertEqual(ps.ring(5, 4, arc_deg=200), ps.read_rig(path))
+        self.assertEqual(ps.ring(5, 4, arc_deg=200).to_dict(), json.loads(path.read_text()))
+
+    def test_depth_maps_are_the_programs(self) -> None:
+        z = self.scene.result.depth["cam1"].z
+        self.assertEqual((z.shape, z.dtype), ((360, 480), np.float32))
+        import matplotlib.image
+
+        tenths = matplotlib.image.imread(self.scene.folder / "out/000000/depth/cam1.png") * 65535
+        theirs = np.round(tenths).astype(int)
+        self.assertTrue((np.round(10 * np.nan_to_num(z)).astype(int) == theirs).mean() > 0.9999)
+        self.assertTrue((np.isfinite(z) == (theirs > 0)).all())
+        self.assertGreater(np.isfinite(z).sum(), 10000)
+        self.assertTrue((self.scene.result.depth["cam1"].sigma[np.isfinite(z)] > 0).all())
+
+    # ---- memory ---------------------------------------------------------------------------------
+
+    def test_results_are_views(self) -> None:
+        points = self.scene.result.points
+        self.assertEqual(address(points.xyz), address(points.x))
+        self.assertEqual(address(points.y) - address(points.x), 4)
+        self.assertEqual(address(points.uv), address(points.u))
+        mesh = self.scene.result.mesh
+        self.assertEqual(address(mesh.vertices), address(mesh.vertices))
+        self.assertEqual(address(mesh.faces), address(mesh.faces))
+        self.assertEqual(mesh.faces.dtype, np.int32)
+        self.assertEqual(mesh.vertices.shape[1], 3)
+        self.assertEqual(mesh.sigma.shape, (len(mesh.vertices),))
+        self.assertEqual(mesh.color.shape, (len(mesh.vertices), 3))
+        z = self.scene.result._core.depth["cam0"][0]
+        self.assertEqual(address(z), address(self.scene.result.depth["cam0"].z))
+
+    def test_pictures_are_read_where_they_lie(self) -> None:
+        wide = np.zeros((20, 40, 3), np.float32)
+        pictures = _core.Pictures({
+            "float": wide, "bytes": self.scene.frame["cam0"], "part": wide[:, :30],
+            "turned": wide[..., ::-1],
+        })
+        views = pictures.views()
+        self.assertEqual(address(views["float"]), address(wide))
+        self.assertEqual(address(views["bytes"]), address(self.scene.frame["cam0"]))
+        self.assertEqual(address(views["part"]), address(wide))
+        self.assertEqual(views["part"].shape, (20, 30, 3))
+        self.assertNotEqual(address(views["turned"]), address(wide))
+
+    def test_arrays_outlive_their_result(self) -> None:
+        result = ps.reconstruct(self.scene.rig, self.scene.frame, mesh=False)
+        xyz = result.points.xyz
+        copy = xyz.copy()
+        del result
+        gc.collect()
+        junk = [np.ones(1 << 20) for _ in range(20)]
+        self.assertTrue((xyz == copy).all())
+        del junk
+
+    def test_pictures_stay_as_they_are_and_their_type_does_not_matter(self) -> None:
+        numbers = {
+            name: image.astype(np.float32) * np.float32(1 / 255)
+            for name, image in self.scene.frame.items()
+        }
+        before = {name: image.copy() for name, image in numbers.items()}
+        of_numbers = ps.reconstruct(self.scene.rig, numbers, mesh=False)
+        of_bytes = ps.reconstruct(self.scene.rig, self.scene.frame, mesh=False)
+        self.assertEqual(of_numbers.points.xyz.tobytes(), of_bytes.points.xyz.tobytes())
+        for name, image in numbers.items():
+            self.assertTrue((image == before[name]).all())
+
+    # ---- while it runs --------------------------------------------------------------------------
+
+    def test_progress_comes_in_order_in_the_callers_thread(self) -> None:
+        done = [entry[1] for entry in self.scene.stages]
+        self.assertEqual(done, sorted(done))
+        self.assertLess(done[-1], 1)
+        self.assertIn("surface", {entry[0] for entry in self.scene.stages})
+        self.assertEqual({entry[2] for entry in self.scene.stages}, {threading.get_ident()})
+
+    def test_progress_can_end_the_call(self) -> None:
+        with self.assertRaises(ps.Cancelled):
+            ps.reconstruct(self.scene.rig, self.scene.frame, progress=lambda *_: False)
+
+        def fail(stage: str, done: float) -> None:
+            raise KeyError(stage)
+
+        with self.assertRaises(KeyError):
+            ps.reconstruct(self.scene.rig, self.scene.frame, progress=fail)
+
+    def test_other_threads_run_meanwhile(self) -> None:
+        finished = threading.Event()
+        worker = threading.Thread(target=lambda: (
+            ps.reconstruct(self.scene.rig, self.scene.frame, mesh=False), finished.set()
+        ))
+        worker.start()
+        turns = 0
+        while not finished.is_set():
+            turns += 1
+            time.sleep(0.001)
+        worker.join()
+        self.assertGreater(turns, 20)  # a locked interpreter would have given none or one
+
+    def test_ctrl_c_ends_the_call(self) -> None:
+        script = (
+            "import pencilscan as ps, sys\n"
+            "rig = ps.ring()\n"
+            "frame = ps.simulate(rig, ps.make_sphere(120, 48), 'none')\n"
+            "print('ready', flush=True)\n"
+            "try:\n"
+            "    while True: ps.reconstruct(rig, frame)\n"
+            "except KeyboardInterrupt:\n"
+            "    print('interrupted')\n"
+        )
+        child = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True)
+        self.assertEqual(child.stdout.readline(), "ready\n")
+        time.sleep(0.5)
+        child.send_signal(signal.SIGINT)
+        rest, _ = child.communicate(timeout=120)
+        self.assertEqual((rest, child.returncode), ("interrupted\n", 0))
+
+    # ---- complaints -----------------------------------------------------------------------------
+
+    def complaint(self, call) -> ps.InputError:
+        with self.assertRaises(ps.InputError) as caught:
+            call()
+        self.assertNotIn("\n", str(caught.exception))
+        return caught.exception
+
+    def test_complaints_name_file_field_value_and_rule(self) -> None:
+        path = self.scene.folder / "bad.json"
+        contents = self.scene.rig.to_dict()
+        contents["cameras"][1]["K"][0][0] = -1
+        path.write_text(json.dumps(contents))
+        error = self.complaint(lambda: ps.read_rig(path))
+        self.assertEqual((error.file, error.field), (str(path), "cameras[1].K[0][0]"))
+        self.assertEqual(float(error.value), -1)
+        self.assertIn("> 0", error.rule)
+        self.assertIsInstance(error, ValueError)
+        self.assertEqual(self.complaint(lambda: ps.Rig(contents)).field, "cameras[1].K[0][0]")
+
+    def test_complaints_about_pictures(self) -> None:
+        rig, frame = self.scene.rig, self.scene.frame
+
+        def of(**images):
+            return str(self.complaint(lambda: ps.reconstruct(rig, images)))
+
+        self.assertIn("cam7", of(cam7=frame["cam0"]))
+        self.assertIn("20x10: must be 480x360", of(cam0=np.zeros((10, 20, 3), np.uint8)))
+        self.assertIn("(height, width, 3)", of(cam0=np.zeros((360, 480, 4), np.uint8)))
+        self.assertIn("[0, 1]", of(cam0=frame["cam0"].astype(np.float32)))
+        self.assertIn("int64", of(cam0=frame["cam0"].astype(np.int64)))
+        self.assertIn("(height, width)", of(cam0="image.png"))
+        with self.assertRaises(ps.StageError):
+            ps.reconstruct(rig, {"cam0": np.zeros((360, 480, 3), np.uint8)})
+        with self.assertRaises(TypeError):
+            ps.reconstruct(rig, frame, metod="joint")
+        self.assertIn("must be joint", str(self.complaint(
+            lambda: ps.reconstruct(rig, frame, method="magic"))))
+
+    def test_complaints_about_meshes_and_options(self) -> None:
+        far = ps.Mesh(ps.make_sphere(10).vertices + 1e5, ps.make_sphere(10).faces)
+        self.assertIn("view", str(self.complaint(lambda: ps.simulate(self.scene.rig, far))))
+        self.assertIn("index", str(self.complaint(lambda: ps.Mesh(np.eye(3), [[0, 1, 3]]))))
+        self.assertIn("(n, 3)", str(self.complaint(lambda: ps.Mesh(np.eye(2), [[0, 1, 1]]))))
+        self.assertIn("medium", str(self.complaint(
+            lambda: ps.simulate(self.scene.rig, ps.make_sphere(100), noise="loud"))))
+        self.assertIn("colours^order", str(self.complaint(lambda: ps.ring(order=30))))
+        self.assertIn("green", str(self.complaint(lambda: ps.ring(colors=(("mauve", "blue"),)))))
+
+    # ---- the rest -------------------------------------------------------------------------------
+
+    def test_help_shows_defaults(self) -> None:
+        for name in ps.__all__:
+            self.assertTrue(inspect.getdoc(getattr(ps, name)), name)
+        parameters = inspect.signature(ps.reconstruct).parameters
+        self.assertEqual(parameters["method"].default, "joint")
+        self.assertIn("height, width", ps.reconstruct.__doc__)
+        self.assertTrue((pathlib.Path(ps.__file__).parent / "_core.pyi").exists())
+
+    def test_a_rig_can_be_sent_to_another_process(self) -> None:
+        self.assertEqual(pickle.loads(pickle.dumps(self.scene.rig)), self.scene.rig)
+        self.assertEqual(self.scene.rig.cameras, ["cam0", "cam1", "cam2", "cam3"])
+        self.assertEqual(self.scene.rig.volume, ((0, 0, 0), 170))
+
+    def test_meshes_go_in_and_out(self) -> None:
+        ball = ps.make_sphere(50)
+        again = ps.Mesh(ball.vertices, ball.faces)
+        self.assertTrue((again.vertices == ball.vertices).all())
+        self.assertAlmostEqual(again.volume_mm3, 4 / 3 * np.pi * 50**3, delta=5000)
+        directions = ball.vertices / 50
+        self.assertGreater((again.normals * directions).sum(axis=1).min(), 0.98)
+        path = self.scene.folder / "ball.stl"
+        again.write(path)
+        self.assertEqual(len(ps.read_mesh(path).faces), len(ball.faces))
+
+    def test_calibration_gives_a_rig(self) -> None:
+        folder = self.scene.folder / "calibration"
+        folder.mkdir()
+        rig = ps.ring(3, 3, arc_deg=150, camera_size=(320, 240), camera_focal_px=575,
+                      projector_size=(320, 256), projector_focal_px=607)
+        rig.write(folder / "rig.json")
+        ps.make_sphere(120, 24).write(folder / "ball.ply")
+        run("simulate", "--gray-code", "--samples", 2, "--rig", folder / "rig.json", "--mesh",
+            folder / "ball.ply", "--out", folder / "scene")
+        run("calibrate", "--captures", folder / "scene" / "captures", "--devices",
+            folder / "rig.json", "--out", folder / "calibrated.json")
+        stages: list = []
+        found = ps.calibrate(folder / "scene" / "captures", rig,
+                             progress=lambda stage, done: stages.append(stage))
+        self.assertEqual((folder / "calibrated.json").read_text(), found._core.text())
+        self.assertEqual(found.verdict, "good")
+        self.assertLess(found.figures["rms_px"], 0.2)
+        self.assertIn("decoding", stages)
+        self.assertIsInstance(found, ps.Rig)
+
+
+if __name__ == "__main__":
+    unittest.main()

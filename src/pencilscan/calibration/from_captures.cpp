@@ -1,0 +1,127 @@
+#include "pencilscan/calibration/from_captures.h"
+
+#include <nlohmann/json.hpp>
+
+#include "pencilscan/boards/board.h"
+#include "pencilscan/gray/gray_decode.h"
+#include "pencilscan/gray/image_order.h"
+#include "pencilscan/rig/device_list.h"
+
+namespace pencilscan {
+namespace {
+
+/// Decodes one pair and adds its correspondences, unless the codes make no sense; looks for the
+/// board where all of the panel is lit.
+DecodeSummary decode_pair(const CapturePair& pair, std::size_t capture, const Rig& rig,
+                          TrackBuilder& tracks, ColorCollector& colors, BoardFinder* boards,
+                          std::vector<Finding>& findings) {
+  const Projector& projector = rig.projectors[pair.projector];
+  const GrayStack stack = read_gray_stack(pair, rig);
+  if (boards != nullptr) boards->look(capture, pair.camera, stack.white);
+  const DecodedView view = decode_gray_stack(stack);
+  DecodeSummary summary{capture, pair.projector, pair.camera, view.counts, view.valid_share(), 0,
+                        {}};
+  summary.wrong_order = explain_wrong_order(
+      projector.width, projector.height, pair.inverses,
+      [&](std::size_t i) { return read_gray_image(pair, rig, i); }, view);
+  if (!summary.wrong_order.empty()) {
+    findings.push_back({Grade::kDoubtful,
+                        "the images of " + projector.name + "/" + rig.cameras[pair.camera].name +
+                            " (--captures number " + std::to_string(capture + 1) +
+                            ") are in the wrong order: " + summary.wrong_order,
+                        "put them in the documented order; they were left out"});
+    return summary;
+  }
+  const std::size_t before = tracks.samples();
+  tracks.add(capture, pair.camera, pair.projector, view);
+  colors.add(pair, view);
+  if (boards != nullptr)
+    boards->project(capture, pair.camera, rig.cameras.size() + pair.projector, view);
+  summary.samples = tracks.samples() - before;
+  return summary;
+}
+
+}  // namespace
+
+CapturesCalibration calibrate_captures(const UncalibratedRig& devices,
+                                       const std::vector<std::filesystem::path>& folders,
+                                       const CapturesOptions& options, const Progress& progress) {
+  const auto tell = [&](const char* stage, double done) {
+    if (progress) progress(stage, done);
+  };
+  CapturesCalibration all;
+  CalibrationInput& input = all.input;
+  input.rig = devices.rig;
+  input.known = devices.given;
+  input.distance = options.distance;
+
+  std::optional<BoardFinder> boards;
+  if (!options.board.empty()) boards.emplace(board_from_text(options.board, "--board"));
+
+  GrayTrackOptions track_options;
+  track_options.max_tracks = options.max_tracks;
+  TrackBuilder tracks(input.rig, track_options);
+  ColorCollector colors(input.rig);
+  std::vector<Finding> findings;
+  std::vector<std::vector<CapturePair>> captures;
+  for (const std::filesystem::path& folder : folders)
+    captures.push_back(list_captures(folder, input.rig));
+  for (std::size_t k = 0; k < captures.size(); ++k) {
+    for (std::size_t i = 0; i < captures[k].size(); ++i) {
+      tell("decoding", (static_cast<double>(k) +
+                        static_cast<double>(i) / static_cast<double>(captures[k].size())) /
+                           static_cast<double>(captures.size()));
+      all.decoded.push_back(decode_pair(captures[k][i], k, input.rig, tracks, colors,
+                                        boards ? &*boards : nullptr, findings));
+    }
+  }
+  input.tracks = tracks.tracks();
+  if (boards) {
+    input.board_views = boards->views();
+    input.projected_corners = boards->projected_views();
+    input.boards = folders.size();
+    if (boards->found() == 0)
+      findings.push_back({Grade::kDoubtful,
+                          "the board " + options.board + " is in no picture of any camera",
+                          "count its inner corners, and let a camera see all of it lit"});
+  }
+
+  all.result = calibrate(input, {}, progress);
+  all.color = colors.result();
+  set_colors(all.color, all.result.rig);
+  tell("judging", 0.9);
+  all.uncertainty.devices.resize(device_count(input.rig));
+  if (all.result.solved)
+    all.uncertainty = uncertainty(all.result.problem, all.result.adjustment, options.seed);
+  all.loop = close_loop(all.result);
+  if (const auto finding = judge_loop(all.result, all.loop)) findings.push_back(*finding);
+  all.verdict = judge(input, all.result, all.uncertainty, std::move(findings));
+  tell("judging", 1);
+  return all;
+}
+
+nlohmann::ordered_json calibration_json(const CapturesCalibration& calibration) {
+  return calibration_json(CalibrationReport{
+      calibration.input, calibration.result, calibration.uncertainty, calibration.verdict,
+      calibration.decoded, calibration.loop, calibration.color});
+}
+
+nlohmann::ordered_json calibration_figures(const CapturesCalibration& calibration) {
+  const CalibrationResult& result = calibration.result;
+  const Verdict& verdict = calibration.verdict;
+  nlohmann::ordered_json figures;
+  figures["verdict"] = to_string(verdict.grade);
+  for (const Finding& finding : verdict.findings)
+    if (finding.grade == verdict.grade && verdict.grade != Grade::kGood)
+      figures["reasons"].push_back(finding.what);
+  figures["rms_px"] = result.rms_px;
+  figures["held_out_rms_px"] = result.held_out_rms_px;
+  if (!result.problem.board_views.empty()) figures["board_rms_px"] = result.board_rms_px;
+  figures["views"] = result.views;
+  figures["views_dropped"] = result.views_dropped;
+  figures["point_sigma"] = calibration.uncertainty.volume_median;
+  figures["unit"] = result.rig.unit_known ? "mm" : "unknown";
+  return figures;
+}
+
+}  // namespace pencilscan
