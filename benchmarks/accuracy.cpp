@@ -42,8 +42,8 @@ void print_detection(const Rig& rig, const PointResult& result,
     }
     const DetectionFigures figures = detection_figures(lines, detected, family);
     std::string name;
-    for (const std::string& color : result.families[f].colors) {
-      name += (name.empty() ? "" : "/") + color;
+    for (const PatternColor& color : result.families[f].colors) {
+      name += (name.empty() ? "" : "/") + color.text();
     }
     std::printf(
         "detection %-12s recall %.4f  recall 3-5 px %.4f  spurious %.4f  error px median %.4f p90 "
@@ -132,7 +132,7 @@ int run(const std::filesystem::path& rig_path, const std::filesystem::path& fram
   frame.name = name;
   for (const Camera& camera : rig.cameras) {
     const auto path = find_image(frames / name, camera.name);
-    frame.images.push_back(path ? read_image(*path) : cv::Mat());
+    frame.images.push_back(path ? read_camera_image(camera, *path) : cv::Mat());
   }
   const TruthScene truth(read_mesh(mesh_path), rig);
   std::vector<std::vector<TrueLinePixel>> true_lines(rig.cameras.size());

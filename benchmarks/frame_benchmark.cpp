@@ -16,6 +16,7 @@
 #include "pencilscan/core/stopwatch.h"
 #include "pencilscan/io/image.h"
 #include "pencilscan/pipeline/frame.h"
+#include "pencilscan/rig/camera_light.h"
 #include "pencilscan/rig/rig.h"
 #include "reference_blur.h"
 
@@ -27,7 +28,7 @@ Frame read_frame(const Rig& rig, const std::filesystem::path& folder) {
   frame.name = folder.filename().string();
   for (const Camera& camera : rig.cameras) {
     const auto path = find_image(folder, camera.name);
-    frame.images.push_back(path ? read_image(*path) : cv::Mat());
+    frame.images.push_back(path ? read_camera_image(camera, *path) : cv::Mat());
   }
   return frame;
 }

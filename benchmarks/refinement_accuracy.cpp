@@ -77,7 +77,7 @@ int run(const Arguments& arguments) {
   frame.name = arguments.frame;
   for (const Camera& camera : rig.cameras) {
     const auto path = find_image(arguments.frames / frame.name, camera.name);
-    frame.images.push_back(path ? read_image(*path) : cv::Mat());
+    frame.images.push_back(path ? read_camera_image(camera, *path) : cv::Mat());
   }
   const TruthScene truth(read_mesh(arguments.mesh), rig);
   const PointResult detected = detect_frame(rig, frame);

@@ -164,6 +164,8 @@ def ring(
     options.line_width_px = line_width_px
     options.offset_px = offset_px
     options.order = order
-    options.colors = [list(entry) for entry in colors]
+    options.colors = [
+        [entry if isinstance(entry, str) else list(entry) for entry in of_one] for of_one in colors
+    ]
     # Once through the text, which checks every number as it checks those of a file.
     return Rig._of(_core.Rig(_core.make_ring(options).text(), "ring"))

@@ -4,9 +4,12 @@
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 
+#include <algorithm>
 #include <memory>
 #include <optional>
 #include <string>
+#include <variant>
+#include <vector>
 
 #include "arrays.h"
 #include "pencilscan/pencilscan.h"
@@ -152,6 +155,35 @@ void add_mesh(py::module_& module) {
   });
 }
 
+/// Colours of each projector's pattern: names, or linear light [r, g, b].
+using StatedColor = std::variant<std::string, Rgb>;
+
+PatternColor color_of(const StatedColor& stated) {
+  if (const auto* name = std::get_if<std::string>(&stated)) {
+    if (!color_from_name(*name))
+      throw InputError("ring", "colors", *name,
+                       "must be blue, cyan, red, yellow, green, magenta or white, or [r, g, b]");
+    return PatternColor(*name);
+  }
+  const Rgb& light = std::get<Rgb>(stated);
+  const bool inside =
+      std::all_of(light.begin(), light.end(), [](double v) { return v >= 0 && v <= 1; });
+  if (!inside || light == Rgb{})
+    throw InputError("ring", "colors",
+                     "[" + std::to_string(light[0]) + ", " + std::to_string(light[1]) + ", " +
+                         std::to_string(light[2]) + "]",
+                     "each must be in [0, 1], not all 0");
+  return PatternColor(light);
+}
+
+void set_ring_colors(RingOptions& options, const std::vector<std::vector<StatedColor>>& stated) {
+  options.colors.clear();
+  for (const auto& colors : stated) {
+    options.colors.emplace_back();
+    for (const StatedColor& color : colors) options.colors.back().push_back(color_of(color));
+  }
+}
+
 void add_rig(py::module_& module) {
   py::class_<Rig, std::shared_ptr<Rig>>(module, "Rig")
       .def(py::init([](const std::string& text, const std::string& name) {
@@ -199,7 +231,7 @@ void add_rig(py::module_& module) {
       .def_readwrite("line_width_px", &RingOptions::line_width_px)
       .def_readwrite("offset_px", &RingOptions::offset_px)
       .def_readwrite("order", &RingOptions::order)
-      .def_readwrite("colors", &RingOptions::colors);
+      .def_property("colors", nullptr, set_ring_colors);
   module.def("make_ring",
              [](const RingOptions& options) { return std::make_shared<Rig>(make_ring(options)); });
 }

@@ -17,6 +17,7 @@
 #include "pencilscan/pipeline/frame.h"
 #include "pencilscan/pipeline/frame_files.h"
 #include "pencilscan/pipeline/frame_output.h"
+#include "pencilscan/rig/camera_light.h"
 #include "pencilscan/solution/single_projector.h"
 
 namespace pencilscan {
@@ -46,8 +47,7 @@ std::vector<cv::Mat> camera_images(const Rig& rig, const Images& images) {
     if (stored.depth() == CV_32F && !cv::checkRange(stored, true, nullptr, -1, 2)) {
       throw InputError("images", camera.name, "", "float pixels must be finite and lie in [0, 1]");
     }
-    // Pixels of the right type stay where they are.
-    result[c] = stored.type() == CV_32FC3 ? stored : unit_image(stored);
+    result[c] = camera_values(camera, stored, "images");
   }
   if (known == images.size()) return result;
   for (const auto& [name, image] : images) {

@@ -38,15 +38,15 @@ struct RingCommand {
 };
 
 /// "red,green,blue" as the colours of a pattern.
-std::vector<std::string> color_list(const std::string& text) {
-  std::vector<std::string> names;
+std::vector<PatternColor> color_list(const std::string& text) {
+  std::vector<PatternColor> names;
   std::istringstream words(text);
   for (std::string name; std::getline(words, name, ',');) {
     if (!color_from_name(name)) {
       throw InputError("command line", "--colors", name,
                        "must be blue, cyan, red, yellow, green, magenta or white, with commas");
     }
-    names.push_back(name);
+    names.emplace_back(name);
   }
   return names;
 }

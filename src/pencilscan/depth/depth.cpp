@@ -6,21 +6,15 @@
 #include "pencilscan/core/median.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/core/stopwatch.h"
-#include "pencilscan/io/linear_light.h"
+#include "pencilscan/rig/camera_light.h"
 
 namespace pencilscan {
 namespace {
 
-/// 1 where no channel is overexposed.
-cv::Mat unsaturated(const cv::Mat& image) {
-  constexpr float kFull = 0.998F;
-  cv::Mat valid(image.rows, image.cols, CV_8U);
-  for (int y = 0; y < image.rows; ++y) {
-    const auto* row = image.ptr<cv::Vec3f>(y);
-    auto* out = valid.ptr<std::uint8_t>(y);
-    for (int x = 0; x < image.cols; ++x)
-      out[x] = row[x][0] < kFull && row[x][1] < kFull && row[x][2] < kFull ? 1 : 0;
-  }
+/// 1 where nothing is overexposed.
+cv::Mat unsaturated(const cv::Mat& values) {
+  cv::Mat valid;
+  cv::bitwise_and(~overexposed(values), 1, valid);
   return valid;
 }
 
@@ -55,7 +49,7 @@ DepthResult measure_depth(const Rig& rig, const std::vector<ColorFamily>& famili
   parallel_for(cameras.size(), [&](std::size_t i) {
     const std::size_t c = cameras[i];
     const Camera& camera = rig.cameras[c];
-    const cv::Mat rgb = projector_light(camera, linearized(images[c], camera.gamma), unmixings[c]);
+    const cv::Mat rgb = projector_light(camera, linear_light(camera, images[c]), unmixings[c]);
     std::vector<cv::Mat> presence;
     for (const ColorFamily& family : families) presence.push_back(presence_image(rgb, family));
     CameraLight& light = result.lights[i];

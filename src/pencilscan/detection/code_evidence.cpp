@@ -173,8 +173,8 @@ std::vector<ColorAmplitude> color_amplitudes(const Images& images, const Curve& 
   return result;
 }
 
-Eigen::Vector3f color_vector(const std::string& name) {
-  const Rgb rgb = color_from_name(name).value_or(Rgb{0, 0, 0});
+Eigen::Vector3f color_vector(const PatternColor& color) {
+  const Rgb& rgb = color.light();
   return {static_cast<float>(rgb[0]), static_cast<float>(rgb[1]), static_cast<float>(rgb[2])};
 }
 
@@ -225,7 +225,7 @@ void measure_code(const cv::Mat& unmixed_image, const std::vector<ColorFamily>& 
     }
     const Eigen::Vector3f gains = channel_gains(amplitudes, own, family.presence);
     std::vector<Eigen::Vector3f> colors;
-    for (const std::string& name : family.colors) colors.push_back(color_vector(name));
+    for (const PatternColor& color : family.colors) colors.push_back(color_vector(color));
     std::size_t k = 0;
     for (Curve& curve : curves) {
       if (curve.family != static_cast<int>(f)) continue;

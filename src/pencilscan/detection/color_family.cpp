@@ -7,8 +7,8 @@
 namespace pencilscan {
 namespace {
 
-Vec3 vector_of(const std::string& color) {
-  const Rgb rgb = color_from_name(color).value_or(Rgb{0, 0, 0});
+Vec3 vector_of(const PatternColor& color) {
+  const Rgb& rgb = color.light();
   return {rgb[0], rgb[1], rgb[2]};
 }
 
@@ -18,7 +18,7 @@ void set_presence(std::vector<ColorFamily>& families) {
     std::vector<Vec3> rows;
     std::vector<double> targets;
     for (const ColorFamily& family : families) {
-      for (const std::string& color : family.colors) {
+      for (const PatternColor& color : family.colors) {
         rows.push_back(vector_of(color));
         targets.push_back(&family == &own ? 1 : 0);
       }
@@ -40,7 +40,7 @@ void set_presence(std::vector<ColorFamily>& families) {
 
 std::vector<int> ColorFamily::color_of_symbol(const LinePattern& pattern) const {
   std::vector<int> index;
-  for (const std::string& color : pattern.colors) {
+  for (const PatternColor& color : pattern.colors) {
     index.push_back(
         static_cast<int>(std::find(colors.begin(), colors.end(), color) - colors.begin()));
   }
@@ -51,7 +51,7 @@ std::vector<ColorFamily> color_families(const Rig& rig) {
   std::vector<ColorFamily> families;
   for (std::size_t p = 0; p < rig.projectors.size(); ++p) {
     for (std::size_t k = 0; k < rig.projectors[p].patterns.size(); ++k) {
-      std::vector<std::string> colors = rig.projectors[p].patterns[k].colors;
+      std::vector<PatternColor> colors = rig.projectors[p].patterns[k].colors;
       std::sort(colors.begin(), colors.end());
       auto family = std::find_if(families.begin(), families.end(),
                                  [&](const ColorFamily& f) { return f.colors == colors; });
@@ -77,7 +77,7 @@ Rig with_registered_patterns(Rig rig) {
       LinePattern& pattern = projector.patterns[static_cast<std::size_t>(ref.pattern)];
       pattern.max_lines = projector.line_count(pattern);
       Vec3 weight = Vec3::Zero();  // of red, green and blue in where its lines are found
-      for (const std::string& color : pattern.colors)
+      for (const PatternColor& color : pattern.colors)
         weight += family.presence.cwiseProduct(vector_of(color));
       weight /= weight.sum();
       const auto axis = static_cast<Eigen::Index>(pattern.axis);

@@ -18,7 +18,7 @@ struct PatternRef {
 /// unmixed projector red, green, blue so that each of its colours gives 1 and those of the other
 /// families give 0 (blue/cyan against red/yellow: the blue channel).
 struct ColorFamily {
-  std::vector<std::string> colors;
+  std::vector<PatternColor> colors;
   std::vector<PatternRef> patterns;
   Vec3 presence = Vec3::Zero();
   double leakage = 0;  ///< largest |presence . colour of another family|; 0: separable

@@ -5,24 +5,11 @@
 #include <opencv2/imgproc.hpp>
 #include <utility>
 
-#include "pencilscan/core/check.h"
 #include "pencilscan/core/parallel.h"
-#include "pencilscan/io/linear_light.h"
+#include "pencilscan/rig/camera_light.h"
 
 namespace pencilscan {
 namespace {
-
-std::size_t count_saturated(const cv::Mat& image) {
-  constexpr float kFull = 0.998F;
-  std::size_t count = 0;
-  for (int y = 0; y < image.rows; ++y) {
-    const auto* row = image.ptr<cv::Vec3f>(y);
-    for (int x = 0; x < image.cols; ++x) {
-      count += row[x][0] >= kFull || row[x][1] >= kFull || row[x][2] >= kFull;
-    }
-  }
-  return count;
-}
 
 /// The part of an image (linear light) that holds everything bright enough to be a line, with a
 /// margin for the filters. The object often covers a small part of the image only.
@@ -51,13 +38,12 @@ cv::Rect lit_area(const cv::Mat& image) {
 CameraDetection detect_curves(const Camera& camera, const Rig& rig,
                               const std::vector<ColorFamily>& families, const cv::Mat& image,
                               const DetectionOptions& options) {
-  PENCILSCAN_CHECK(image.type() == CV_32FC3);
   CameraDetection result;
   // Unmix the colour families where there is light.
-  const cv::Mat whole = linearized(image, camera.gamma);
+  const cv::Mat whole = linear_light(camera, image);
   const cv::Rect area = lit_area(whole);
   const cv::Mat linear = whole(area);
-  result.saturated_pixels = count_saturated(image(area));
+  result.saturated_pixels = static_cast<std::size_t>(cv::countNonZero(overexposed(image(area))));
   result.unmixing = estimate_unmixing(camera, rig, families, registered(camera, linear, area.tl()));
   const cv::Mat rgb = projector_light(camera, linear, result.unmixing, area.tl());
   // Find and trace the curves of each family, then fit them together.

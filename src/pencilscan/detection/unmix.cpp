@@ -24,8 +24,8 @@ struct LineColor {
 std::vector<LineColor> line_colors(const std::vector<ColorFamily>& families) {
   std::vector<LineColor> colors;
   for (const ColorFamily& family : families) {
-    for (const std::string& name : family.colors) {
-      const Rgb rgb = color_from_name(name).value_or(Rgb{1, 1, 1});
+    for (const PatternColor& color : family.colors) {
+      const Rgb& rgb = color.light();
       const Eigen::Vector3f direction(static_cast<float>(rgb[0]), static_cast<float>(rgb[1]),
                                       static_cast<float>(rgb[2]));
       if (std::none_of(colors.begin(), colors.end(),

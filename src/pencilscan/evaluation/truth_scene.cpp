@@ -35,8 +35,8 @@ std::vector<PatternChannel> pattern_channels(const Rig& rig) {
 bool same_color_family(const Rig& rig, PatternChannel a, PatternChannel b) {
   const auto& colors_a = pattern_of(rig, a).colors;
   const auto& colors_b = pattern_of(rig, b).colors;
-  return std::set<std::string>(colors_a.begin(), colors_a.end()) ==
-         std::set<std::string>(colors_b.begin(), colors_b.end());
+  return std::set<PatternColor>(colors_a.begin(), colors_a.end()) ==
+         std::set<PatternColor>(colors_b.begin(), colors_b.end());
 }
 
 TruthScene::TruthScene(const TriangleMesh& mesh, const Rig& rig)

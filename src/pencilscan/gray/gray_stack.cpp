@@ -7,7 +7,9 @@
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/io/image.h"
+#include "pencilscan/io/linear_light.h"
 #include "pencilscan/pattern/solid_color.h"
+#include "pencilscan/rig/camera_light.h"
 
 namespace pencilscan {
 namespace {
@@ -66,14 +68,15 @@ CapturePair capture_pair(const fs::path& folder, const Projector& projector) {
 }  // namespace
 
 cv::Mat read_color_image(const fs::path& path, const Camera& camera) {
-  cv::Mat color = read_image(path);
+  cv::Mat color = camera_values(camera, read_stored_image(path), path);
   if (color.cols != camera.width || color.rows != camera.height) {
     throw InputError(path.string(), "size",
                      std::to_string(color.cols) + " x " + std::to_string(color.rows),
                      "must be that of camera " + camera.name + ", " + std::to_string(camera.width) +
                          " x " + std::to_string(camera.height));
   }
-  return color;
+  color = linearized(color, 1, camera.black_level);
+  return camera.mosaic ? demosaiced(color, *camera.mosaic) : color;
 }
 
 GrayStack make_gray_stack(int panel_width, int panel_height, bool inverses,

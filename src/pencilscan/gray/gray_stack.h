@@ -49,7 +49,8 @@ struct CapturePair {
 [[nodiscard]] std::vector<CapturePair> list_captures(const std::filesystem::path& captures,
                                                      const Rig& rig);
 
-/// One image of a pair as stored, CV_32FC3 RGB. InputError when its size is not the camera's.
+/// One image of a pair without its black level, gamma as stored, CV_32FC3 RGB; the colours that a
+/// mosaic leaves out are interpolated. InputError when its size is not the camera's.
 [[nodiscard]] cv::Mat read_color_image(const std::filesystem::path& path, const Camera& camera);
 /// One image of a pair as grey. InputError when its size is not the camera's.
 [[nodiscard]] cv::Mat read_gray_image(const CapturePair& pair, const Rig& rig, std::size_t image);

@@ -122,12 +122,17 @@ cv::Mat read_stored_image(const std::filesystem::path& path) {
   return image;
 }
 
-cv::Mat unit_image(const cv::Mat& stored) {
+cv::Mat unit_values(const cv::Mat& stored) {
   const double scale = stored.depth() == CV_8U    ? 1.0 / 255
                        : stored.depth() == CV_16U ? 1.0 / 65535
                                                   : 1;
   cv::Mat image;
   stored.convertTo(image, CV_32F, scale);
+  return image;
+}
+
+cv::Mat unit_image(const cv::Mat& stored) {
+  cv::Mat image = unit_values(stored);
   if (image.channels() == 1) cv::cvtColor(image, image, cv::COLOR_GRAY2RGB);
   return image;
 }

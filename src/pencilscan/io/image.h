@@ -14,7 +14,9 @@ namespace pencilscan {
 
 /// The same as stored: CV_8U, CV_16U (or CV_32F of TIFF) of one channel, or of three in RGB order.
 [[nodiscard]] cv::Mat read_stored_image(const std::filesystem::path& path);
-/// CV_32FC3 in [0, 1] of an image as stored.
+/// CV_32F in [0, 1] of an image as stored, of as many channels.
+[[nodiscard]] cv::Mat unit_values(const cv::Mat& stored);
+/// CV_32FC3 in [0, 1] of an image as stored; grey is replicated.
 [[nodiscard]] cv::Mat unit_image(const cv::Mat& stored);
 
 /// The file of `stem` in `folder` with one of the known endings (.png .tiff .tif .jpg .jpeg .bmp).

@@ -12,7 +12,9 @@
 #include "pencilscan/io/curve_file.h"
 #include "pencilscan/io/file.h"
 #include "pencilscan/io/image.h"
+#include "pencilscan/io/linear_light.h"
 #include "pencilscan/io/mesh_file.h"
+#include "pencilscan/io/mosaic.h"
 #include "pencilscan/io/ply.h"
 #include "pencilscan/io/point_file.h"
 #include "pencilscan/io/temporary_folder.h"
@@ -399,4 +401,45 @@ TEST_F(Io, CurvesWithStatesThatDoNotExistAreRefused) {
 }
 
 }  // namespace
+TEST(LinearLight, BlackIsTakenOutBeforeGamma) {
+  cv::Mat image(1, 4, CV_32FC1);
+  const float values[] = {0.05F, 0.1F, 0.55F, 1};
+  std::copy_n(values, 4, image.ptr<float>());
+  const cv::Mat light = linearized(image, 2, 0.1);
+  const float expected[] = {0, 0, 0.25F, 1};
+  for (int x = 0; x < 4; ++x) EXPECT_NEAR(light.at<float>(x), expected[x], 1e-6F);
+  EXPECT_EQ(linearized(image, 1).data, image.data);
+}
+
+TEST(Mosaic, NamesSayWhatThePixelsSee) {
+  for (const std::string name : {"RGGB", "BGGR", "GRBG", "GBRG"}) {
+    const auto mosaic = Mosaic::from_name(name);
+    ASSERT_TRUE(mosaic);
+    EXPECT_EQ(mosaic->name(), name);
+    for (int i = 0; i < 4; ++i)
+      EXPECT_EQ("RGB"[mosaic->color(2 + i % 2, 4 + i / 2)], name[static_cast<std::size_t>(i)]);
+  }
+  EXPECT_FALSE(Mosaic::from_name("RGBG"));
+}
+
+/// Linear interpolation is exact where each colour is a plane, up to the border, where it mirrors.
+TEST(Mosaic, PlanesOfColourComeBack) {
+  cv::Mat image(11, 14, CV_32FC3);
+  for (int y = 0; y < image.rows; ++y) {
+    for (int x = 0; x < image.cols; ++x) {
+      const auto u = static_cast<float>(x);
+      const auto v = static_cast<float>(y);
+      image.at<cv::Vec3f>(y, x) = {0.1F + 0.01F * u, 0.5F - 0.02F * v, 0.3F + 0.01F * (u - v)};
+    }
+  }
+  for (const char* name : {"RGGB", "BGGR", "GRBG", "GBRG"}) {
+    const Mosaic mosaic = *Mosaic::from_name(name);
+    const cv::Mat raw = sampled(image, mosaic);
+    const cv::Mat back = demosaiced(raw, mosaic);
+    EXPECT_EQ(cv::norm(sampled(back, mosaic), raw, cv::NORM_INF), 0);
+    const cv::Rect inner(1, 1, image.cols - 2, image.rows - 2);
+    EXPECT_LT(cv::norm(back(inner), image(inner), cv::NORM_INF), 1e-6);
+  }
+}
+
 }  // namespace pencilscan

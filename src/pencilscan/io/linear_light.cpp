@@ -2,10 +2,13 @@
 
 namespace pencilscan {
 
-cv::Mat linearized(const cv::Mat& image, double gamma) {
-  if (gamma == 1) return image;
-  cv::Mat linear;
-  cv::pow(cv::max(image, 0.0), gamma, linear);
+cv::Mat linearized(const cv::Mat& image, double gamma, double black_level) {
+  if (gamma == 1 && black_level == 0) return image;
+  cv::Mat linear = image;
+  if (black_level != 0)
+    image.convertTo(linear, -1, 1 / (1 - black_level), -black_level / (1 - black_level));
+  linear = cv::max(linear, 0.0);
+  if (gamma != 1) cv::pow(linear, gamma, linear);
   return linear;
 }
 

@@ -11,6 +11,7 @@
 #include "pencilscan/io/image.h"
 #include "pencilscan/report/overlay.h"
 #include "pencilscan/report/shaded_view.h"
+#include "pencilscan/rig/camera_light.h"
 
 namespace pencilscan {
 namespace {
@@ -37,11 +38,8 @@ cv::Mat limited(const cv::Mat& image, int max_width) {
 }
 
 cv::Mat shown_image(const std::filesystem::path& file, const Camera& camera, bool linear) {
+  if (linear) return displayable(linear_light(camera, read_camera_image(camera, file)));
   cv::Mat image = read_image(file);
-  if (linear) {
-    cv::pow(cv::max(image, 0.0), camera.gamma, image);
-    return displayable(image);
-  }
   image.convertTo(image, CV_8UC3, 255);
   return image;
 }

@@ -32,6 +32,12 @@ std::string script_json(const ordered_json& value) {
   return safe;
 }
 
+std::vector<std::string> color_texts(const std::vector<PatternColor>& colors) {
+  std::vector<std::string> texts;
+  for (const PatternColor& color : colors) texts.push_back(color.text());
+  return texts;
+}
+
 /// rig.json with what the page cannot easily derive: line counts, families of colours, the volume.
 ordered_json describe_rig(const Rig& rig, const fs::path& path) {
   ordered_json json = ordered_json(read_json(path));
@@ -44,12 +50,13 @@ ordered_json describe_rig(const Rig& rig, const fs::path& path) {
                         {"pitch_px", pattern.pitch_px},
                         {"offset_px", pattern.offset_px},
                         {"sequence", pattern.sequence},
-                        {"colors", pattern.colors}});
+                        {"colors", color_texts(pattern.colors)}});
     }
     lines.push_back(std::move(counts));
   }
   ordered_json families = ordered_json::array();
-  for (const ColorFamily& family : color_families(rig)) families.push_back(family.colors);
+  for (const ColorFamily& family : color_families(rig))
+    families.push_back(color_texts(family.colors));
   const Sphere volume = working_volume(rig);
   return {{"cameras", std::move(json["cameras"])},
           {"projectors", std::move(json["projectors"])},

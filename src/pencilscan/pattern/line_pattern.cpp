@@ -5,19 +5,8 @@
 
 namespace pencilscan {
 
-std::optional<Rgb> color_from_name(std::string_view name) {
-  if (name == "blue") return Rgb{0, 0, 1};
-  if (name == "cyan") return Rgb{0, 1, 1};
-  if (name == "red") return Rgb{1, 0, 0};
-  if (name == "yellow") return Rgb{1, 1, 0};
-  if (name == "green") return Rgb{0, 1, 0};
-  if (name == "magenta") return Rgb{1, 0, 1};
-  if (name == "white") return Rgb{1, 1, 1};
-  return std::nullopt;
-}
-
 Rgb LinePattern::color(int line) const {
-  return color_from_name(colors[static_cast<std::size_t>(symbol(line))]).value_or(Rgb{0, 0, 0});
+  return colors[static_cast<std::size_t>(symbol(line))].light();
 }
 
 int LinePattern::line_count(int size_px) const {

@@ -1,28 +1,20 @@
 #pragma once
 
-#include <array>
 #include <opencv2/core.hpp>
 #include <optional>
-#include <string>
-#include <string_view>
 #include <vector>
 
 #include "pencilscan/geometry/light_sheet.h"
+#include "pencilscan/pattern/pattern_color.h"
 
 namespace pencilscan {
-
-/// A colour the projector shows, as red, green, blue in [0, 1].
-using Rgb = std::array<double, 3>;
-
-/// blue, cyan, red, yellow, green, magenta, white; nothing for another name.
-[[nodiscard]] std::optional<Rgb> color_from_name(std::string_view name);
 
 /// Parallel lines with a periodic colour code. Values are valid when validated by the rig reader:
 /// colors.size() == alphabet >= 1, pitch_px > 0, 0 < line_width_px <= pitch_px, symbols of
 /// `sequence` in [0, alphabet).
 struct LinePattern {
   Axis axis = Axis::kColumn;  ///< kColumn: vertical lines, kRow: horizontal lines
-  std::vector<std::string> colors = {"blue", "cyan"};
+  std::vector<PatternColor> colors = {"blue", "cyan"};
   int alphabet = 2;
   int order = 3;
   double pitch_px = 12;

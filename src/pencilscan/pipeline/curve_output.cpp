@@ -6,6 +6,7 @@
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/io/image.h"
 #include "pencilscan/report/overlay.h"
+#include "pencilscan/rig/camera_light.h"
 
 namespace pencilscan {
 namespace {
@@ -101,8 +102,7 @@ void write_camera_pictures(const std::filesystem::path& folder, const Rig& rig,
                            const Frame& frame) {
   parallel_for(rig.cameras.size(), [&](std::size_t c) {
     if (frame.images[c].empty()) return;
-    cv::Mat linear;
-    cv::pow(cv::max(frame.images[c], 0.0), rig.cameras[c].gamma, linear);
+    const cv::Mat linear = linear_light(rig.cameras[c], frame.images[c]);
     write_image(folder / (rig.cameras[c].name + ".jpg"), displayable(linear));
   });
 }

@@ -9,8 +9,8 @@
 #include "pencilscan/core/median.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/core/stopwatch.h"
-#include "pencilscan/io/linear_light.h"
 #include "pencilscan/pipeline/line_naming.h"
+#include "pencilscan/rig/camera_light.h"
 #include "pencilscan/solution/surface_check.h"
 #include "pencilscan/surface/vertex_color.h"
 
@@ -28,7 +28,8 @@ std::vector<std::string> detection_warnings(const Rig& rig, const Frame& frame,
   for (const ColorFamily& family : families) {
     if (family.leakage <= 0.1) continue;
     std::string names;
-    for (const std::string& color : family.colors) names += (names.empty() ? "" : "/") + color;
+    for (const PatternColor& color : family.colors)
+      names += (names.empty() ? "" : "/") + color.text();
     warnings.push_back("the colours " + names +
                        " cannot be told apart from those of other projectors");
   }
@@ -92,16 +93,9 @@ std::vector<MeasuredPoint> dense_points(const Rig& rig, std::span<const DepthMap
 }
 
 /// `linear` with NaN where the image as read is overexposed.
-cv::Mat without_overexposed(const cv::Mat& linear, const cv::Mat& raw) {
-  constexpr float kFull = 0.998F;
+cv::Mat without_overexposed(const cv::Mat& linear, const cv::Mat& values) {
   cv::Mat image = linear.clone();
-  for (int v = 0; v < image.rows; ++v) {
-    for (int u = 0; u < image.cols; ++u) {
-      const auto& value = raw.at<cv::Vec3f>(v, u);
-      if (std::max({value[0], value[1], value[2]}) >= kFull)
-        image.at<cv::Vec3f>(v, u) = cv::Vec3f::all(std::nanf(""));
-    }
-  }
+  image.setTo(cv::Scalar::all(std::nan("")), overexposed(values));
   return image;
 }
 
@@ -115,7 +109,7 @@ std::vector<ColorView> color_views(const Rig& rig, const Frame& frame, const Poi
     view.camera = static_cast<int>(c);
     view.is_plain = rig.cameras[c].sees_texture_only;
     const Camera& camera = rig.cameras[c];
-    const cv::Mat linear = linearized(frame.images[c], camera.gamma);
+    const cv::Mat linear = linear_light(camera, frame.images[c]);
     view.image = view.is_plain ? registered(camera, linear)
                                : projector_light(camera, linear, points.detections[c].unmixing);
     view.image = without_overexposed(view.image, frame.images[c]);
@@ -130,7 +124,7 @@ std::vector<ColorView> color_views(const Rig& rig, const Frame& frame, const Poi
     view.camera = static_cast<int>(c);
     view.is_plain = true;
     const Camera& camera = rig.cameras[c];
-    view.image = without_overexposed(registered(camera, linearized(frame.plain[c], camera.gamma)),
+    view.image = without_overexposed(registered(camera, linear_light(camera, frame.plain[c])),
                                      frame.plain[c]);
     views.push_back(std::move(view));
   }

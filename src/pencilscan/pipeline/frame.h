@@ -31,7 +31,7 @@ struct FrameTiming {
 /// One moment seen by all cameras.
 struct Frame {
   std::string name;
-  std::vector<cv::Mat> images;  ///< one per camera of the rig, CV_32FC3 RGB as read; empty: missing
+  std::vector<cv::Mat> images;  ///< one per camera: camera_values(); empty: missing
   /// The same moment in plain light, for colour: as `images`, or nothing at all.
   std::vector<cv::Mat> plain;
   std::optional<FrameTiming> timing;  ///< where the pictures have time stamps

@@ -6,25 +6,9 @@
 #include "pencilscan/io/file.h"
 #include "pencilscan/io/hash.h"
 #include "pencilscan/io/image.h"
+#include "pencilscan/rig/camera_light.h"
 
 namespace pencilscan {
-namespace {
-
-/// The image of a camera; empty where there is no file.
-cv::Mat read_camera_image(const Camera& camera, const std::optional<std::filesystem::path>& file) {
-  if (!file) return {};
-  cv::Mat image = read_image(*file);
-  if (image.cols != camera.width || image.rows != camera.height) {
-    throw InputError(
-        file->string(), "image size", std::to_string(image.cols) + "x" + std::to_string(image.rows),
-        "must be " + std::to_string(camera.width) + "x" + std::to_string(camera.height) +
-            " as camera " + camera.name + " of the rig");
-  }
-  return image;
-}
-
-}  // namespace
-
 std::string camera_names(const Rig& rig) {
   std::string names;
   for (const Camera& camera : rig.cameras) names += (names.empty() ? "" : ", ") + camera.name;
@@ -62,7 +46,8 @@ std::vector<FrameFiles> find_frames(const Rig& rig, const std::filesystem::path&
 std::vector<cv::Mat> read_images(const Rig& rig, const FrameFiles& files) {
   std::vector<cv::Mat> images;
   for (std::size_t c = 0; c < files.images.size(); ++c)
-    images.push_back(read_camera_image(rig.cameras[c], files.images[c]));
+    images.push_back(files.images[c] ? read_camera_image(rig.cameras[c], *files.images[c])
+                                     : cv::Mat());
   return images;
 }
 

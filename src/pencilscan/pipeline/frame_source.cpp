@@ -7,11 +7,11 @@
 #include "pencilscan/core/error.h"
 #include "pencilscan/io/file.h"
 #include "pencilscan/io/hash.h"
-#include "pencilscan/io/image.h"
 #include "pencilscan/pipeline/frame_files.h"
 #include "pencilscan/recording/frame_sets.h"
 #include "pencilscan/recording/pack.h"
 #include "pencilscan/recording/recording.h"
+#include "pencilscan/rig/camera_light.h"
 
 namespace pencilscan {
 
@@ -55,7 +55,8 @@ struct FrameSource::Recorded : Storage {
       const auto at = row(frame, c);
       if (!at) continue;
       const cv::Mat stored = recording.read(*at, *camera_of[c]);
-      if (!stored.empty()) result[c] = unit_image(stored);
+      if (stored.empty()) continue;
+      result[c] = camera_values(rig.cameras[c], stored, recording.picture_file(*at, *camera_of[c]));
     }
     return result;
   }

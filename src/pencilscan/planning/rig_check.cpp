@@ -200,7 +200,7 @@ Vec3 axis_direction(const Projector& projector, Axis axis) {
 }
 
 bool share_a_color(const LinePattern& a, const LinePattern& b) {
-  return std::any_of(a.colors.begin(), a.colors.end(), [&](const std::string& color) {
+  return std::any_of(a.colors.begin(), a.colors.end(), [&](const PatternColor& color) {
     return std::find(b.colors.begin(), b.colors.end(), color) != b.colors.end();
   });
 }

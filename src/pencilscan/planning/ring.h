@@ -31,7 +31,7 @@ struct RingOptions {
 
   // What differs from projector to projector: projector i has entry i mod size, none may be empty.
   std::vector<Axis> axes{Axis::kColumn, Axis::kRow};  ///< vertical and horizontal lines
-  std::vector<std::vector<std::string>> colors{{"blue", "cyan"}, {"red", "yellow"}};
+  std::vector<std::vector<PatternColor>> colors{{"blue", "cyan"}, {"red", "yellow"}};
   std::vector<double> rolls_rad{0};  ///< about its optical axis: its lines are tilted by so much
 };
 

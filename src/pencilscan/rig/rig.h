@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "pencilscan/geometry/device.h"
+#include "pencilscan/io/mosaic.h"
 #include "pencilscan/pattern/line_pattern.h"
 #include "pencilscan/rig/color_registration.h"
 
@@ -16,7 +17,9 @@ struct Camera : Device {
   /// camera RGB = matrix * projector RGB, for every projector or by projector name.
   std::optional<Mat3> color_matrix;
   std::map<std::string, Mat3> color_matrix_by_projector;
-  double gamma = 1;                ///< linear = value^gamma on [0, 1]; > 0
+  double gamma = 1;                ///< > 0; with the black level: io/linear_light.h
+  double black_level = 0;          ///< stored value of no light, in [0, 1)
+  std::optional<Mosaic> mosaic;    ///< its images have one channel, one colour a pixel
   bool sees_texture_only = false;  ///< "role": "texture"
   ColorRegistration color_registration;
 
@@ -41,11 +44,21 @@ struct Projector : Device {
   }
 };
 
+/// What the object stands on.
+struct Floor {
+  Vec3 point = Vec3::Zero();
+  Vec3 normal = Vec3::UnitZ();  ///< unit, towards the object
+
+  /// Height of a point above it, mm.
+  [[nodiscard]] double height(const Vec3& x) const { return normal.dot(x - point); }
+};
+
 /// All devices and what they show, as one value (rig.json).
 struct Rig {
   std::vector<Camera> cameras;
   std::vector<Projector> projectors;
   std::optional<Sphere> volume;  ///< as stated by the file
+  std::optional<Floor> floor;    ///< what lies below it, or within a line spacing, is no object
   bool unit_known = true;        ///< "unit": "mm"; false: "unknown"
 };
 

@@ -134,16 +134,32 @@ void parse_sequence(const JsonField& field, LinePattern& pattern) {
   }
 }
 
+/// A name, or the linear light of red, green and blue.
+PatternColor parse_color(const JsonField& field) {
+  if (!field.is_array()) {
+    const std::string name = field.text();
+    if (!color_from_name(name)) {
+      field.fail("must be blue, cyan, red, yellow, green, magenta or white, or [r, g, b]");
+    }
+    return PatternColor(name);
+  }
+  const auto numbers = field.entries(3);
+  Rgb light{};
+  for (std::size_t k = 0; k < 3; ++k) {
+    light[k] = numbers[k].number();
+    if (light[k] < 0 || light[k] > 1) numbers[k].fail("must be in [0, 1]");
+  }
+  if (light == Rgb{}) field.fail("must not be all 0: a black line shows nothing");
+  return PatternColor(light);
+}
+
 /// colors, alphabet, order and sequence.
 void parse_code(const JsonField& field, LinePattern& pattern) {
   const auto colors = field.at("colors").entries();
   if (colors.empty()) field.at("colors").fail("must have at least one colour");
   pattern.colors.clear();
   for (const JsonField& color : colors) {
-    pattern.colors.push_back(color.text());
-    if (!color_from_name(pattern.colors.back())) {
-      color.fail("must be blue, cyan, red, yellow, green, magenta or white");
-    }
+    pattern.colors.push_back(parse_color(color));
   }
   pattern.alphabet = static_cast<int>(colors.size());
   const bool coded = pattern.alphabet > 1;
@@ -229,13 +245,25 @@ Projector parse_projector(const JsonField& field, GivenCalibration* given) {
 
 Camera parse_camera(const JsonField& field, const std::vector<Projector>& projectors,
                     GivenCalibration* given) {
-  check_device_keys(field, {"color_matrix", "color_registration", "gamma", "role"},
-                    given == nullptr);
+  check_device_keys(
+      field, {"color_matrix", "color_registration", "gamma", "black_level", "mosaic", "role"},
+      given == nullptr);
   Camera camera;
   parse_device(field, camera, given);
   if (field.has("color_registration"))
     camera.color_registration = parse_color_registration(field.at("color_registration"));
   if (field.has("gamma")) camera.gamma = field.at("gamma").positive();
+  if (field.has("black_level")) {
+    camera.black_level = field.at("black_level").number();
+    if (camera.black_level < 0 || camera.black_level >= 1)
+      field.at("black_level").fail("must be in [0, 1)");
+  }
+  if (field.has("mosaic")) {
+    camera.mosaic = Mosaic::from_name(field.at("mosaic").text());
+    if (!camera.mosaic) field.at("mosaic").fail("must be RGGB, BGGR, GRBG or GBRG");
+    if (camera.width < 2 || camera.height < 2)
+      field.at("mosaic").fail("needs an image of at least 2x2 pixels");
+  }
   if (field.has("role")) {
     if (field.at("role").text() != "texture") field.at("role").fail("must be \"texture\"");
     camera.sees_texture_only = true;
@@ -272,6 +300,15 @@ std::vector<JsonField> parse_device_list(const JsonField& field) {
 Sphere parse_volume(const JsonField& field) {
   field.check_keys({"center", "radius"}, {});
   return {field.at("center").vector3(), field.at("radius").positive()};
+}
+
+Floor parse_floor(const JsonField& field) {
+  field.check_keys({"point", "normal"}, {});
+  const Vec3 normal = field.at("normal").vector3();
+  const double length = normal.norm();
+  if (!(length > 0) || !std::isfinite(length))
+    field.at("normal").fail("must be a direction, longer than 0");
+  return {field.at("point").vector3(), normal / length};
 }
 
 // ---- writing ------------------------------------------------------------------------------------
@@ -312,7 +349,13 @@ void add_color_registration(const ColorRegistration& registration, Json& device)
 Json pattern_to_json(const LinePattern& pattern) {
   Json json;
   json["orientation"] = pattern.axis == Axis::kColumn ? "vertical" : "horizontal";
-  json["colors"] = pattern.colors;
+  json["colors"] = Json::array();
+  for (const PatternColor& color : pattern.colors) {
+    if (color.stated_by_name())
+      json["colors"].push_back(color.text());
+    else
+      json["colors"].push_back(color.light());
+  }
   if (pattern.alphabet > 1) {
     json["alphabet"] = pattern.alphabet;
     json["order"] = pattern.order;
@@ -338,6 +381,8 @@ Json camera_to_json(const Camera& camera, const GivenCalibration& given) {
   }
   add_color_registration(camera.color_registration, json);
   if (camera.gamma != 1) json["gamma"] = camera.gamma;
+  if (camera.black_level != 0) json["black_level"] = camera.black_level;
+  if (camera.mosaic) json["mosaic"] = camera.mosaic->name();
   if (camera.sees_texture_only) json["role"] = "texture";
   return json;
 }
@@ -389,7 +434,7 @@ namespace {
 Rig parse_rig(const std::string& name, const nlohmann::json& json,
               std::vector<GivenCalibration>* given) {
   const JsonField root(name, json);
-  root.check_keys({"format", "unit", "cameras", "projectors"}, {"volume"});
+  root.check_keys({"format", "unit", "cameras", "projectors"}, {"volume", "floor"});
   if (root.at("format").text() != "rig/1") root.at("format").fail("must be \"rig/1\"");
   const std::string unit = root.at("unit").text();
   if (unit != "mm" && unit != "unknown") root.at("unit").fail("must be \"mm\" or \"unknown\"");
@@ -406,6 +451,7 @@ Rig parse_rig(const std::string& name, const nlohmann::json& json,
   }
   if (given != nullptr) given->insert(given->end(), of_projectors.begin(), of_projectors.end());
   if (root.has("volume")) rig.volume = parse_volume(root.at("volume"));
+  if (root.has("floor")) rig.floor = parse_floor(root.at("floor"));
   return rig;
 }
 
@@ -446,6 +492,9 @@ std::string devices_text(const Rig& rig, std::span<const GivenCalibration> all_g
     json["projectors"].push_back(projector_to_json(projector, *given++));
   if (rig.volume) {
     json["volume"] = {{"center", to_json(rig.volume->center)}, {"radius", rig.volume->radius}};
+  }
+  if (rig.floor) {
+    json["floor"] = {{"point", to_json(rig.floor->point)}, {"normal", to_json(rig.floor->normal)}};
   }
   return pretty(json) + "\n";
 }

@@ -38,6 +38,8 @@ Rig example_rig() {
   rig.cameras[1].distortion = {0.1, -0.2, 1e-3, -1e-4, 0.05};
   rig.cameras[1].gamma = 2.2;
   rig.cameras[2].sees_texture_only = true;
+  rig.cameras[0].mosaic = Mosaic::from_name("GBRG");
+  rig.cameras[0].black_level = 1.0 / 16;
   for (int i = 0; i < 2; ++i) {
     Projector projector;
     static_cast<Device&>(projector) = ring_camera("proj" + std::to_string(i), 1.3 + i, 0.5);
@@ -53,7 +55,7 @@ Rig example_rig() {
   rows.has_own_sequence = true;
   rows.max_lines = 7;
   LinePattern plain;
-  plain.colors = {"white"};
+  plain.colors = {PatternColor(Rgb{0.9, 1.0 / 3, 0.05})};
   plain.alphabet = 1;
   plain.order = 1;
   plain.sequence = {0};
@@ -64,6 +66,7 @@ Rig example_rig() {
   rig.projectors[1].color_registration.colors[2] = {Vec2(-0.25, 0), 1};
   rig.projectors[0].output = "HDMI-1";
   rig.volume = Sphere{{1, 2, 3}, 1.0 / 3};
+  rig.floor = Floor{{1, 2, -1.0 / 3}, {0, 0, 1}};
   return rig;
 }
 
@@ -110,6 +113,8 @@ TEST_F(RigFile, RoundTripGivesTheSameDoubles) {
     expect_equal(a, b);
     EXPECT_EQ(a.gamma, b.gamma);
     EXPECT_EQ(a.sees_texture_only, b.sees_texture_only);
+    EXPECT_EQ(a.black_level, b.black_level);
+    EXPECT_EQ(a.mosaic, b.mosaic);
     EXPECT_EQ(a.color_matrix_for("proj0"), b.color_matrix_for("proj0"));
     EXPECT_EQ(a.color_matrix_for("proj1"), b.color_matrix_for("proj1"));
   }
@@ -129,6 +134,33 @@ TEST_F(RigFile, RoundTripGivesTheSameDoubles) {
   }
   EXPECT_EQ(back.volume->center, rig.volume->center);
   EXPECT_EQ(back.volume->radius, rig.volume->radius);
+  EXPECT_EQ(back.floor->point, rig.floor->point);
+  EXPECT_EQ(back.floor->normal, rig.floor->normal);
+}
+
+TEST_F(RigFile, ColoursAreWrittenAsTheyWereStated) {
+  Rig rig = example_rig();
+  rig.projectors[0].patterns[0].colors = {PatternColor("blue"), PatternColor(Rgb{0, 1, 1})};
+  write_rig(rig, folder_ / "rig.json");
+  const nlohmann::json json = read_json(folder_ / "rig.json");
+  EXPECT_EQ(json["projectors"][0]["pattern"]["colors"].dump(), "[\"blue\",[0.0,1.0,1.0]]");
+  const Rig back = read_rig(folder_ / "rig.json");
+  EXPECT_EQ(back.projectors[0].patterns[0].colors[1], PatternColor("cyan"));
+  EXPECT_EQ(back.projectors[0].patterns[0].colors[1].text(), "cyan");
+  EXPECT_EQ(back.projectors[1].patterns[1].colors[0].text(),
+            "[0.90000000000000002, 0.33333333333333331, 0.050000000000000003]");
+}
+
+TEST_F(RigFile, FloorsAreChecked) {
+  const auto floor_error = [&](const nlohmann::json& floor) {
+    return error_after([&](auto& j) { j["floor"] = floor; });
+  };
+  EXPECT_EQ(floor_error({{"point", {0, 0, -100}}, {"normal", {0, 0, 2}}}), "accepted");
+  EXPECT_EQ(read_rig(folder_ / "rig.json").floor->normal, Vec3(0, 0, 1));
+  EXPECT_EQ(floor_error({{"point", {0, 0, -100}}, {"normal", {0, 0, 0}}}),
+            "floor.normal = [0,0,0]: must be a direction, longer than 0");
+  EXPECT_EQ(floor_error({{"point", {0, 0, -100}}}), "floor.normal: this key is missing");
+  EXPECT_THAT(floor_error({{"point", {0, 0}}, {"normal", {0, 0, 1}}}), HasSubstr("floor.point"));
 }
 
 TEST_F(RigFile, ColourRegistrationComesBack) {
@@ -259,6 +291,12 @@ TEST_F(RigFile, PatternsAreChecked) {
   EXPECT_THAT(pattern_error("offset_px", 1280), HasSubstr("offset_px = 1280: the first line"));
   EXPECT_THAT(pattern_error("colors", {"blue", "pink"}),
               HasSubstr("pattern.colors[1] = \"pink\": must be blue"));
+  EXPECT_THAT(pattern_error("colors", {"blue", {0, 1.5, 0}}),
+              HasSubstr("pattern.colors[1][1] = 1.5: must be in [0, 1]"));
+  EXPECT_THAT(pattern_error("colors", {"blue", {0, 0, 0}}),
+              HasSubstr("pattern.colors[1] = [0,0,0]: must not be all 0"));
+  EXPECT_THAT(pattern_error("colors", {"blue", {1, 1}}),
+              HasSubstr("pattern.colors[1] = [1,1]: must be a list of 3"));
   EXPECT_THAT(pattern_error("colors", {"blue", "cyan", "red"}),
               HasSubstr("pattern.alphabet = 2: must be the number of colors, 3"));
   EXPECT_THAT(pattern_error("sequence", {0, 1, 2}),
@@ -280,6 +318,11 @@ TEST_F(RigFile, OptionalCameraKeysAreChecked) {
     return error_after([&](auto& j) { j["cameras"][0][key] = value; });
   };
   EXPECT_THAT(camera_error("gamma", 0), HasSubstr("cameras[0].gamma = 0: must be > 0"));
+  EXPECT_EQ(camera_error("mosaic", "BGGR"), "accepted");
+  EXPECT_EQ(camera_error("mosaic", "RGBG"),
+            "cameras[0].mosaic = \"RGBG\": must be RGGB, BGGR, GRBG or GBRG");
+  EXPECT_EQ(camera_error("black_level", 1), "cameras[0].black_level = 1: must be in [0, 1)");
+  EXPECT_EQ(camera_error("black_level", -0.1), "cameras[0].black_level = -0.1: must be in [0, 1)");
   EXPECT_THAT(camera_error("role", "x"), HasSubstr("cameras[0].role = \"x\""));
   EXPECT_THAT(camera_error("color_matrix", {{1, 0}, {0, 1}}), HasSubstr("must be a list of 3"));
   EXPECT_THAT(camera_error("color_matrix", {{"nobody", 1}}),

@@ -66,7 +66,7 @@ void write_object(std::ostream& out, const SimulatedObject& object) {
 
 /// The slits of all lines of one colour, as a mesh in front of the projector.
 void write_slits(std::ostream& out, const Projector& projector, const LinePattern& pattern,
-                 const std::string& color) {
+                 const PatternColor& color) {
   const RigidTransform world_from_device = projector.device_from_world.inverse();
   const bool columns = pattern.axis == Axis::kColumn;
   const double across_end = projector.size_across(pattern) - 0.5;
@@ -104,14 +104,15 @@ void write_lights(std::ostream& out, const Rig& rig, const RenderOptions& option
     const double strength =
         options.exposure * (options.inverse_square ? 0.5 * (1 + kFade * kFade) : 1);
     for (const LinePattern& pattern : projector.patterns) {
-      std::map<std::string, bool> used;
+      std::map<PatternColor, bool> used;
       for (const int symbol : pattern.sequence) {
         used[pattern.colors[static_cast<std::size_t>(symbol)]] = true;
       }
       for (const auto& [color, is_used] : used) {
-        const Rgb rgb = color_from_name(color).value_or(Rgb{0, 0, 0});
-        out << "// " << projector.name << ": " << color << "\nlight_source {\n  " << Vector{center}
-            << " rgb " << strength << " * <" << rgb[0] << ", " << rgb[1] << ", " << rgb[2] << ">\n";
+        const Rgb& rgb = color.light();
+        out << "// " << projector.name << ": " << color.text() << "\nlight_source {\n  "
+            << Vector{center} << " rgb " << strength << " * <" << rgb[0] << ", " << rgb[1] << ", "
+            << rgb[2] << ">\n";
         if (options.inverse_square) {
           out << "  fade_distance " << reference / kFade << " fade_power 2\n";
         }
