@@ -17,6 +17,7 @@
 #include "pencilscan/io/image.h"
 #include "pencilscan/io/mesh_file.h"
 #include "pencilscan/pipeline/frame.h"
+#include "pencilscan/rig/camera_light.h"
 
 namespace pencilscan {
 namespace {

@@ -20,6 +20,7 @@
 #include "pencilscan/io/image.h"
 #include "pencilscan/io/mesh_file.h"
 #include "pencilscan/pipeline/rig_refinement.h"
+#include "pencilscan/rig/camera_light.h"
 
 namespace pencilscan {
 namespace {
