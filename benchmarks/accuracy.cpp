@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "cluster_enumeration.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/evaluation/label_error.h"
 #include "pencilscan/evaluation/line_recall.h"
@@ -117,9 +118,7 @@ void print_reliability(const LabelFigures& labels) {
 
 struct MethodChoice {
   const char* name;
-  Method method;
-  MultiviewCost cost;
-  Inference inference = Inference::kMessages;
+  MethodOptions method;
   bool has_second_look = true;
 };
 
@@ -144,26 +143,26 @@ int run(const std::filesystem::path& rig_path, const std::filesystem::path& fram
   for (const auto& lines : true_lines)
     all_lines.insert(all_lines.end(), lines.begin(), lines.end());
 
+  MultiviewOptions published;
+  published.cost = MultiviewCost::kPublished;
+  JointOptions clusters;
+  clusters.inference = [](const PairwiseEnergy& energy) { return enumerate_clusters(energy); };
   const MethodChoice choices[] = {
-      {"linear", Method::kLinear, MultiviewCost::kNormalized},
-      {"multiview published", Method::kMultiview, MultiviewCost::kPublished},
-      {"multiview", Method::kMultiview, MultiviewCost::kNormalized},
-      {"joint", Method::kJoint, MultiviewCost::kNormalized},
-      {"joint, first look", Method::kJoint, MultiviewCost::kNormalized, Inference::kMessages,
-       false},
-      {"clusters, first look", Method::kJoint, MultiviewCost::kNormalized, Inference::kClusters,
-       false},
-      {"clusters", Method::kJoint, MultiviewCost::kNormalized, Inference::kClusters},
+      {"linear", LinearOptions{}},
+      {"multiview published", published},
+      {"multiview", MultiviewOptions{}},
+      {"joint", JointOptions{}},
+      {"joint, first look", JointOptions{}, false},
+      {"clusters, first look", clusters, false},
+      {"clusters", clusters},
   };
   bool is_first = true;
   for (std::size_t k = 0; k < std::size(choices); ++k) {
     if (!methods.empty() && methods != choices[k].name) continue;
     PointOptions options;
-    options.solution.method = choices[k].method;
-    options.solution.cost = choices[k].cost;
-    options.solution.joint.inference = choices[k].inference;
+    options.method = choices[k].method;
     if (!choices[k].has_second_look) options.second_look.passes = 0;
-    const PointResult result = measure_points(rig, frame, options);
+    const PointResult result = reconstruct_frame(rig, frame, options, {}, false).points;
     if (is_first) {
       print_detection(rig, result, true_lines);
       print_identities(truth, rig, result);

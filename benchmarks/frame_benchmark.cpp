@@ -42,8 +42,9 @@ void print_row(const std::string& stage, double seconds, double blur_seconds) {
   std::printf("%-24s %9.1f %9.1f\n", stage.c_str(), 1e3 * seconds, seconds / blur_seconds);
 }
 
-void run(const Rig& rig, const Frame& frame, int threads, int runs, bool with_shape) {
+void run(const Rig& stated, const Frame& frame, int threads, int runs, bool with_shape) {
   const ThreadLimit limit(threads);
+  const Rig rig = scaled(stated, 1 / footprint(stated));
   cv::setNumThreads(1);  // the cameras share the threads
 
   // The reference before and after, so that a machine that became slower in between is seen.

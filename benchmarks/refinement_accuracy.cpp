@@ -49,7 +49,7 @@ RigCorrection errors(const Rig& rig, const Arguments& arguments, std::uint64_t s
 
 void print_points(const std::string& name, const Rig& rig, const TruthScene& truth,
                   const PointResult& detected) {
-  const Labeling labeling = solve(rig, detected.families, detected.graphs);
+  const Labeling labeling = solve_joint(rig, detected.families, detected.graphs, {});
   const auto crossings =
       crossing_disagreement(rig, crossing_tracks(rig, detected.graphs, labeling));
   const auto measured = triangulate(rig, detected.graphs, labeling);

@@ -25,7 +25,10 @@ std::vector<std::string> built_layers() {
 }
 
 LayeringRules project_rules() {
-  return {built_layers(), "simulation", {"detection", "grid", "solution", "depth", "surface"}};
+  return {built_layers(),
+          "simulation",
+          {"view", "detection", "grid", "labeling", "points", "paper", "joint", "guided", "depth",
+           "surface"}};
 }
 
 /// The layers as docs/architecture.md lists them: the first word of each line of the block after

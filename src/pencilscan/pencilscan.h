@@ -20,7 +20,7 @@
 #include "pencilscan/core/error.h"
 #include "pencilscan/geometry/mesh.h"
 #include "pencilscan/io/mesh_file.h"
-#include "pencilscan/io/point_file.h"
+#include "pencilscan/labeling/point_file.h"
 #include "pencilscan/planning/ring.h"
 #include "pencilscan/rig/rig.h"
 #include "pencilscan/rig/rig_text.h"

@@ -6,7 +6,7 @@
 
 #include "pencilscan/api/reconstruct.h"
 #include "pencilscan/geometry/mesh.h"
-#include "pencilscan/io/point_file.h"
+#include "pencilscan/labeling/measured_point.h"
 #include "pencilscan/rig/rig.h"
 
 namespace pencilscan {

@@ -13,12 +13,12 @@
 #include "pencilscan/io/image.h"
 #include "pencilscan/io/json_text.h"
 #include "pencilscan/io/mesh_file.h"
+#include "pencilscan/labeling/point_file.h"
 #include "pencilscan/pipeline/curve_output.h"
 #include "pencilscan/pipeline/frame.h"
 #include "pencilscan/pipeline/frame_files.h"
 #include "pencilscan/pipeline/frame_output.h"
 #include "pencilscan/rig/camera_light.h"
-#include "pencilscan/solution/single_projector.h"
 
 namespace pencilscan {
 namespace {
@@ -61,24 +61,26 @@ std::vector<cv::Mat> camera_images(const Rig& rig, const Images& images) {
 
 PointOptions point_options(const Rig& rig, const ReconstructionOptions& options) {
   PointOptions points;
-  const std::optional<Method> method = method_from_name(options.method);
-  if (!method) {
+  const SolutionMethod* method = find_method(options.method);
+  if (method == nullptr) {
     throw InputError("options", "method", options.method,
                      "must be joint, linear, multiview or single-projector");
   }
-  points.solution.method = *method;
+  points.method = method->defaults;
   if (options.multiview_cost != "normalized" && options.multiview_cost != "published") {
     throw InputError("options", "multiview_cost", options.multiview_cost,
                      "must be normalized or published");
   }
-  points.solution.cost = options.multiview_cost == "published" ? MultiviewCost::kPublished
-                                                               : MultiviewCost::kNormalized;
+  if (auto* multiview = std::get_if<MultiviewOptions>(&points.method)) {
+    multiview->cost = options.multiview_cost == "published" ? MultiviewCost::kPublished
+                                                            : MultiviewCost::kNormalized;
+  }
   for (std::size_t p = 0; p < rig.projectors.size(); ++p) {
     if (rig.projectors[p].patterns.empty())
       throw InputError("rig", "projectors[" + std::to_string(p) + "].pattern", "",
                        "this key is missing: there is nothing to see of this projector");
   }
-  if (*method == Method::kSingleProjector && !shows_grid(rig)) {
+  if (method->capabilities.needs_grid && !shows_grid(rig)) {
     throw InputError("rig", "projectors", "",
                      "must hold one with a vertical and a horizontal pattern, which the method "
                      "single-projector needs");
@@ -102,8 +104,8 @@ Reconstruction reconstruct(const Rig& rig, const Images& images,
                            const ReconstructionOptions& options) {
   PointOptions points = point_options(rig, options);
   ShapeOptions shape;
-  // The paper's two methods keep their own, continuous planes: their surface rests on the curves.
-  shape.depth.enabled = options.depth && points.solution.method == Method::kJoint;
+  shape.depth.enabled =
+      options.depth && solution_method(points.method).capabilities.allows_dense_depth;
   Frame frame;
   frame.name = options.frame;
   frame.images = camera_images(rig, images);

@@ -10,7 +10,7 @@
 #include "pencilscan/api/images.h"
 #include "pencilscan/geometry/mesh.h"
 #include "pencilscan/io/curve_file.h"
-#include "pencilscan/io/point_file.h"
+#include "pencilscan/labeling/measured_point.h"
 #include "pencilscan/rig/rig.h"
 
 namespace pencilscan {

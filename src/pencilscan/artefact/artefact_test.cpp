@@ -13,8 +13,8 @@
 #include "pencilscan/core/random.h"
 #include "pencilscan/io/file.h"
 #include "pencilscan/io/mesh_file.h"
-#include "pencilscan/io/point_file.h"
 #include "pencilscan/io/temporary_folder.h"
+#include "pencilscan/labeling/point_file.h"
 
 namespace pencilscan {
 namespace {

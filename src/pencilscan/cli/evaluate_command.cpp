@@ -9,7 +9,7 @@
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/evaluation/evaluate.h"
 #include "pencilscan/io/mesh_file.h"
-#include "pencilscan/io/point_file.h"
+#include "pencilscan/labeling/point_file.h"
 
 namespace pencilscan::cli {
 namespace {

@@ -44,12 +44,13 @@ void print_refinement(const RefinementOutcome& refinement, nlohmann::ordered_jso
 void reconstruct(const ReconstructOptions& options) {
   const ThreadLimit limit(options.common.threads);
   SequenceOptions sequence;
-  sequence.points.solution.method = method_from_name(options.method).value();
-  sequence.points.solution.cost =
-      options.cost == "published" ? MultiviewCost::kPublished : MultiviewCost::kNormalized;
-  // The paper's two methods keep their own, continuous planes: their surface rests on the curves.
-  sequence.shape.depth.enabled =
-      !options.no_depth && sequence.points.solution.method == Method::kJoint;
+  const SolutionMethod& method = *find_method(options.method);
+  sequence.points.method = method.defaults;
+  if (auto* multiview = std::get_if<MultiviewOptions>(&sequence.points.method)) {
+    multiview->cost =
+        options.cost == "published" ? MultiviewCost::kPublished : MultiviewCost::kNormalized;
+  }
+  sequence.shape.depth.enabled = !options.no_depth && method.capabilities.allows_dense_depth;
   sequence.plain_frames = options.plain_frames;
   sequence.refine_rig = options.refine_rig;
   sequence.meshes = !options.no_mesh;
@@ -123,9 +124,10 @@ void add_reconstruct_command(CLI::App& app) {
       ->check(CLI::IsMember({"linear", "multiview", "joint", "single-projector"}))
       ->capture_default_str();
   command
-      ->add_option("--multiview-cost", options->cost,
-                   "of the sweep: published (a sum over matched points) or normalized (a mean over "
-                   "all reprojected points)")
+      ->add_option(
+          "--multiview-cost", options->cost,
+          "of the sweep: published (a sum over the reprojected points) or normalized (a mean "
+          "in which points outside the other images count too)")
       ->check(CLI::IsMember({"published", "normalized"}))
       ->capture_default_str();
   command->add_flag("--no-depth", options->no_depth,

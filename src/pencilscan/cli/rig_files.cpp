@@ -13,6 +13,7 @@
 #include "pencilscan/exchange/opencv_file.h"
 #include "pencilscan/io/file.h"
 #include "pencilscan/io/image.h"
+#include "pencilscan/labeling/point_file.h"
 #include "pencilscan/report/rig_picture.h"
 #include "pencilscan/rig/device_list.h"
 #include "pencilscan/rig/devices_file.h"

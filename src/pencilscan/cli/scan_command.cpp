@@ -7,6 +7,7 @@
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/core/stopwatch.h"
 #include "pencilscan/io/mesh_file.h"
+#include "pencilscan/labeling/point_file.h"
 #include "pencilscan/scan/gray_scan.h"
 
 namespace pencilscan::cli {

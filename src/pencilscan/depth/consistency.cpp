@@ -146,10 +146,10 @@ class Comparison {
       const double sigma =
           static_cast<double>(node(i).sigma + node(static_cast<std::size_t>(other)).sigma);
       const Link link{static_cast<std::uint32_t>(other), static_cast<std::uint16_t>(m)};
-      if (std::abs(nearest) < 0.5 * options_.margin_mm + 3 * sigma) {
+      if (std::abs(nearest) < 0.5 * options_.margin + 3 * sigma) {
         links.support[i].push_back(
             {link.other, link.group, disagreement(i, static_cast<std::size_t>(next), there)});
-      } else if (nearest > options_.margin_mm + 4 * sigma && count >= 3) {
+      } else if (nearest > options_.margin + 4 * sigma && count >= 3) {
         links.contradiction[i].push_back(link);
       }
     }
@@ -161,9 +161,9 @@ class Comparison {
     constexpr int kCell = 3;  // projector px
     const int columns = projector.width / kCell + 1;
     const int rows = projector.height / kCell + 1;
-    std::uint64_t bits = 0;
-    for (std::size_t k = 0; k < pattern_projector_.size() && k < 64; ++k) {
-      if (pattern_projector_[k] == static_cast<int>(p)) bits |= std::uint64_t{1} << k;
+    LitPatterns own;
+    for (std::size_t k = 0; k < pattern_projector_.size(); ++k) {
+      if (pattern_projector_[k] == static_cast<int>(p)) own.set(k);
     }
     // The second farthest lit node of each cell: a single wrong one shall not cast doubt on all
     // that stands before it.
@@ -184,7 +184,7 @@ class Comparison {
       z_of[i] = static_cast<float>((projector.device_from_world * nodes_[i].x).z());
     });
     for (std::size_t i = 0; i < nodes_.size(); ++i) {
-      if (cell_of[i] < 0 || (node(i).lit & bits) == 0) continue;
+      if (cell_of[i] < 0 || (node(i).lit & own).none()) continue;
       Lit& lit = farthest[static_cast<std::size_t>(cell_of[i])];
       if (z_of[i] > lit.farthest) {
         lit = {lit.farthest, lit.farthest_node, z_of[i], static_cast<std::int32_t>(i)};
@@ -199,7 +199,7 @@ class Comparison {
       if (lit.node < 0 || lit.node == static_cast<std::int32_t>(i)) return;
       const double sigma =
           static_cast<double>(node(i).sigma + node(static_cast<std::size_t>(lit.node)).sigma);
-      if (static_cast<double>(lit.z - z_of[i]) < 2 * options_.margin_mm + 4 * sigma) return;
+      if (static_cast<double>(lit.z - z_of[i]) < 2 * options_.margin + 4 * sigma) return;
       links.contradiction[i].push_back(
           {static_cast<std::uint32_t>(lit.node), static_cast<std::uint16_t>(maps_.size() + p)});
     });

@@ -4,13 +4,13 @@
 #include <vector>
 
 #include "pencilscan/depth/depth_map.h"
-#include "pencilscan/detection/color_family.h"
 #include "pencilscan/rig/rig.h"
+#include "pencilscan/view/color_family.h"
 
 namespace pencilscan {
 
 struct ConsistencyOptions {
-  double margin_mm = 1.5;           ///< by so much a segment must pass through a surface, > 0
+  double margin = 3;  ///< footprints by which a segment must pass through a surface, > 0
   double contradiction_weight = 3;  ///< of one contradiction against one support
   double min_confidence = 0.5;
   int rounds = 6;

@@ -106,7 +106,7 @@ CameraLight measure_light(const Rig& rig, int camera, const std::vector<ColorFam
   light.valid = std::move(valid);
   light.noise.assign(families.size(), NoiseModel{});
   // Pilot windows at evenly picked curve points.
-  constexpr std::size_t kPilots = 300;
+  constexpr std::size_t kPilots = 100;
   const CurveSeeds seeds(*light.camera, camera, points);
   std::vector<Vec2> pixels;
   std::size_t own = 0;
@@ -117,21 +117,19 @@ CameraLight measure_light(const Rig& rig, int camera, const std::vector<ColorFam
     if (p.camera != camera) continue;
     if (i++ % step == 0) pixels.emplace_back(std::round(p.u), std::round(p.v));
   }
-  const auto run = [&](float blur) {
+  /// take(fit, fitter) for each pilot window that fits.
+  const auto run = [&](float blur, auto take) {
     light.blur_px = blur;
     WindowFitter fitter(light, options.half);
-    std::vector<std::optional<WindowFit>> fits;
     for (const Vec2& pixel : pixels) {
       const auto planes = seeds.planes(pixel, options.seed_radius_px, options.half);
-      fits.push_back(planes.empty() ? std::nullopt : fitter.fit(pixel, planes[0], 5));
+      if (planes.empty()) continue;
+      if (const auto fit = fitter.fit(pixel, planes[0], 5)) take(*fit, fitter);
     }
-    return fits;
   };
   const auto median_misfit = [&](float blur) {
     std::vector<float> values;
-    for (const auto& fit : run(blur)) {
-      if (fit) values.push_back(fit->misfit);
-    }
+    run(blur, [&](const WindowFit& fit, const WindowFitter&) { values.push_back(fit.misfit); });
     if (values.empty()) return 1e9F;
     return upper_median(std::move(values));
   };
@@ -140,7 +138,7 @@ CameraLight measure_light(const Rig& rig, int camera, const std::vector<ColorFam
   constexpr float kGolden = 0.618034F;
   float a = high - kGolden * (high - low), b = low + kGolden * (high - low);
   float fa = median_misfit(a), fb = median_misfit(b);
-  for (int round = 0; round < 7; ++round) {
+  for (int round = 0; round < 4; ++round) {
     if (fa < fb) {
       high = b;
       b = a;
@@ -155,13 +153,15 @@ CameraLight measure_light(const Rig& rig, int camera, const std::vector<ColorFam
       fb = median_misfit(b);
     }
   }
-  const auto fits = run(0.5F * (low + high));
+  using Samples = std::vector<std::pair<float, float>>;  // mean and variance of a window
+  std::vector<Samples> samples_of(families.size());
+  run(0.5F * (low + high), [&](const WindowFit&, const WindowFitter& fitter) {
+    for (std::size_t f = 0; f < families.size(); ++f)
+      samples_of[f].emplace_back(fitter.family_mean(f), fitter.family_variance(f));
+  });
   // Noise per family: a line through the medians of the darker and the brighter half.
-  for (std::size_t f = 0; f < std::min<std::size_t>(families.size(), 4); ++f) {
-    std::vector<std::pair<float, float>> samples;
-    for (const auto& fit : fits) {
-      if (fit) samples.emplace_back(fit->family_mean[f], fit->family_variance[f]);
-    }
+  for (std::size_t f = 0; f < families.size(); ++f) {
+    Samples& samples = samples_of[f];
     if (samples.size() < 20) continue;
     std::sort(samples.begin(), samples.end());
     const auto half_median = [&](std::size_t from, std::size_t to) {
@@ -268,7 +268,7 @@ std::size_t complete_map(const CameraLight& light, const RayScene& surface, cons
     const auto fit = fitter.fit(pixel, start, 5);
     if (!fit || !acceptable(light, pixel, *fit, volume, options.half, options)) continue;
     const double move = (camera.point_at_depth(pixel, 1 / fit->q[0]) - hit->point).norm();
-    if (move > options.max_move_mm) continue;
+    if (move > options.max_move) continue;
     map.nodes[i] = node_of(*fit, options.half);
     map.nodes[i].sigma *= static_cast<float>(kHardPlaces * sigma_factor);
     map.nodes[i].confidence = kConfidence;

@@ -5,9 +5,9 @@
 
 #include "pencilscan/depth/depth_map.h"
 #include "pencilscan/depth/window_fit.h"
-#include "pencilscan/detection/color_family.h"
 #include "pencilscan/geometry/ray_scene.h"
-#include "pencilscan/io/point_file.h"
+#include "pencilscan/labeling/measured_point.h"
+#include "pencilscan/view/color_family.h"
 
 namespace pencilscan {
 
@@ -19,7 +19,7 @@ struct DepthOptions {
   double max_relative_residual = 0.25;
   double max_sigma_lines = 0.08;  ///< of the best pattern
   double min_cosine = 0.2;        ///< of the incidence to the camera
-  double max_move_mm = 1;         ///< of a node that is started from the closed surface
+  double max_move = 2;            ///< footprints; of a node started from the closed surface
 };
 
 /// Light as one camera sees it, blur and noise measured from the image itself at the seeds.

@@ -7,8 +7,8 @@
 
 #include "pencilscan/depth/consistency.h"
 #include "pencilscan/depth/dense_depth.h"
-#include "pencilscan/detection/unmix.h"
 #include "pencilscan/geometry/ray_scene.h"
+#include "pencilscan/view/unmix.h"
 
 namespace pencilscan {
 

@@ -1,10 +1,12 @@
 #pragma once
 
 #include <array>
+#include <bitset>
 #include <cstdint>
 #include <vector>
 
 #include "pencilscan/geometry/types.h"
+#include "pencilscan/rig/rig.h"
 
 namespace pencilscan {
 
@@ -22,15 +24,18 @@ enum class HoleReason : std::uint8_t {
 };
 inline constexpr std::size_t kHoleReasons = 9;
 
+/// One bit per pattern of the rig, in the order of the families.
+using LitPatterns = std::bitset<kMostPatterns>;
+
 /// One measured pixel: inverse depth and its first derivatives, w(u + dx, v + dy) =
 /// w + wx dx + wy dy + (wxx dx^2 + 2 wxy dx dy + wyy dy^2) / 2.
 struct DepthNode {
   float w = 0;  ///< 1 / camera z, 1/mm; 0: no depth
   float wx = 0, wy = 0, wxx = 0, wxy = 0, wyy = 0;
-  float sigma = 0;        ///< mm of camera z, one standard deviation
-  float misfit = 0;       ///< residual over what noise explains (1 = only noise)
-  std::uint64_t lit = 0;  ///< bit per pattern (flat index) whose light was found
-  float support = 0;      ///< number of other cameras that agree, each by its own confidence
+  float sigma = 0;    ///< mm of camera z, one standard deviation
+  float misfit = 0;   ///< residual over what noise explains (1 = only noise)
+  LitPatterns lit;    ///< whose light was found
+  float support = 0;  ///< number of other cameras that agree, each by its own confidence
   bool seeded =
       false;  ///< started from a labelled curve of a pattern found here, not from neighbours
   float confidence = 0;  ///< 0..1: what the other views say

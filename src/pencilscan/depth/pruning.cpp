@@ -1,6 +1,5 @@
 #include "pencilscan/depth/pruning.h"
 
-#include <bit>
 #include <span>
 #include <vector>
 
@@ -11,7 +10,7 @@ namespace {
 
 /// Lit by one projector and confirmed by no camera.
 bool is_unconfirmed(const DepthNode& n) {
-  return n.measured() && std::popcount(n.lit) <= 1 && n.support <= 0.01F;
+  return n.measured() && n.lit.count() <= 1 && n.support <= 0.01F;
 }
 
 /// Removes nodes of a map; returns how many.

@@ -9,7 +9,8 @@ namespace pencilscan {
 namespace {
 
 constexpr std::size_t kLeastPoints = 4;
-constexpr double kSteepest = 3.5;  // mm of depth per mm across: an incidence of 74 degrees
+constexpr double kSteepest = 3.5;  // depth per length across: an incidence of 74 degrees
+constexpr double kScatter = 0.8;   // footprints by which points of one surface leave its plane
 
 struct Offset {
   double x, y;  ///< dx / half
@@ -18,15 +19,15 @@ struct Offset {
 };
 
 /// Plane through `points`, reweighted against outliers; clears those of another surface.
-std::optional<Quadric> robust_plane(std::vector<Offset>& points, double mm_per_half) {
+std::optional<Quadric> robust_plane(std::vector<Offset>& points, double per_half) {
   const auto nearest =
       std::min_element(points.begin(), points.end(),
                        [](const Offset& a, const Offset& b) { return a.distance < b.distance; });
   const double w0 = nearest->w;
   // Slopes are pulled to zero weakly: a single curve leaves one of them open.
-  const double steep = mm_per_half * w0 * w0;
+  const double steep = per_half * w0 * w0;
   Vec3 c(w0, 0, 0);
-  const double scale = 0.4 * w0 * w0;  // 0.4 mm
+  const double scale = kScatter * w0 * w0;
   for (Offset& p : points) {
     p.variance = p.sigma_w * p.sigma_w + 1e-2 * scale * scale;
     p.weight = 1 / (p.variance * (0.1 + p.distance * p.distance));
@@ -72,7 +73,7 @@ std::optional<Quadric> robust_plane(std::vector<Offset>& points, double mm_per_h
 
 CurveSeeds::CurveSeeds(const Camera& camera, int camera_index,
                        std::span<const MeasuredPoint> points) {
-  mm_per_px_ = 1 / camera.K(0, 0);
+  per_px_ = 1 / camera.K(0, 0);
   columns_ = cell(camera.width) + 1;
   rows_ = cell(camera.height) + 1;
   cells_.resize(static_cast<std::size_t>(columns_ * rows_));
@@ -98,9 +99,9 @@ std::vector<Quadric> CurveSeeds::planes(const Vec2& pixel, double radius_px, int
   std::vector<Quadric> planes;
   if (points.size() < kLeastPoints) return planes;
   depth /= static_cast<double>(points.size());
-  const double mm_per_half = half * mm_per_px_ * depth;
+  const double per_half = half * per_px_ * depth;
   while (planes.size() < 2 && points.size() >= kLeastPoints) {
-    const auto q = robust_plane(points, mm_per_half);
+    const auto q = robust_plane(points, per_half);
     if (!q) break;
     planes.push_back(*q);
   }

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "pencilscan/depth/window_fit.h"
-#include "pencilscan/io/point_file.h"
+#include "pencilscan/labeling/measured_point.h"
 
 namespace pencilscan {
 
@@ -45,7 +45,7 @@ class CurveSeeds {
 
   int columns_ = 0;
   int rows_ = 0;
-  double mm_per_px_ = 0;  ///< at 1 mm of depth
+  double per_px_ = 0;  ///< length across a pixel at depth 1
   std::vector<std::vector<Point>> cells_;
 };
 

@@ -11,8 +11,6 @@
 namespace pencilscan {
 namespace {
 
-constexpr int kMaxPatterns = 10;  // lit at one place
-constexpr int kMaxUnknowns = 48;
 constexpr float kLeastSpacingPx = 2.5F;  // closer lines are blurred away
 
 /// Integral of the triweight kernel from -1, u clamped.
@@ -30,8 +28,8 @@ constexpr float kLeastLight = 0.6F;   // share of the predicted light that a sid
 constexpr float kLeastEnergy = 40.F;  // ... where that would be beyond noise
 constexpr float kMiddle2 = 0.2F;      // squared radius of the middle, in radii
 
-using Dense = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMaxUnknowns, kMaxUnknowns>;
-using DenseVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMaxUnknowns, 1>;
+using Dense = Eigen::MatrixXd;
+using DenseVector = Eigen::VectorXd;
 
 }  // namespace
 
@@ -72,10 +70,10 @@ WindowFitter::WindowFitter(const CameraLight& light, int half) : light_(&light),
   const std::size_t families = light.families.size();
   image_.assign(families, Column::Zero(padded_));
   offset_.assign(families, 0.F);
-  ex_ = ey_ = inverse_variance_ = mean_ = offset_;
-  profile_.assign(kMaxPatterns, Column::Zero(padded_));
+  ex_ = ey_ = inverse_variance_ = mean_ = variance_ = offset_;
+  profile_.assign(light.patterns.size(), Column::Zero(padded_));
   slope_ = profile_;
-  J_.resize(padded_, 6 + kMaxPatterns + 4);
+  J_.resize(padded_, 6 + static_cast<Eigen::Index>(light.patterns.size()) + 4);
 }
 
 bool WindowFitter::gather(int u, int v) {
@@ -115,8 +113,7 @@ void WindowFitter::choose_patterns(const Vec2& m, const Eigen::Matrix2d& jacobia
   const Vec2 slope = jacobian.transpose().inverse() * Vec2(q[1], q[2]) / half_;
   const Vec3 normal = -Vec3(slope[0], slope[1], q[0] - slope.dot(m)).normalized();
   const Vec3 x = m.homogeneous() / q[0];
-  const std::size_t patterns = std::min<std::size_t>(light_->patterns.size(), 64);
-  for (std::size_t k = 0; k < patterns && lit_.size() < kMaxPatterns; ++k) {
+  for (std::size_t k = 0; k < light_->patterns.size(); ++k) {
     const PatternView& view = light_->patterns[k];
     if ((view.center() - x).dot(normal) <= 0) continue;
     bool ok = false;
@@ -229,10 +226,7 @@ double WindowFitter::step(Quadric& q, bool last, WindowFit& fit) {
     J_.col(columns++) = (root_ * x_ * sum).matrix();
     J_.col(columns++) = (root_ * y_ * sum).matrix();
     const double rss = static_cast<double>(residual.square().sum());
-    if (f < 4) {
-      fit.family_variance[f] = static_cast<float>(rss) / weight_sum;
-      fit.family_mean[f] = mean_[f];
-    }
+    variance_[f] = static_cast<float>(rss) / weight_sum;
     chi2 += rss * static_cast<double>(inverse_variance_[f]);
     degrees += static_cast<double>(weight_sum);
     if (columns == 9) {  // no line of this family: it says nothing of depth, only the offset
@@ -262,8 +256,9 @@ double WindowFitter::step(Quadric& q, bool last, WindowFit& fit) {
       g[place(c)] -= 11 * e;
     }
   }
-  // Weak prior on curvature: a bow of 3 mm over the window's half.
-  const double bow = 3 * q[0];
+  // Weak prior on curvature: a bow of so many footprints over the window's half.
+  constexpr double kBow = 6;
+  const double bow = kBow * q[0];
   for (int c = 3; c < 6; ++c) {
     H(c, c) += 1 / (bow * bow);
     g[c] -= q[c] / q[0] / (bow * bow);
@@ -421,15 +416,14 @@ std::optional<WindowFit> WindowFitter::fit(const Vec2& pixel, const Quadric& sta
   for (const Lit& lit : lit_) {
     if (!lit.on || lit.amplitude < kLeastShare * fit.amplitude) continue;
     if (lit.amplitude < kLeastSignificance * std::sqrt(lit.amplitude_variance)) continue;
-    fit.lit |= std::uint64_t{1} << lit.pattern;
+    fit.lit.set(static_cast<std::size_t>(lit.pattern));
     fit.significance =
         std::max(fit.significance, lit.amplitude / std::sqrt(lit.amplitude_variance));
     fit.lines_per_w =
         std::max(fit.lines_per_w, std::abs(lit.lines.slope(static_cast<float>(q[0]))));
   }
-  if (fit.lit == 0 || !(fit.variance > 0)) return std::nullopt;
-  for (std::size_t f = 0; f < std::min<std::size_t>(image_.size(), 4); ++f)
-    residual = std::max(residual, fit.family_variance[f]);
+  if (fit.lit.none() || !(fit.variance > 0)) return std::nullopt;
+  for (const float variance : variance_) residual = std::max(residual, variance);
   fit.relative_residual = std::sqrt(residual) / fit.amplitude;
   return fit;
 }

@@ -2,12 +2,12 @@
 
 #include <Eigen/Core>
 #include <array>
-#include <cstdint>
 #include <opencv2/core.hpp>
 #include <optional>
 #include <span>
 #include <vector>
 
+#include "pencilscan/depth/depth_map.h"
 #include "pencilscan/depth/pattern_view.h"
 
 namespace pencilscan {
@@ -22,7 +22,7 @@ struct NoiseModel {
 /// What one camera sees, as the photometric fit needs it.
 struct CameraLight {
   const Camera* camera = nullptr;
-  std::vector<PatternView> patterns;  ///< of all families; at most 64 are used
+  std::vector<PatternView> patterns;  ///< of all families
   std::vector<cv::Mat> families;      ///< per family: presence channel, CV_32FC1, linear
   cv::Mat valid;                      ///< CV_8U, 0 where saturated
   float blur_px = 0.8F;               ///< standard deviation of camera and projector blur together
@@ -34,16 +34,14 @@ using Quadric = Eigen::Matrix<double, 6, 1>;
 
 struct WindowFit {
   Quadric q = Quadric::Zero();
-  double variance = 0;                     ///< of q[0], 1/mm^2, misfit included
-  float misfit = 0;                        ///< chi^2 per degree of freedom against the noise model
-  float relative_residual = 0;             ///< root mean square over the largest amplitude
-  std::uint64_t lit = 0;                   ///< patterns found
-  bool cut = false;                        ///< a side of the window does not belong to the surface
-  float amplitude = 0;                     ///< largest, image value
-  float significance = 0;                  ///< largest amplitude / its standard deviation
-  float lines_per_w = 0;                   ///< largest |dl / dw| of a lit pattern
-  std::array<float, 4> family_variance{};  ///< residual variance per family (first four)
-  std::array<float, 4> family_mean{};      ///< mean image value
+  double variance = 0;          ///< of q[0], 1/mm^2, misfit included
+  float misfit = 0;             ///< chi^2 per degree of freedom against the noise model
+  float relative_residual = 0;  ///< root mean square over the largest amplitude
+  LitPatterns lit;              ///< patterns found
+  bool cut = false;             ///< a side of the window does not belong to the surface
+  float amplitude = 0;          ///< largest, image value
+  float significance = 0;       ///< largest amplitude / its standard deviation
+  float lines_per_w = 0;        ///< largest |dl / dw| of a lit pattern
 };
 
 /// Fits inverse depth to the image of a circular window by Gauss-Newton. The image of family f is
@@ -58,6 +56,9 @@ class WindowFitter {
 
   /// Nothing where the window leaves the image, is saturated or shows no line that fits.
   [[nodiscard]] std::optional<WindowFit> fit(const Vec2& pixel, const Quadric& start, int rounds);
+  /// Mean image value and variance of the residuals of a family, of the last window that did fit.
+  [[nodiscard]] float family_mean(std::size_t family) const { return mean_[family]; }
+  [[nodiscard]] float family_variance(std::size_t family) const { return variance_[family]; }
   [[nodiscard]] int half() const { return half_; }
 
  private:
@@ -71,7 +72,7 @@ class WindowFitter {
     bool on = true;
   };
   using Column = Eigen::ArrayXf;
-  using Gram = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, 0, 24, 24>;
+  using Gram = Eigen::MatrixXf;
 
   [[nodiscard]] bool gather(int u, int v);
   void choose_patterns(const Vec2& m, const Eigen::Matrix2d& jacobian, const Quadric& q);
@@ -99,7 +100,7 @@ class WindowFitter {
   std::vector<Column> image_;     ///< per family
   std::vector<Lit> lit_;
   std::vector<Column> profile_, slope_;  ///< per lit: P, dP/dw
-  std::vector<float> offset_, ex_, ey_, inverse_variance_, mean_;
+  std::vector<float> offset_, ex_, ey_, inverse_variance_, mean_, variance_;
   Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic> J_;
 };
 

@@ -3,8 +3,8 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
-#include "pencilscan/detection/color_family.h"
 #include "pencilscan/detection/curve.h"
+#include "pencilscan/view/color_family.h"
 
 namespace pencilscan {
 

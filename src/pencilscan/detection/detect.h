@@ -4,12 +4,12 @@
 #include <vector>
 
 #include "pencilscan/detection/code_evidence.h"
-#include "pencilscan/detection/color_family.h"
 #include "pencilscan/detection/curve.h"
 #include "pencilscan/detection/refine.h"
 #include "pencilscan/detection/ridge.h"
 #include "pencilscan/detection/trace.h"
-#include "pencilscan/detection/unmix.h"
+#include "pencilscan/view/color_family.h"
+#include "pencilscan/view/unmix.h"
 
 namespace pencilscan {
 

@@ -7,8 +7,8 @@
 
 #include "pencilscan/core/lanes.h"
 #include "pencilscan/detection/curve_smoothing.h"
-#include "pencilscan/detection/nearest.h"
 #include "pencilscan/detection/profile_fit.h"
+#include "pencilscan/view/nearest.h"
 
 namespace pencilscan {
 namespace {

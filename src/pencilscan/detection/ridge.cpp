@@ -6,9 +6,9 @@
 #include <opencv2/imgproc.hpp>
 #include <utility>
 
-#include "pencilscan/detection/cell_index.h"
-#include "pencilscan/detection/nearest.h"
 #include "pencilscan/detection/oriented_filter.h"
+#include "pencilscan/view/cell_index.h"
+#include "pencilscan/view/nearest.h"
 
 namespace pencilscan {
 namespace {

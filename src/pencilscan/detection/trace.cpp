@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "pencilscan/core/lanes.h"
-#include "pencilscan/detection/cell_index.h"
+#include "pencilscan/view/cell_index.h"
 
 namespace pencilscan {
 namespace {

@@ -5,7 +5,7 @@
 
 #include "pencilscan/evaluation/statistics.h"
 #include "pencilscan/evaluation/true_lines.h"
-#include "pencilscan/io/point_file.h"
+#include "pencilscan/labeling/measured_point.h"
 
 namespace pencilscan {
 

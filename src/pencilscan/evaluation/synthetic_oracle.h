@@ -4,7 +4,7 @@
 #include <numbers>
 #include <vector>
 
-#include "pencilscan/io/point_file.h"
+#include "pencilscan/labeling/measured_point.h"
 #include "pencilscan/rig/rig.h"
 
 /// Scenes whose true lines are known in closed form. Tests only.

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "pencilscan/exchange/exchanged_device.h"
-#include "pencilscan/io/point_file.h"
+#include "pencilscan/labeling/measured_point.h"
 
 namespace pencilscan {
 

@@ -1,6 +1,7 @@
 #include "pencilscan/geometry/ray_scene.h"
 
 #include <embree3/rtcore.h>
+#include <tbb/task_arena.h>
 
 #include <cmath>
 #include <utility>
@@ -57,8 +58,8 @@ struct RayScene::State {
 
 RayScene::RayScene(const TriangleMesh& mesh) : state_(std::make_unique<State>()) {
   state_->mesh = mesh;
-  // One build thread: the tree, and with it the choice among equal hits, must not vary.
-  state_->device = rtcNewDevice("threads=1");
+  // Not "threads=1": Embree would hold oneTBB's limit for the whole process down while it lives.
+  state_->device = rtcNewDevice(nullptr);
   PENCILSCAN_CHECK(state_->device != nullptr);
   state_->scene = rtcNewScene(state_->device);
   rtcSetSceneFlags(state_->scene, RTC_SCENE_FLAG_ROBUST);
@@ -84,7 +85,8 @@ RayScene::RayScene(const TriangleMesh& mesh) : state_(std::make_unique<State>())
     rtcAttachGeometry(state_->scene, geometry);
     rtcReleaseGeometry(geometry);
   }
-  rtcCommitScene(state_->scene);
+  // One build thread: the tree, and with it the choice among equal hits, must not vary.
+  tbb::task_arena(1).execute([this] { rtcJoinCommitScene(state_->scene); });
 }
 
 RayScene::~RayScene() = default;

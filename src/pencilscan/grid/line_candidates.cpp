@@ -15,7 +15,8 @@ std::optional<DepthRange> depth_range(const Camera& camera, const Sphere& volume
   const double discriminant = b * b - a * (center.squaredNorm() - volume.radius * volume.radius);
   if (discriminant <= 0) return std::nullopt;
   const double root = std::sqrt(discriminant);
-  const DepthRange range{std::max(1e-3, (b - root) / a), (b + root) / a};
+  constexpr double kNearest = 1e-6;  // of the middle's depth, where the volume holds the camera
+  const DepthRange range{std::max(kNearest * b / a, (b - root) / a), (b + root) / a};
   if (!(range.far > range.near)) return std::nullopt;
   return range;
 }

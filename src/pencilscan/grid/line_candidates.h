@@ -3,9 +3,9 @@
 #include <optional>
 #include <vector>
 
-#include "pencilscan/detection/color_family.h"
 #include "pencilscan/geometry/light_sheet.h"
 #include "pencilscan/rig/rig.h"
+#include "pencilscan/view/color_family.h"
 
 namespace pencilscan {
 

@@ -16,7 +16,6 @@
 #include "pencilscan/io/mesh_file.h"
 #include "pencilscan/io/mosaic.h"
 #include "pencilscan/io/ply.h"
-#include "pencilscan/io/point_file.h"
 #include "pencilscan/io/temporary_folder.h"
 
 namespace pencilscan {
@@ -172,70 +171,6 @@ TEST_F(Io, FindImageTriesAllEndings) {
   EXPECT_FALSE(find_image(folder_, "cam0").has_value());
   put("cam0.jpeg", "x");
   EXPECT_EQ(find_image(folder_, "cam0"), folder_ / "cam0.jpeg");
-}
-
-TEST_F(Io, PointsRoundTrip) {
-  std::vector<MeasuredPoint> points(1000);
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    const auto f = static_cast<float>(i);
-    points[i] = {f,
-                 -f,
-                 0.5F * f,
-                 2 * f,
-                 3 * f,
-                 static_cast<std::uint8_t>(i % 6),
-                 static_cast<std::uint8_t>(i % 5),
-                 static_cast<std::uint8_t>(i % 2),
-                 static_cast<std::uint16_t>(i * 60),
-                 0.1F,
-                 0.25F,
-                 f + 0.25F};
-  }
-  write_points(folder_ / "p.ply", points);
-  const auto back = read_points(folder_ / "p.ply");
-  ASSERT_EQ(back.size(), points.size());
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    EXPECT_EQ(back[i].y, points[i].y);
-    EXPECT_EQ(back[i].camera, points[i].camera);
-    EXPECT_EQ(back[i].pattern, points[i].pattern);
-    EXPECT_EQ(back[i].line, points[i].line);
-    EXPECT_EQ(back[i].plane, points[i].plane);
-  }
-}
-
-TEST_F(Io, PointsOfOtherOrderAndMorePropertiesAreRead) {
-  const auto path = put("p.ply",
-                        "ply\nformat ascii 1.0\nelement vertex 1\nproperty ushort line\n"
-                        "property uchar red\nproperty int projector\nproperty uchar camera\n"
-                        "property double x\nproperty double y\nproperty double z\n"
-                        "property float v\nproperty float u\nend_header\n"
-                        "7 255 2 1 1.5 2.5 3.5 20 10\n");
-  const auto points = read_points(path);
-  ASSERT_EQ(points.size(), 1U);
-  EXPECT_EQ(points[0].line, 7);
-  EXPECT_EQ(points[0].projector, 2);
-  EXPECT_EQ(points[0].camera, 1);
-  EXPECT_EQ(points[0].u, 10);
-  EXPECT_EQ(points[0].z, 3.5F);
-  EXPECT_EQ(points[0].confidence, 1);
-  EXPECT_EQ(points[0].plane, 7);
-}
-
-TEST_F(Io, BrokenPointFilesAreRejected) {
-  write_points(folder_ / "p.ply", std::vector<MeasuredPoint>(10));
-  truncate(folder_ / "p.ply", 0.95);
-  EXPECT_THAT(error_of([&] { return read_points(folder_ / "p.ply"); }),
-              ::testing::HasSubstr("truncated"));
-  const std::string header =
-      "ply\nformat ascii 1.0\nelement vertex 99999999999\nproperty float x\n";
-  EXPECT_THAT(error_of([&] { return read_points(put("q.ply", header + "end_header\n1\n")); }),
-              ::testing::HasSubstr("truncated"));
-  EXPECT_THAT(error_of([&] {
-                return read_points(put("r.ply",
-                                       "ply\nformat ascii 1.0\nelement vertex 0\n"
-                                       "property float x\nend_header\n"));
-              }),
-              ::testing::HasSubstr("y: the vertices must have this property"));
 }
 
 TEST_F(Io, MeshRoundTripKeepsVerticesAndSigma) {
@@ -395,8 +330,8 @@ TEST_F(Io, CurvesWithStatesThatDoNotExistAreRefused) {
   write_curves(folder_ / "curves.ply", curves);
   EXPECT_THAT(error_of([&] { return read_curves(folder_ / "curves.ply"); }),
               ::testing::HasSubstr("vertex[0].state"));
-  write_points(folder_ / "points.ply", std::vector<MeasuredPoint>(2));
-  EXPECT_THAT(error_of([&] { return read_curves(folder_ / "points.ply"); }),
+  write_mesh(folder_ / "box.ply", make_box({1, 1, 1}));
+  EXPECT_THAT(error_of([&] { return read_curves(folder_ / "box.ply"); }),
               ::testing::HasSubstr("`crossing`"));
 }
 

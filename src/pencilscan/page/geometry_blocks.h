@@ -6,7 +6,7 @@
 
 #include "pencilscan/geometry/ray_scene.h"
 #include "pencilscan/io/curve_file.h"
-#include "pencilscan/io/point_file.h"
+#include "pencilscan/labeling/measured_point.h"
 #include "pencilscan/page/block.h"
 #include "pencilscan/rig/rig.h"
 

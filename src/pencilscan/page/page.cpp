@@ -6,9 +6,9 @@
 
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/parallel.h"
-#include "pencilscan/detection/color_family.h"
 #include "pencilscan/io/file.h"
 #include "pencilscan/page/page_assets.h"
+#include "pencilscan/view/color_family.h"
 
 namespace pencilscan {
 namespace {

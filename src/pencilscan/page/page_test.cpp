@@ -12,6 +12,7 @@
 
 #include "pencilscan/core/error.h"
 #include "pencilscan/io/temporary_folder.h"
+#include "pencilscan/labeling/point_file.h"
 #include "pencilscan/page/advice.h"
 #include "pencilscan/page/block.h"
 #include "pencilscan/page/geometry_blocks.h"

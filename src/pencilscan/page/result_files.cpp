@@ -2,6 +2,7 @@
 
 #include "pencilscan/io/file.h"
 #include "pencilscan/io/mesh_file.h"
+#include "pencilscan/labeling/point_file.h"
 
 namespace pencilscan {
 

@@ -12,7 +12,7 @@
 #include "pencilscan/io/file.h"
 #include "pencilscan/io/image.h"
 #include "pencilscan/io/mesh_file.h"
-#include "pencilscan/io/point_file.h"
+#include "pencilscan/labeling/point_file.h"
 #include "pencilscan/rig/sample_devices.h"
 
 namespace pencilscan::sample {

@@ -37,6 +37,18 @@ Rgb LinePattern::value(double px, int size_px, double box_px) const {
   return sum;
 }
 
+int nearest_line(double coordinate, int local_id, int period, int line_count) {
+  if (!std::isfinite(coordinate) || line_count < 1) return -1;
+  const double bounded = std::clamp(coordinate, -1e6, 1e6);
+  if (local_id < 0 || period < 2) {
+    return std::clamp(static_cast<int>(std::lround(bounded)), 0, line_count - 1);
+  }
+  const int last_cycle = (line_count - 1 - local_id) / period;
+  if (local_id >= line_count) return -1;
+  const long cycle = std::lround((bounded - local_id) / period);
+  return local_id + period * static_cast<int>(std::clamp<long>(cycle, 0, last_cycle));
+}
+
 cv::Mat render_patterns(const std::vector<LinePattern>& patterns, int width, int height) {
   cv::Mat image(height, width, CV_32FC3, cv::Scalar::all(0));
   for (const LinePattern& pattern : patterns) {

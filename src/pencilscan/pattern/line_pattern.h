@@ -39,6 +39,10 @@ struct LinePattern {
   [[nodiscard]] Rgb value(double px, int size_px, double box_px) const;
 };
 
+/// The line nearest to a continuous coordinate that has this local ID (any if negative), limited to
+/// the pattern; -1: the pattern has none.
+[[nodiscard]] int nearest_line(double coordinate, int local_id, int period, int line_count);
+
 /// What a projector of this size shows: linear light, CV_32FC3 in RGB order, each pixel the box
 /// average of the ideal lines; several patterns add up, limited to 1.
 [[nodiscard]] cv::Mat render_patterns(const std::vector<LinePattern>& patterns, int width,

@@ -10,8 +10,9 @@
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/core/stopwatch.h"
 #include "pencilscan/pipeline/line_naming.h"
+#include "pencilscan/points/surface_check.h"
 #include "pencilscan/rig/camera_light.h"
-#include "pencilscan/solution/surface_check.h"
+#include "pencilscan/surface/manifold.h"
 #include "pencilscan/surface/vertex_color.h"
 
 namespace pencilscan {
@@ -163,8 +164,7 @@ PointResult detect_frame(const Rig& rig, const Frame& frame, const PointOptions&
   announce(options.progress, "grid");
   Stopwatch grid_watch;
   GridOptions grid = options.grid;
-  // The joint solution decides pattern and line at once.
-  grid.identify = grid.identify && options.solution.method != Method::kJoint;
+  grid.identify = grid.identify && solution_method(options.method).capabilities.needs_identities;
   result.graphs.resize(cameras);
   parallel_for(cameras, [&](std::size_t c) {
     result.graphs[c] = build_grid_graph(rig, result.families, static_cast<int>(c),
@@ -179,8 +179,9 @@ PointResult measure_points(const Rig& stated, const Frame& frame, const PointOpt
   PointResult result = detect_frame(rig, frame, options);
   announce(options.progress, "solution");
   Stopwatch solution_watch;
-  if (options.solution.method != Method::kJoint) {
-    result.labeling = solve(rig, result.families, result.graphs, options.solution);
+  const SolutionMethod& method = solution_method(options.method);
+  if (!method.capabilities.may_be_guided) {
+    result.labeling = method.solve(rig, result.families, result.graphs, options.method);
     result.times.push_back({"solution", solution_watch.seconds()});
     const Stopwatch triangulation_watch;
     result.points = triangulate(rig, result.graphs, result.labeling, options.triangulation);
@@ -274,10 +275,13 @@ ShapeResult measure_shape(const Rig& stated, const Frame& frame, const PointResu
 
 void look_again(const Rig& stated, const PointOptions& options, PointResult& points,
                 ShapeResult& shape) {
-  if (options.solution.method != Method::kJoint || points.rig_is_off || !shape.scene) return;
+  if (!solution_method(options.method).capabilities.may_be_guided || points.rig_is_off ||
+      !shape.scene)
+    return;
   announce(options.progress, "look again");
   const Stopwatch watch;
   const Rig rig = with_registered_patterns(stated);
+  points.looked_again = true;
   points.contradicted = drop_contradicted(rig, *shape.scene, points.graphs, points.labeling);
   const std::vector<LocalSurface> surfaces =
       second_look(rig, points.families, presence_images(points.detections), points.graphs,
@@ -296,8 +300,44 @@ void look_again(const Rig& stated, const PointOptions& options, PointResult& poi
   points.times.push_back({"look again", watch.seconds()});
 }
 
-FrameResult reconstruct_frame(const Rig& rig, const Frame& frame, const PointOptions& points,
+namespace {
+
+void scale(double factor, TriangleMesh& mesh) {
+  for (Vec3& x : mesh.vertices) x *= factor;
+  for (float& sigma : mesh.sigma) sigma *= static_cast<float>(factor);
+}
+
+/// From footprints to the rig's unit.
+void scale(double factor, FrameResult& result) {
+  const auto f = static_cast<float>(factor);
+  for (MeasuredPoint& p : result.points.points) {
+    for (float* length : {&p.x, &p.y, &p.z, &p.sigma}) *length *= f;
+  }
+  ShapeResult& shape = result.shape;
+  scale(factor, shape.surface.mesh);
+  scale(factor, shape.surface.measured);
+  shape.surface.report.spacing_mm *= factor;
+  for (double& area : shape.holes.area_mm2) area *= factor * factor;
+  for (CameraDepthReport& camera : shape.depth.report.cameras) camera.sigma_median_mm *= factor;
+  for (DepthMap& map : shape.depth.maps) {
+    for (DepthNode& node : map.nodes) {
+      for (float* inverse : {&node.w, &node.wx, &node.wy, &node.wxx, &node.wxy, &node.wyy})
+        *inverse /= f;
+      node.sigma *= f;
+    }
+  }
+  // Scaling and files round: what lay apart may lie at one place.
+  separate_vertices(shape.surface.mesh);
+  separate_vertices(shape.surface.measured);
+  shape.scene.reset();
+}
+
+}  // namespace
+
+FrameResult reconstruct_frame(const Rig& stated, const Frame& frame, const PointOptions& points,
                               const ShapeOptions& shape, bool meshes) {
+  const double unit = footprint(stated);
+  const Rig rig = scaled(stated, 1 / unit);
   if (std::all_of(frame.images.begin(), frame.images.end(),
                   [](const cv::Mat& image) { return image.empty(); })) {
     throw NothingFound("no camera of the rig has a picture of this moment");
@@ -310,6 +350,7 @@ FrameResult reconstruct_frame(const Rig& rig, const Frame& frame, const PointOpt
   std::vector<StageTime>& times = result.points.times;
   times.insert(times.end(), result.shape.times.begin(), result.shape.times.end());
   look_again(rig, points, result.points, result.shape);
+  scale(unit, result);
   return result;
 }
 

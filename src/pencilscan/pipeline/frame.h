@@ -10,12 +10,12 @@
 #include "pencilscan/depth/depth.h"
 #include "pencilscan/detection/detect.h"
 #include "pencilscan/grid/grid_graph.h"
-#include "pencilscan/io/point_file.h"
+#include "pencilscan/guided/second_look.h"
+#include "pencilscan/labeling/measured_point.h"
+#include "pencilscan/pipeline/method.h"
+#include "pencilscan/points/settle.h"
+#include "pencilscan/points/triangulate.h"
 #include "pencilscan/refinement/crossing_tracks.h"
-#include "pencilscan/solution/labeling.h"
-#include "pencilscan/solution/second_look.h"
-#include "pencilscan/solution/settle.h"
-#include "pencilscan/solution/triangulate.h"
 #include "pencilscan/surface/holes.h"
 #include "pencilscan/surface/surface.h"
 
@@ -40,10 +40,10 @@ struct Frame {
 struct PointOptions {
   DetectionOptions detection;
   GridOptions grid;
-  SolutionOptions solution;
-  SecondLookOptions second_look;  ///< joint only
+  MethodOptions method;
+  SecondLookOptions second_look;  ///< of methods that may be guided
   TriangulationOptions triangulation;
-  SettleOptions settle;  ///< joint only: the paper's methods are triangulated as they are
+  SettleOptions settle;  ///< of the same; others are triangulated as they are
   Progress progress;     ///< hears of every stage as it starts, with fraction 0
 };
 
@@ -69,6 +69,7 @@ struct PointResult {
   Labeling labeling;
   CrossingDisagreement crossings;  ///< joint only: the paper's two have none by construction
   bool rig_is_off = false;         ///< lines were named with the devices as the frame corrects them
+  bool looked_again = false;       ///< after the dense surface
   std::size_t contradicted = 0;    ///< labelled curve points that the dense surface contradicted
   std::vector<MeasuredPoint> points;
   std::vector<StageTime> times;
@@ -80,6 +81,8 @@ struct PointResult {
 [[nodiscard]] PointResult detect_frame(const Rig& rig, const Frame& frame,
                                        const PointOptions& options = {});
 
+/// The steps below take lengths in footprints; reconstruct_frame() scales the rig.
+///
 /// The paper's Fig. 3 for one frame: detection and grid per camera, one solution over all cameras,
 /// triangulation. Joint: where crossing lines say that the rig is off, lines are named with the
 /// devices as the frame corrects them; points are triangulated with the rig as given, their sigma
@@ -120,7 +123,9 @@ struct NothingFound : StageError {
   using StageError::StageError;
 };
 
-/// All of the above in order. NothingFound when no camera has a picture, or no curve a label.
+/// All of the above in order, in footprints (rig/rig.h), so that the rig's unit does not matter;
+/// the result is in the rig's unit, without `scene`. NothingFound when no camera has a picture, or
+/// no curve a label.
 [[nodiscard]] FrameResult reconstruct_frame(const Rig& rig, const Frame& frame,
                                             const PointOptions& points, const ShapeOptions& shape,
                                             bool meshes = true);

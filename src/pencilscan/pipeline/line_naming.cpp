@@ -46,7 +46,9 @@ LineNaming name_lines(const Rig& rig, const std::vector<ColorFamily>& families,
   constexpr double kAsWell = 1.2;       // crossings' misses, of those before
   constexpr double kClearlyLess = 0.8;  // the same
   LineNaming result;
-  result.labeling = solve(rig, families, graphs, options.solution);
+  const SolutionMethod& method = solution_method(options.method);
+  result.labeling = method.solve(rig, families, graphs, options.method);
+  if (!method.capabilities.corrects_rig) return result;
   result.crossings = disagreement(rig, graphs, result.labeling);
   const bool is_off = disagrees(result.crossings);
   const auto points = static_cast<double>(labelled_points(result.labeling));

@@ -106,9 +106,10 @@ TEST_F(PipelineTest, JointAndMultiviewLabelTheBallAndLinearWorksWithOneCamera) {
   }
   // A noise-free convex object: nearly every point must carry its true line.
   for (const auto& [method, max_wrong, min_recall] :
-       {std::tuple(Method::kJoint, 0.002, 0.85), std::tuple(Method::kMultiview, 0.02, 0.85)}) {
+       {std::tuple(MethodOptions(JointOptions{}), 0.002, 0.85),
+        std::tuple(MethodOptions(MultiviewOptions{}), 0.02, 0.85)}) {
     PointOptions options;
-    options.solution.method = method;
+    options.method = method;
     const PointResult result = measure_points(*rig_, *frame_, options);
     const auto verdicts = judge_points(truth, result.points);
     EXPECT_LT(label_figures(truth, result.points, verdicts).wrong.value(), max_wrong);
@@ -120,7 +121,7 @@ TEST_F(PipelineTest, JointAndMultiviewLabelTheBallAndLinearWorksWithOneCamera) {
   Frame one = *frame_;
   one.images.resize(1);
   PointOptions options;
-  options.solution.method = Method::kLinear;
+  options.method = LinearOptions{};
   const PointResult linear = measure_points(minimum, one, options);
   ASSERT_GT(linear.points.size(), 500U);
   const TruthScene one_truth(ball(), minimum);
@@ -217,7 +218,7 @@ TEST_F(PipelineTest, SingleProjectorLabelsTheGridOfOneProjector) {
   across.axis = Axis::kRow;
   rig.projectors[0].patterns.push_back(across);
   PointOptions options;
-  options.solution.method = Method::kSingleProjector;
+  options.method = SingleProjectorOptions{};
   const PointResult result = measure_points(rig, render_frame(rig, ball()), options);
   ASSERT_GT(result.points.size(), 1000U);
   const TruthScene truth(ball(), rig);
@@ -227,14 +228,14 @@ TEST_F(PipelineTest, SingleProjectorLabelsTheGridOfOneProjector) {
 
 TEST_F(PipelineTest, SingleProjectorRefusesARigWithoutAGrid) {
   SequenceOptions options = quick();
-  options.points.solution.method = Method::kSingleProjector;
+  options.points.method = SingleProjectorOptions{};
   EXPECT_THROW(static_cast<void>(run(*folder_ / "frames", *folder_ / "out_without_grid", options)),
                InputError);
 }
 
 TEST_F(PipelineTest, PointsAloneAreThoseOfTheWholeResult) {
   SequenceOptions options = quick();
-  options.points.solution.method = Method::kMultiview;
+  options.points.method = MultiviewOptions{};
   options.shape.depth.enabled = false;
   ASSERT_TRUE(run(*folder_ / "frames", *folder_ / "out_whole", options).front().done);
   options.meshes = false;
@@ -452,7 +453,7 @@ TEST_F(PipelineTest, MissingCameraIsAWarningAndNotAFailure) {
   fs::copy_file(*folder_ / "frames" / "000000" / "cam0.png", frames / "000000" / "cam0.png",
                 fs::copy_options::overwrite_existing);
   SequenceOptions options = quick();
-  options.points.solution.method = Method::kLinear;
+  options.points.method = LinearOptions{};
   const auto outcomes = run(frames, *folder_ / "out_missing", options);
   ASSERT_TRUE(outcomes.front().done) << outcomes.front().failure;
   EXPECT_THAT(outcomes.front().warnings, testing::Contains(testing::HasSubstr("cam1")));

@@ -6,7 +6,7 @@
 #include <optional>
 #include <utility>
 
-#include "pencilscan/solution/joint.h"
+#include "pencilscan/joint/joint.h"
 
 namespace pencilscan {
 namespace {
@@ -47,7 +47,8 @@ Attempt attempt(const Rig& calibrated, std::span<const FrameCurves> frames, doub
   // What the first labels' crossings leave open stays as given; the last ones may tell.
   RefineRigOptions refine = options.refine;
   refine.max_remaining = std::numeric_limits<double>::infinity();
-  JointOptions joint = options.points.solution.joint;
+  const auto* chosen = std::get_if<JointOptions>(&options.points.method);
+  JointOptions joint = chosen != nullptr ? *chosen : JointOptions{};
   const double last_tolerance = joint.projection_sigma_px;
   tolerance = std::max(tolerance, last_tolerance);
   while (true) {
@@ -91,7 +92,8 @@ bool end_alike(const Attempt& a, const Attempt& b) {
 
 RigRefinement refine_rig_on_frames(const Rig& stated, std::span<const FrameCurves> frames,
                                    const RigRefinementOptions& options) {
-  const Rig calibrated = with_registered_patterns(stated);
+  const double unit = footprint(stated);
+  const Rig calibrated = with_registered_patterns(scaled(stated, 1 / unit));
   std::optional<Attempt> best;
   for (const double tolerance : options.first_tolerances_px) {
     Attempt next = attempt(calibrated, frames, tolerance, options);
@@ -105,10 +107,13 @@ RigRefinement refine_rig_on_frames(const Rig& stated, std::span<const FrameCurve
     result.report = std::move(last.report);
     if (result.report.refined) result.rig = corrected_rig(calibrated, last.correction);
   }
-  if (!result.report.refined) {
-    result.rig = calibrated;
+  if (result.report.refined) {
+    result.rig = scaled(std::move(result.rig), unit);
+  } else {
+    result.rig = with_registered_patterns(stated);
     result.labelings.clear();
   }
+  for (DeviceRefinement& device : result.report.devices) device.translation_mm *= unit;
   for (std::size_t p = 0; p < stated.projectors.size(); ++p) {
     result.rig.projectors[p].patterns = stated.projectors[p].patterns;
     result.rig.projectors[p].color_registration = stated.projectors[p].color_registration;

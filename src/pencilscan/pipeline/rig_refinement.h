@@ -12,9 +12,9 @@ struct RigRefinementOptions {
   PointOptions points;
   /// Tolerances of the labels in the first round, projector px: about the error of a line with the
   /// rig as given. Each later round takes half of it or what the crossings then show; the last one
-  /// is that of solution.joint. Labels and rig can be wrong together and agree, but only the right
-  /// ones name nearly all curves: of what the tolerances lead to, the one that names most points is
-  /// taken. Two that name equally many end the search. Not empty.
+  /// is that of the joint method. Labels and rig can be wrong together and agree, but only the
+  /// right ones name nearly all curves: of what the tolerances lead to, the one that names most
+  /// points is taken. Two that name equally many end the search. Not empty.
   std::vector<double> first_tolerances_px = {2, 3, 4, 6, 1};
   TrackOptions tracks;
   RefineRigOptions refine;

@@ -10,13 +10,14 @@
 #include "pencilscan/io/file.h"
 #include "pencilscan/io/hash.h"
 #include "pencilscan/io/mesh_file.h"
+#include "pencilscan/labeling/point_file.h"
+#include "pencilscan/paper/single_projector.h"
 #include "pencilscan/pipeline/curve_output.h"
 #include "pencilscan/pipeline/depth_output.h"
 #include "pencilscan/pipeline/frame_output.h"
 #include "pencilscan/pipeline/frame_source.h"
 #include "pencilscan/pipeline/rig_refinement.h"
 #include "pencilscan/pipeline/run_folder.h"
-#include "pencilscan/solution/single_projector.h"
 
 namespace pencilscan {
 namespace {
@@ -179,7 +180,7 @@ Rig refined_rig(const Rig& rig, const FrameSource& frames, const fs::path& out,
                static_cast<double>(names.size()) / static_cast<double>(picked.size()));
     }
     PointOptions joint = options.points;
-    joint.solution.method = Method::kJoint;
+    joint.method = JointOptions{};
     PointResult detected = detect_frame(rig, frames.read(rig, i), joint);
     curves.push_back({std::move(detected.families), std::move(detected.graphs)});
     names.push_back(frames.name(i));
@@ -236,7 +237,7 @@ SequenceOutcome reconstruct_sequence(const fs::path& rig_path, const fs::path& f
     throw InputError("--rig", "", rig_path.string(),
                      "must not be the rig.json in --out, where the refined rig is written");
   }
-  if (options.points.solution.method == Method::kSingleProjector && !shows_grid(rig)) {
+  if (solution_method(options.points.method).capabilities.needs_grid && !shows_grid(rig)) {
     throw InputError(rig_path.string(), "projectors", "",
                      "must hold one with a vertical and a horizontal pattern, which the method "
                      "single-projector needs");

@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "pencilscan/solution/labeling.h"
+#include "pencilscan/labeling/labeling.h"
 
 namespace pencilscan {
 

@@ -4,11 +4,11 @@
 #include <cmath>
 
 #include "pencilscan/geometry/least_squares.h"
+#include "pencilscan/labeling/two_projector_scene.h"
 #include "pencilscan/refinement/determinacy.h"
 #include "pencilscan/refinement/refine_rig.h"
 #include "pencilscan/refinement/ring_scene.h"
 #include "pencilscan/refinement/track_residual.h"
-#include "pencilscan/solution/two_projector_scene.h"
 
 namespace pencilscan {
 namespace {

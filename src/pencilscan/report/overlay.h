@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "pencilscan/io/point_file.h"
+#include "pencilscan/labeling/measured_point.h"
 #include "pencilscan/report/palette.h"
 #include "pencilscan/rig/rig.h"
 

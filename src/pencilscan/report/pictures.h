@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "pencilscan/geometry/mesh.h"
-#include "pencilscan/io/point_file.h"
+#include "pencilscan/labeling/measured_point.h"
 #include "pencilscan/rig/rig.h"
 
 namespace pencilscan {

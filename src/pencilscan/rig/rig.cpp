@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "pencilscan/core/median.h"
 #include "pencilscan/geometry/least_squares.h"
 
 namespace pencilscan {
@@ -103,6 +104,39 @@ Sphere working_volume(const Rig& rig) {
   volume.radius = median(radii);
   if (!(volume.radius > 0)) volume.radius = kGuessedRadiusShare * median(distances);
   return volume;
+}
+
+std::vector<int> adjacent_cameras(const Rig& rig, int camera) {
+  constexpr double kMinCosine = 0.25;
+  std::vector<int> result;
+  const Vec3 forward = rig.cameras[static_cast<std::size_t>(camera)].forward();
+  for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
+    if (static_cast<int>(c) == camera || rig.cameras[c].sees_texture_only) continue;
+    if (rig.cameras[c].forward().dot(forward) > kMinCosine) result.push_back(static_cast<int>(c));
+  }
+  return result;
+}
+
+double footprint(const Rig& rig) {
+  const Vec3 center = working_volume(rig).center;
+  std::vector<double> footprints;
+  for (const Camera& camera : rig.cameras) {
+    if (camera.sees_texture_only) continue;
+    const double focal = std::sqrt(camera.K(0, 0) * camera.K(1, 1));
+    footprints.push_back((camera.center() - center).norm() / focal);
+  }
+  return footprints.empty() ? 1 : upper_median(std::move(footprints));
+}
+
+Rig scaled(Rig rig, double factor) {
+  for (Camera& camera : rig.cameras) camera.device_from_world.translation *= factor;
+  for (Projector& projector : rig.projectors) projector.device_from_world.translation *= factor;
+  if (rig.volume) {
+    rig.volume->center *= factor;
+    rig.volume->radius *= factor;
+  }
+  if (rig.floor) rig.floor->point *= factor;
+  return rig;
 }
 
 }  // namespace pencilscan

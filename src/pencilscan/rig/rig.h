@@ -53,6 +53,16 @@ struct Floor {
   [[nodiscard]] double height(const Vec3& x) const { return normal.dot(x - point); }
 };
 
+/// A pattern of a projector, by index.
+struct PatternRef {
+  int projector = 0;
+  int pattern = 0;
+  friend bool operator==(const PatternRef&, const PatternRef&) = default;
+};
+
+/// A rig shows at most so many patterns in all; the reader refuses more.
+inline constexpr std::size_t kMostPatterns = 256;
+
 /// All devices and what they show, as one value (rig.json).
 struct Rig {
   std::vector<Camera> cameras;
@@ -60,6 +70,16 @@ struct Rig {
   std::optional<Sphere> volume;  ///< as stated by the file
   std::optional<Floor> floor;    ///< what lies below it, or within a line spacing, is no object
   bool unit_known = true;        ///< "unit": "mm"; false: "unknown"
+
+  [[nodiscard]] const Camera& camera(int index) const {
+    return cameras[static_cast<std::size_t>(index)];
+  }
+  [[nodiscard]] const Projector& projector(int index) const {
+    return projectors[static_cast<std::size_t>(index)];
+  }
+  [[nodiscard]] const LinePattern& pattern(PatternRef ref) const {
+    return projector(ref.projector).patterns[static_cast<std::size_t>(ref.pattern)];
+  }
 };
 
 /// Reads rig.json; InputError names file, field, value and rule.
@@ -84,5 +104,15 @@ void write_rig(const Rig& rig, const std::filesystem::path& path);
 /// The sphere that holds the object: the stated one, or else derived from the devices: the point
 /// nearest to all optical axes (least squares), with the radius that the median device sees whole.
 [[nodiscard]] Sphere working_volume(const Rig& rig);
+
+/// What one pixel covers at the volume's centre, square to the line of sight, in the rig's unit:
+/// the median over the cameras that see patterns.
+[[nodiscard]] double footprint(const Rig& rig);
+
+/// The same rig with all lengths times `factor`, > 0: pictures and angles stay.
+[[nodiscard]] Rig scaled(Rig rig, double factor);
+
+/// Cameras that see much of what this one sees: axes within about 75 degrees.
+[[nodiscard]] std::vector<int> adjacent_cameras(const Rig& rig, int camera);
 
 }  // namespace pencilscan

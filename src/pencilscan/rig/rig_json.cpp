@@ -445,6 +445,9 @@ Rig parse_rig(const std::string& name, const nlohmann::json& json,
     of_projectors.emplace_back();
     rig.projectors.push_back(parse_projector(entry, given ? &of_projectors.back() : nullptr));
   }
+  std::size_t patterns = 0;
+  for (const Projector& projector : rig.projectors) patterns += projector.patterns.size();
+  if (patterns > kMostPatterns) root.at("projectors").fail("must show at most 256 patterns in all");
   for (const JsonField& entry : parse_device_list(root.at("cameras"))) {
     if (given != nullptr) given->emplace_back();
     rig.cameras.push_back(parse_camera(entry, rig.projectors, given ? &given->back() : nullptr));

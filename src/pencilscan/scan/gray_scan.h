@@ -4,7 +4,7 @@
 
 #include "pencilscan/geometry/mesh.h"
 #include "pencilscan/gray/gray_decode.h"
-#include "pencilscan/io/point_file.h"
+#include "pencilscan/labeling/measured_point.h"
 #include "pencilscan/rig/rig.h"
 #include "pencilscan/surface/sample.h"
 

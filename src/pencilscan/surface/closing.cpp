@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "pencilscan/surface/attributes.h"
+#include "pencilscan/surface/manifold.h"
 #include "pencilscan/surface/mesh_parts.h"
 #include "pencilscan/surface/poisson.h"
 
@@ -86,10 +87,10 @@ ClosedSurface closed_surface(std::span<const SurfaceSample> samples,
   result.scale = cube_scale(samples, cube);
   result.depth = octree_depth(cube, options, result.scale);
   result.mesh = with_caps(poisson_surface(samples, result.depth, result.scale));
+  make_manifold(result.mesh);
   attribute_vertices(samples, options.reach_spacings, options.spacing_mm, result.mesh);
   result.mesh =
       without_floaters(result.mesh, options.min_component_share, result.components_removed);
-  result.edges = count_edges(result.mesh);
   return result;
 }
 

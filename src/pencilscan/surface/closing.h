@@ -19,7 +19,6 @@ struct ClosedSurface {
   TriangleMesh mesh;  ///< with sigma and confidence
   int depth = 0;      ///< of the octree
   double scale = 0;   ///< octree cube / bounding cube of the samples
-  EdgeCounts edges;
   std::size_t components_removed = 0;
 };
 

@@ -1,6 +1,7 @@
 #include "pencilscan/surface/holes.h"
 
 #include <algorithm>
+#include <bitset>
 
 #include "pencilscan/core/chunks.h"
 #include "pencilscan/depth/pattern_view.h"
@@ -10,6 +11,8 @@
 
 namespace pencilscan {
 namespace {
+
+using LitProjectors = std::bitset<256>;  // a rig has no more: rig_json.cpp
 
 /// What a camera could have measured at a place of the closed mesh.
 class Visibility {
@@ -29,37 +32,36 @@ class Visibility {
   [[nodiscard]] const RayScene& scene() const { return scene_; }
 
   /// Bit per projector that lights the place.
-  [[nodiscard]] std::uint64_t lighting(const Vec3& x, const Vec3& normal) const {
-    std::uint64_t lit = 0;
-    for (std::size_t p = 0; p < std::min<std::size_t>(rig_.projectors.size(), 64); ++p) {
+  [[nodiscard]] LitProjectors lighting(const Vec3& x, const Vec3& normal) const {
+    LitProjectors lit;
+    for (std::size_t p = 0; p < rig_.projectors.size(); ++p) {
       const auto pixel = rig_.projectors[p].project(x);
       if (!pixel || !rig_.projectors[p].contains(*pixel)) continue;
-      if (sees(scene_, rig_.projectors[p].center(), x, normal, options_.least_cosine))
-        lit |= std::uint64_t{1} << p;
+      if (sees(scene_, rig_.projectors[p].center(), x, normal, options_.least_cosine)) lit.set(p);
     }
     return lit;
   }
 
   /// Reason from geometry alone for a place that camera c sees.
   [[nodiscard]] HoleReason reason(std::size_t c, const Vec3& x, const Vec3& normal,
-                                  std::uint64_t lit) const {
-    if (lit == 0) return HoleReason::kNoProjector;
+                                  const LitProjectors& lit) const {
+    if (lit.none()) return HoleReason::kNoProjector;
     const Camera& camera = rig_.cameras[c];
     if ((camera.center() - x).normalized().dot(normal) < options_.least_cosine)
       return HoleReason::kTooCompressed;
     const TangentView at(camera, x, normal);
-    std::uint64_t resolved = 0;
+    LitProjectors resolved;
     for (const PatternView& view : views_[c]) {
-      if (view.projector() >= 64 || ((lit >> view.projector()) & 1U) == 0) continue;
+      if (!lit[static_cast<std::size_t>(view.projector())]) continue;
       bool ok = false;
       const WindowLines lines = view.lines(at.normalized, at.jacobian, at.w, ok);
       if (!ok) continue;
       const auto gradient = lines.gradient(static_cast<float>(at.w), at.slope[0], at.slope[1]);
       if (static_cast<double>(gradient.norm()) * options_.least_spacing_px < 1)
-        resolved |= std::uint64_t{1} << view.projector();
+        resolved.set(static_cast<std::size_t>(view.projector()));
     }
-    if (resolved == 0) return HoleReason::kTooCompressed;
-    return (resolved & (resolved - 1)) == 0 ? HoleReason::kOneProjector : HoleReason::kAmbiguous;
+    if (resolved.none()) return HoleReason::kTooCompressed;
+    return resolved.count() == 1 ? HoleReason::kOneProjector : HoleReason::kAmbiguous;
   }
 
  private:
@@ -85,8 +87,8 @@ void explain_nodes(const Rig& rig, const Visibility& visibility,
       return;
     }
     const Vec3& normal = face_normals[hit->face];
-    const std::uint64_t lit = visibility.lighting(hit->point, normal);
-    if (node.reason == HoleReason::kOneProjector && lit != 0) return;  // the depth stage knows
+    const LitProjectors lit = visibility.lighting(hit->point, normal);
+    if (node.reason == HoleReason::kOneProjector && lit.any()) return;  // the depth stage knows
     node.reason = visibility.reason(c, hit->point, normal, lit);
   });
 }
@@ -114,7 +116,7 @@ int rank(HoleReason reason) {
 HoleReason explain_vertex(const Rig& rig, const Visibility& visibility,
                           std::span<const DepthMap> maps, const Vec3& x, const Vec3& normal) {
   HoleReason best = HoleReason::kNotSeen;
-  const std::uint64_t lit = visibility.lighting(x, normal);
+  const LitProjectors lit = visibility.lighting(x, normal);
   for (const DepthMap& map : maps) {
     const auto c = static_cast<std::size_t>(map.camera);
     const auto pixel = rig.cameras[c].project(x);

@@ -12,12 +12,13 @@ namespace {
 
 constexpr double kLeastCosine = 0.15;  // of the incidence of a vertex to the camera
 constexpr double kGrazing = 0.2;       // keeps grazing views from looking exact
-/// What the quadric misses within its window, mm at a right angle: relief that no sigma knows.
-constexpr double kRelief = 0.04;
+/// What the quadric misses within its window, footprints at a right angle: relief that no sigma
+/// knows.
+constexpr double kRelief = 0.08;
 constexpr double kReach = 2.5;  // of a node's say, widths
 
 struct Prediction {
-  double height = 0;  ///< along the vertex normal, mm
+  double height = 0;  ///< along the vertex normal
   double weight = 0;
   double bell = 0;
 };
@@ -29,7 +30,7 @@ class NodeView {
       : camera_(&rig.cameras[static_cast<std::size_t>(map.camera)]),
         eye_(camera_->center()),
         map_(&map),
-        farthest_(options.farthest_mm),
+        farthest_(options.farthest),
         fx_(camera_->K(0, 0)),
         fy_(camera_->K(1, 1)),
         inverse_width2_(0.5 / (options.width_nodes * options.width_nodes)),
@@ -126,7 +127,7 @@ std::optional<double> agreed_height(std::span<const Prediction> predictions,
     double sum = 0;
     double total = 0;
     for (const Prediction& p : predictions) {
-      const double off = (p.height - height) / options.robust_mm;
+      const double off = (p.height - height) / options.robust;
       const double outlying = round == 0 ? 1 : 1 + off * off;
       const double weight = p.weight / (outlying * outlying);
       sum += weight * p.height;
@@ -167,7 +168,7 @@ void fade_out(const TriangleMesh& mesh, std::vector<char> moved, std::vector<Vec
 
 void follow_nodes(const Rig& rig, std::span<const DepthMap> maps, const FollowOptions& options,
                   TriangleMesh& mesh) {
-  PENCILSCAN_CHECK(options.width_nodes > 0 && options.robust_mm > 0 && options.least_weight > 0);
+  PENCILSCAN_CHECK(options.width_nodes > 0 && options.robust > 0 && options.least_weight > 0);
   std::vector<NodeView> views;
   for (const DepthMap& map : maps) views.emplace_back(rig, map, options);
   const std::vector<Vec3> start = mesh.vertices;

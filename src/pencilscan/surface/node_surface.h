@@ -10,9 +10,9 @@
 namespace pencilscan {
 
 struct FollowOptions {
-  double width_nodes = 0.9;   ///< standard deviation of a node's say over the image, nodes, > 0
-  double farthest_mm = 1;     ///< nodes farther off along the normal are another surface, > 0
-  double robust_mm = 0.3;     ///< so far from the others a prediction counts a quarter, > 0
+  double width_nodes = 0.9;  ///< standard deviation of a node's say over the image, nodes, > 0
+  double farthest = 2;       ///< footprints; nodes farther off along the normal are another surface
+  double robust = 0.6;       ///< footprints off the others at which a prediction counts a quarter
   double least_weight = 0.6;  ///< sum of the nodes' bells below which a vertex has no depth, > 0
   int rounds = 2;             ///< normals settle as vertices move
 };

@@ -48,7 +48,7 @@ std::pair<double, Vec3> light_sheet_at(const Projector& projector, std::size_t p
   return {spacing, pose.rotation.transpose() * normal.normalized()};
 }
 
-constexpr double kFarthest = 1e7;  // mm; 10 km off is a ray that missed its sheet
+constexpr double kFarthest = 1e7;  // footprints: a ray that missed its sheet
 
 using CurveKey = std::array<int, 4>;
 CurveKey curve_key(const MeasuredPoint& p) { return {p.camera, p.projector, p.pattern, p.line}; }

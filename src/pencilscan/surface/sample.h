@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "pencilscan/geometry/types.h"
-#include "pencilscan/io/point_file.h"
+#include "pencilscan/labeling/measured_point.h"
 #include "pencilscan/rig/rig.h"
 
 namespace pencilscan {

@@ -4,8 +4,8 @@
 
 namespace pencilscan {
 
-/// Keeps a ray's end off the surface it lies on, mm.
-inline constexpr double kOffSurfaceMm = 0.5;
+/// Keeps a ray's end off the surface it lies on, footprints.
+inline constexpr double kOffSurface = 1;
 
 /// Cosine below which a surface is seen too flat for a pixel to say anything of it.
 inline constexpr double kLeastSightCosine = 0.02;
@@ -15,7 +15,7 @@ inline constexpr double kLeastSightCosine = 0.02;
 [[nodiscard]] inline bool sees(const RayScene& scene, const Vec3& eye, const Vec3& x,
                                const Vec3& normal, double least_cosine) {
   if ((eye - x).normalized().dot(normal) < least_cosine) return false;
-  return scene.visible(eye, x + kOffSurfaceMm * normal, kOffSurfaceMm);
+  return scene.visible(eye, x + kOffSurface * normal, kOffSurface);
 }
 
 }  // namespace pencilscan

@@ -52,7 +52,7 @@ class Verdict {
   /// Distance to the opposite side of the mesh; nothing where there is none.
   [[nodiscard]] double thickness(const Vec3& x, const Vec3& normal) const {
     Ray ray;
-    ray.origin = x - kOffSurfaceMm * normal;
+    ray.origin = x - kOffSurface * normal;
     ray.direction = -normal;
     const auto hit = scene_.first_hit(ray);
     return hit ? hit->distance : 0;
@@ -64,7 +64,7 @@ class Verdict {
     constexpr int kMostHits = 12;
     Ray ray;
     ray.direction = (x - eye).normalized();
-    ray.origin = x - 2 * kOffSurfaceMm * ray.direction;
+    ray.origin = x - 2 * kOffSurface * ray.direction;
     const TriangleMesh& mesh = scene_.mesh();
     for (int k = 0; k < kMostHits; ++k) {
       const auto hit = scene_.first_hit(ray);
@@ -177,7 +177,7 @@ std::size_t draw_in(const Rig& rig, std::span<const Silhouette> silhouettes,
       if (!is_invented(v) || !(normals[v].squaredNorm() > 0.5)) return;
       if (!verdict->is_outside(loose.vertices[v], then[v], then_normals[v])) return;
       const double room = verdict->thickness(then[v], then_normals[v]);
-      loose.vertices[v] -= std::min(options.step_mm, 0.25 / kRoundsPerScene * room) * normals[v];
+      loose.vertices[v] -= std::min(options.step, 0.25 / kRoundsPerScene * room) * normals[v];
       moves[v] = 1;
     });
     if (std::find(moves.begin(), moves.end(), 1) == moves.end()) break;

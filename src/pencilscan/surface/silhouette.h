@@ -24,7 +24,7 @@ struct Silhouette {
 [[nodiscard]] double line_reach_px(const Rig& rig, const Camera& camera);
 
 struct DrawInOptions {
-  double step_mm = 1;  ///< per round, > 0
+  double step = 2;  ///< footprints per round, > 0
   int rounds = 48;
   double least_cosine = 0.2;  ///< of the incidence to camera and projector, in (0, 1)
 };

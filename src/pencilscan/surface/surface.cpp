@@ -11,6 +11,7 @@
 #include "pencilscan/surface/closing.h"
 #include "pencilscan/surface/filter.h"
 #include "pencilscan/surface/local_fit.h"
+#include "pencilscan/surface/manifold.h"
 #include "pencilscan/surface/mesh_parts.h"
 #include "pencilscan/surface/node_surface.h"
 #include "pencilscan/surface/sample.h"
@@ -59,8 +60,8 @@ std::vector<char> judge_samples(const Rig& rig, const SurfaceOptions& options, S
 /// Samples of the depth maps' nodes; the spacing is the distance of nodes on the surface.
 std::vector<SurfaceSample> dense_samples(const Rig& rig, std::span<const DepthMap> maps,
                                          double& spacing) {
-  constexpr double kLeastCosine = 0.7;   // stretches the spacing of grazing nodes no further
-  constexpr double kLeastSigma = 0.005;  // mm; keeps one node from ruling its neighbours
+  constexpr double kLeastCosine = 0.7;  // stretches the spacing of grazing nodes no further
+  constexpr double kLeastSigma = 0.01;  // footprints; keeps one node from ruling its neighbours
   std::vector<SurfaceSample> samples;
   std::vector<double> spacings;
   for (const DepthMap& map : maps) {
@@ -90,7 +91,7 @@ std::vector<SurfaceSample> dense_samples(const Rig& rig, std::span<const DepthMa
 
 /// Points that the depth of their own pixel bears out.
 std::vector<char> points_on_maps(const Rig& rig, std::span<const MeasuredPoint> points,
-                                 std::span<const DepthMap> maps, double tolerance_mm) {
+                                 std::span<const DepthMap> maps, double tolerance) {
   std::vector<char> used(points.size(), 0);
   for (std::size_t i = 0; i < points.size(); ++i) {
     const MeasuredPoint& p = points[i];
@@ -102,7 +103,7 @@ std::vector<char> points_on_maps(const Rig& rig, std::span<const MeasuredPoint> 
       const std::size_t k = map.index(row, column);
       if (!map.nodes[k].measured()) continue;
       const Vec3 d = Vec3(p.x, p.y, p.z) - node_point(rig, map, k);
-      used[i] = std::abs(d.dot(node_normal(rig, map, k))) < tolerance_mm ? 1 : 0;
+      used[i] = std::abs(d.dot(node_normal(rig, map, k))) < tolerance ? 1 : 0;
     }
   }
   return used;
@@ -110,6 +111,7 @@ std::vector<char> points_on_maps(const Rig& rig, std::span<const MeasuredPoint> 
 
 void note_quality(double area, SurfaceResult& result) {
   SurfaceReport& report = result.report;
+  report.edges = count_edges(result.mesh);
   report.vertices = result.mesh.vertices.size();
   report.faces = result.mesh.faces.size();
   report.measured_share = area > 0 ? surface_area(result.measured) / area : 0;
@@ -128,7 +130,6 @@ void take(ClosedSurface closed, SurfaceResult& result) {
   result.mesh = std::move(closed.mesh);
   result.report.depth = closed.depth;
   result.report.scale = closed.scale;
-  result.report.edges = closed.edges;
   result.report.components_removed = closed.components_removed;
 }
 

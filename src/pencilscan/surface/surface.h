@@ -8,7 +8,7 @@
 #include "pencilscan/core/progress.h"
 #include "pencilscan/depth/depth_map.h"
 #include "pencilscan/geometry/mesh.h"
-#include "pencilscan/io/point_file.h"
+#include "pencilscan/labeling/measured_point.h"
 #include "pencilscan/rig/rig.h"
 #include "pencilscan/surface/node_surface.h"
 #include "pencilscan/surface/silhouette.h"
@@ -26,6 +26,7 @@ namespace pencilscan {
 /// 4. Screened Poisson (Kazhdan and Hoppe, 2013; Open3D's build of it) gives a closed surface.
 /// 5. Each vertex learns from the samples near it whether it was measured, and how well.
 ///
+/// Lengths are in footprints (rig/rig.h): a rig in another unit is scaled before.
 /// The bytes are the same for any thread count: Open3D's solver runs on one thread, since its sums
 /// depend on the number of threads.
 struct SurfaceOptions {
@@ -45,7 +46,8 @@ enum class SurfaceStatus {
 
 struct SurfaceReport {
   SurfaceStatus status = SurfaceStatus::kDone;
-  std::size_t points = 0;       ///< input points with finite coordinates (and nearer than 10 km)
+  std::size_t points =
+      0;  ///< input points with finite coordinates (and nearer than 1e7 footprints)
   std::size_t points_used = 0;  ///< of them, those whose sample survived the votes
   std::size_t samples = 0;
   std::size_t samples_used = 0;

@@ -1,0 +1,433 @@
+#include "pencilscan/guided/second_look.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <tuple>
+#include <utility>
+
+#include "pencilscan/core/median.h"
+#include "pencilscan/core/parallel.h"
+#include "pencilscan/detection/profile_fit.h"
+#include "pencilscan/detection/refine.h"
+#include "pencilscan/guided/line_chains.h"
+#include "pencilscan/points/triangulate.h"
+#include "pencilscan/view/places.h"
+
+namespace pencilscan {
+namespace {
+
+using Eigen::Vector2f;
+
+constexpr int kPlaceCellPx = 8;  ///< px, of what is found by place
+
+struct KnownPoint {
+  Vector2f position;
+  PatternRef pattern;
+  int line;
+  float amplitude;
+};
+
+struct LineName {
+  PatternRef pattern;
+  int line;
+  friend bool operator==(const LineName&, const LineName&) = default;
+};
+
+/// visit(begin, end) for each stretch [begin, end) of equal values.
+template <class Values, class Visit>
+void for_each_stretch(const Values& values, Visit visit) {
+  for (auto begin = values.begin(); begin != values.end();) {
+    const auto end =
+        std::find_if(begin, values.end(), [&](const auto& value) { return !(value == *begin); });
+    visit(static_cast<int>(begin - values.begin()), static_cast<int>(end - values.begin()));
+    begin = end;
+  }
+}
+
+/// One camera's second look.
+class CameraLook {
+ public:
+  CameraLook(const Rig& rig, const std::vector<ColorFamily>& families,
+             const std::vector<cv::Mat>& presence, GridGraph& graph, std::vector<LabeledRun>& runs,
+             std::span<const LabeledRun> tentative, const SecondLookOptions& options,
+             std::span<const MeasuredPoint> dense);
+
+  /// Predicts all lines on the surface of what is labelled; keeps those that no labelled point
+  /// shows.
+  void predict();
+  /// Confirms tentative labels where the predicted line is the same.
+  void confirm_tentative();
+  /// Gives undecided stretches of curves the predicted line they lie on.
+  void adopt_curves();
+  /// Fits what is still missing to what the known curves leave of the presence images.
+  void find_missing();
+  /// The surface of all that is labelled now.
+  [[nodiscard]] LocalSurface take_surface();
+
+ private:
+  void accept(std::vector<LabeledRun> news);
+  void grow_surface();
+  [[nodiscard]] bool is_known(const PredictedPoint& p) const;
+  template <class Visit>
+  void aligned_predictions(const CurvePoint& point, Visit visit) const;
+  [[nodiscard]] std::optional<LineName> line_at(const CurvePoint& point, int family,
+                                                float* spacing_px = nullptr) const;
+  [[nodiscard]] bool lies_on(const CurvePoint& point, const LineName& name) const;
+  [[nodiscard]] bool fits(const CurvePoint& point, const LineName& name, int family) const;
+  [[nodiscard]] bool is_near(float across_px, const PredictedPoint& p) const {
+    return across_px < options_.max_offset_px &&
+           across_px < options_.max_offset_lines * p.spacing_px;
+  }
+  [[nodiscard]] bool is_long_enough(const std::vector<char>& decided, int begin, int end) const;
+  [[nodiscard]] std::vector<std::vector<char>> decided_points() const;
+  [[nodiscard]] int family_of(PatternRef ref) const;
+  [[nodiscard]] float expected_width(const PredictedPoint& p) const;
+  [[nodiscard]] LabeledRun run_of(int curve, int begin, int end, const LineName& name) const {
+    return {
+        curve, begin, end,
+        CurveLabel{name.pattern, name.line, static_cast<double>(name.line), options_.confidence}};
+  }
+  [[nodiscard]] Curve guess_of(const LineChain& chain) const;
+
+  const Rig& rig_;
+  const std::vector<ColorFamily>& families_;
+  const Camera& camera_;
+  GridGraph& graph_;
+  std::vector<LabeledRun>& runs_;
+  std::span<const LabeledRun> tentative_;
+  const SecondLookOptions& options_;
+  std::vector<PatternRef> patterns_;  ///< that the camera can see
+  std::vector<cv::Mat> unexplained_;  ///< per family; empty without images
+  LocalSurface surface_;
+  std::vector<MeasuredPoint> dense_;        ///< more points, not on the surface yet
+  std::vector<LabeledRun> not_on_surface_;  ///< runs whose points it does not hold yet
+  Places<KnownPoint> known_;
+  std::vector<PredictedPoint> missing_;  ///< predicted points that no label explains
+  Places<PredictedPoint> missing_places_;
+};
+
+CameraLook::CameraLook(const Rig& rig, const std::vector<ColorFamily>& families,
+                       const std::vector<cv::Mat>& presence, GridGraph& graph,
+                       std::vector<LabeledRun>& runs, std::span<const LabeledRun> tentative,
+                       const SecondLookOptions& options, std::span<const MeasuredPoint> dense)
+    : rig_(rig),
+      families_(families),
+      camera_(rig.camera(graph.camera)),
+      graph_(graph),
+      runs_(runs),
+      tentative_(tentative),
+      options_(options),
+      surface_(camera_, options.surface),
+      known_(camera_.width, camera_.height, kPlaceCellPx),
+      missing_places_(camera_.width, camera_.height, kPlaceCellPx) {
+  for (const ColorFamily& family : families) {
+    for (const PatternRef& ref : family.patterns) {
+      if (can_see_pattern(rig, camera_, ref.projector)) patterns_.push_back(ref);
+    }
+  }
+  for (std::size_t f = 0; f < presence.size(); ++f) {
+    cv::Mat rest = presence[f].clone();
+    for (const Curve& curve : graph.curves) {
+      if (curve.family == static_cast<int>(f)) subtract_curve(curve, rest);
+    }
+    unexplained_.push_back(std::move(rest));
+  }
+  for (const MeasuredPoint& p : dense) {
+    if (p.camera == graph.camera) dense_.push_back(p);
+  }
+  accept(std::exchange(runs, {}));
+}
+
+int CameraLook::family_of(PatternRef ref) const {
+  for (std::size_t f = 0; f < families_.size(); ++f) {
+    const auto& patterns = families_[f].patterns;
+    if (std::find(patterns.begin(), patterns.end(), ref) != patterns.end())
+      return static_cast<int>(f);
+  }
+  return -1;
+}
+
+/// Width of the profile of a predicted line, px.
+float CameraLook::expected_width(const PredictedPoint& p) const {
+  const LinePattern& pattern = rig_.pattern(p.pattern);
+  return line_profile_width(p.spacing_px *
+                            static_cast<float>(pattern.line_width_px / pattern.pitch_px));
+}
+
+/// Adds runs to what is labelled.
+void CameraLook::accept(std::vector<LabeledRun> news) {
+  for (const LabeledRun& run : news) {
+    const Curve& curve = graph_.curves[static_cast<std::size_t>(run.curve)];
+    for (int i = run.begin; i < run.end; ++i) {
+      const CurvePoint& p = curve.points[static_cast<std::size_t>(i)];
+      known_.add(p.position, {p.position, run.label.pattern, run.label.line, p.amplitude});
+    }
+  }
+  not_on_surface_.insert(not_on_surface_.end(), news.begin(), news.end());
+  runs_.insert(runs_.end(), news.begin(), news.end());
+  std::sort(runs_.begin(), runs_.end(), [](const LabeledRun& a, const LabeledRun& b) {
+    return std::tie(a.curve, a.begin) < std::tie(b.curve, b.begin);
+  });
+}
+
+void CameraLook::grow_surface() {
+  Labeling labeling;
+  labeling.runs.resize(rig_.cameras.size());
+  labeling.runs[static_cast<std::size_t>(graph_.camera)] = std::exchange(not_on_surface_, {});
+  std::vector<MeasuredPoint> points = triangulate(rig_, {&graph_, 1}, labeling);
+  points.insert(points.end(), dense_.begin(), dense_.end());
+  dense_.clear();
+  surface_.add(points);
+}
+
+LocalSurface CameraLook::take_surface() {
+  grow_surface();
+  return std::move(surface_);
+}
+
+bool CameraLook::is_known(const PredictedPoint& p) const {
+  constexpr float kSame = 1.5F;  // px
+  bool found = false;
+  known_.around(p.position, kSame, [&](const KnownPoint& k) {
+    found = found || (k.line == p.line && k.pattern == p.pattern &&
+                      (k.position - p.position).squaredNorm() < kSame * kSame);
+  });
+  return found;
+}
+
+void CameraLook::predict() {
+  grow_surface();
+  // Those that became known lie where the surface grew.
+  std::erase_if(missing_,
+                [&](const PredictedPoint& p) { return surface_.refitted()[p.patch] != 0; });
+  for (const PredictedPoint& p :
+       predict_lines(rig_, camera_, surface_, patterns_, options_.prediction)) {
+    if (!is_known(p)) missing_.push_back(p);
+  }
+  missing_places_.clear();
+  for (const PredictedPoint& p : missing_) missing_places_.add(p.position, p);
+}
+
+/// visit(predicted, across_px) for the missing points beside a curve point, of its direction and
+/// not much thinner: a curve wider than its line is another one, or two.
+template <class Visit>
+void CameraLook::aligned_predictions(const CurvePoint& point, Visit visit) const {
+  constexpr float kAround = 3;    // px
+  constexpr float kAlong = 1.5F;  // px
+  constexpr float kSameDirection = 0.9F;
+  constexpr float kWidest = 1.2F;
+  missing_places_.around(point.position, kAround, [&](const PredictedPoint& p) {
+    const Vector2f way = point.position - p.position;
+    const float along = std::abs(way.x() * p.normal.y() - way.y() * p.normal.x());
+    if (along > kAlong || std::abs(p.normal.dot(point.normal)) < kSameDirection ||
+        point.width_px > kWidest * expected_width(p))
+      return;
+    visit(p, std::abs(way.dot(p.normal)));
+  });
+}
+
+std::optional<LineName> CameraLook::line_at(const CurvePoint& point, int family,
+                                            float* spacing_px) const {
+  constexpr float kClear = 0.8F;  // px that another line must be farther away
+  // Of each line the point that is nearest across it; a line's farther points say nothing.
+  struct Candidate {
+    LineName name;
+    float across = 0;
+    bool is_near = false;
+    float spacing_px = 0;
+  };
+  std::vector<Candidate> candidates;
+  aligned_predictions(point, [&](const PredictedPoint& p, float across) {
+    if (across > 2 * options_.max_offset_px || family_of(p.pattern) != family) return;
+    const Candidate candidate{{p.pattern, p.line}, across, is_near(across, p), p.spacing_px};
+    const auto known = std::find_if(candidates.begin(), candidates.end(),
+                                    [&](const Candidate& c) { return c.name == candidate.name; });
+    if (known == candidates.end()) {
+      candidates.push_back(candidate);
+    } else if (across < known->across) {
+      *known = candidate;
+    }
+  });
+  const auto nearer = [](const Candidate& a, const Candidate& b) { return a.across < b.across; };
+  const auto best = std::min_element(candidates.begin(), candidates.end(), nearer);
+  if (best == candidates.end() || !best->is_near) return std::nullopt;
+  for (auto other = candidates.begin(); other != candidates.end(); ++other) {
+    if (other != best && other->across < best->across + kClear) return std::nullopt;
+  }
+  if (spacing_px != nullptr) *spacing_px = best->spacing_px;
+  return best->name;
+}
+
+bool CameraLook::lies_on(const CurvePoint& point, const LineName& name) const {
+  bool found = false;
+  aligned_predictions(point, [&](const PredictedPoint& p, float across) {
+    found = found || (p.line == name.line && p.pattern == name.pattern && is_near(across, p));
+  });
+  return found;
+}
+
+std::vector<std::vector<char>> CameraLook::decided_points() const {
+  std::vector<std::vector<char>> decided;
+  for (const Curve& curve : graph_.curves) decided.emplace_back(curve.points.size(), 0);
+  for (const LabeledRun& run : runs_) {
+    for (int i = run.begin; i < run.end; ++i)
+      decided[static_cast<std::size_t>(run.curve)][static_cast<std::size_t>(i)] = 1;
+  }
+  return decided;
+}
+
+void CameraLook::confirm_tentative() {
+  const auto decided = decided_points();
+  std::vector<LabeledRun> confirmed;
+  std::vector<char> agrees;
+  for (const LabeledRun& run : tentative_) {
+    if (run.label.confidence < static_cast<float>(options_.min_tentative)) continue;
+    const Curve& curve = graph_.curves[static_cast<std::size_t>(run.curve)];
+    const LineName name{run.label.pattern, run.label.line};
+    agrees.clear();
+    for (int i = run.begin; i < run.end; ++i) {
+      const auto k = static_cast<std::size_t>(i);
+      agrees.push_back(decided[static_cast<std::size_t>(run.curve)][k] == 0 &&
+                       lies_on(curve.points[k], name));
+    }
+    for_each_stretch(agrees, [&](int begin, int end) {
+      if (agrees[static_cast<std::size_t>(begin)] != 0 && end - begin >= options_.min_points)
+        confirmed.push_back(run_of(run.curve, run.begin + begin, run.begin + end, name));
+    });
+  }
+  accept(std::move(confirmed));
+}
+
+/// A stretch [begin, end) on one line, within what is undecided of its curve.
+bool CameraLook::is_long_enough(const std::vector<char>& decided, int begin, int end) const {
+  constexpr double kMost = 0.8;
+  const int n = static_cast<int>(decided.size());
+  const int length = end - begin;
+  if (length >= options_.min_adopted) return true;
+  while (begin > 0 && decided[static_cast<std::size_t>(begin - 1)] == 0) --begin;
+  while (end < n && decided[static_cast<std::size_t>(end)] == 0) ++end;
+  return length >= options_.min_whole && length >= kMost * (end - begin);
+}
+
+void CameraLook::adopt_curves() {
+  const auto decided = decided_points();
+  std::vector<LabeledRun> adopted;
+  std::vector<std::optional<LineName>> names;
+  for (std::size_t c = 0; c < graph_.curves.size(); ++c) {
+    const Curve& curve = graph_.curves[c];
+    names.assign(curve.points.size(), std::nullopt);
+    for (std::size_t i = 0; i < names.size(); ++i) {
+      if (decided[c][i] == 0) names[i] = line_at(curve.points[i], curve.family);
+    }
+    for_each_stretch(names, [&](int begin, int end) {
+      const auto& name = names[static_cast<std::size_t>(begin)];
+      if (!name || !is_long_enough(decided[c], begin, end)) return;
+      const auto first = curve.points.begin() + begin;
+      const auto supported = std::count_if(first, first + (end - begin), [&](const CurvePoint& p) {
+        return fits(p, *name, curve.family);
+      });
+      if (2 * supported > end - begin)
+        adopted.push_back(run_of(static_cast<int>(c), begin, end, *name));
+    });
+  }
+  accept(std::move(adopted));
+}
+
+bool CameraLook::fits(const CurvePoint& point, const LineName& name, int family) const {
+  if (point.sigma_px > options_.max_sigma_px) return false;
+  float spacing = 0;
+  if (line_at(point, family, &spacing) != name) return false;
+  std::vector<float> around;
+  const float reach = std::max(static_cast<float>(options_.support_px),
+                               static_cast<float>(options_.support_lines) * spacing);
+  known_.around(point.position, reach, [&](const KnownPoint& k) {
+    if (k.pattern == name.pattern && std::abs(k.line - name.line) <= 1 &&
+        (k.position - point.position).squaredNorm() < reach * reach)
+      around.push_back(k.amplitude);
+  });
+  if (static_cast<int>(around.size()) < options_.min_support) return false;
+  return point.amplitude > options_.min_amplitude * upper_median(std::move(around));
+}
+
+/// A curve where a line is predicted, as wide as it would be there.
+Curve CameraLook::guess_of(const LineChain& chain) const {
+  Curve curve;
+  curve.family = family_of(chain.front().pattern);
+  for (const PredictedPoint& p : chain) {
+    CurvePoint point;
+    point.position = p.position;
+    point.normal = p.normal;
+    point.width_px = expected_width(p);
+    curve.points.push_back(point);
+  }
+  return curve;
+}
+
+void CameraLook::find_missing() {
+  if (unexplained_.empty()) return;
+  RefineOptions fitting;
+  fitting.min_points = options_.min_points;
+  std::erase_if(missing_, [&](const PredictedPoint& p) { return is_known(p); });
+  std::vector<LabeledRun> labeled;
+  std::vector<Curve> found;
+  for (const LineChain& chain : chain_points(missing_)) {
+    // Where the surface is as it was, the line was not found before.
+    const auto is_new = [&](const PredictedPoint& p) { return surface_.refitted()[p.patch] != 0; };
+    if (static_cast<int>(chain.size()) < options_.min_points ||
+        std::none_of(chain.begin(), chain.end(), is_new))
+      continue;
+    const LineName name{chain.front().pattern, chain.front().line};
+    Curve guess = guess_of(chain);
+    const int family = guess.family;
+    const cv::Mat& image = unexplained_[static_cast<std::size_t>(family)];
+    for (Curve& curve : fit_guess(image, std::move(guess), fitting)) {
+      std::vector<char> good;
+      for (const CurvePoint& p : curve.points) good.push_back(fits(p, name, family));
+      const int index = static_cast<int>(graph_.curves.size() + found.size());
+      bool any = false;
+      for_each_stretch(good, [&](int begin, int end) {
+        if (good[static_cast<std::size_t>(begin)] == 0 || end - begin < options_.min_points) return;
+        labeled.push_back(run_of(index, begin, end, name));
+        any = true;
+      });
+      if (any) found.push_back(std::move(curve));
+    }
+  }
+  for (Curve& curve : found) {
+    const auto family = static_cast<std::size_t>(curve.family);
+    subtract_curve(curve, unexplained_[family]);
+    curve.code.assign(curve.points.size() * families_[family].colors.size(), 0.F);
+    graph_.curves.push_back(std::move(curve));
+    graph_.component_of_curve.push_back(-1);
+    if (!graph_.identities.empty()) graph_.identities.emplace_back();
+  }
+  accept(std::move(labeled));
+}
+
+}  // namespace
+
+std::vector<LocalSurface> second_look(const Rig& rig, const std::vector<ColorFamily>& families,
+                                      std::span<const std::vector<cv::Mat>> presence,
+                                      std::span<GridGraph> graphs, Labeling& labeling,
+                                      const SecondLookOptions& options,
+                                      std::span<const MeasuredPoint> dense) {
+  std::vector<std::optional<LocalSurface>> surfaces(graphs.size());
+  parallel_for(graphs.size(), [&](std::size_t g) {
+    const auto camera = static_cast<std::size_t>(graphs[g].camera);
+    CameraLook look(rig, families, presence[g], graphs[g], labeling.runs[camera],
+                    labeling.tentative[camera], options, dense);
+    for (int pass = 0; pass < options.passes; ++pass) {
+      look.predict();
+      look.confirm_tentative();
+      look.adopt_curves();
+      look.find_missing();
+    }
+    surfaces[g] = look.take_surface();
+  });
+  std::vector<LocalSurface> result;
+  for (auto& surface : surfaces) result.push_back(*std::move(surface));
+  return result;
+}
+
+}  // namespace pencilscan

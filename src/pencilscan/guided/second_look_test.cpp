@@ -1,0 +1,282 @@
+#include "pencilscan/guided/second_look.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "pencilscan/core/random.h"
+#include "pencilscan/detection/refine.h"
+#include "pencilscan/labeling/two_projector_scene.h"
+#include "pencilscan/points/settle.h"
+#include "pencilscan/points/triangulate.h"
+
+namespace pencilscan {
+namespace {
+
+/// Camera z of the scene's surface in a pixel, by sphere tracing in small steps.
+double depth_of_surface(const Camera& camera, const Vec2& pixel) {
+  const Ray ray = camera.ray(pixel);
+  const auto outside = [&](double t) {
+    const Vec3 x = ray.origin + t * ray.direction;
+    return x.x() - TwoProjectorScene::surface(x.y(), x.z()).x();
+  };
+  double low = 900;
+  while (outside(low + 1) > 0) low += 1;
+  double high = low + 1;
+  for (int k = 0; k < 40; ++k) {
+    const double middle = 0.5 * (low + high);
+    (outside(middle) > 0 ? low : high) = middle;
+  }
+  return (camera.device_from_world * (ray.origin + low * ray.direction)).z();
+}
+
+/// One camera's curves with true labels.
+class LabeledScene : public testing::Test, protected TwoProjectorScene {
+ protected:
+  LabeledScene() : graph_(graph(0, 50, 0.05, 3)) {
+    labeling_.runs.resize(2);
+    labeling_.tentative.resize(2);
+    labeling_.undecided.resize(2);
+    for (std::size_t k = 0; k < graph_.curves.size(); ++k) {
+      Curve& curve = graph_.curves[k];
+      const int line = true_lines[0][k];
+      labeling_.runs[0].push_back({static_cast<int>(k), 0, static_cast<int>(curve.points.size()),
+                                   CurveLabel{{curve.family, 0}, line, 1.0 * line, 1}});
+      for (std::size_t i = 0; i < curve.points.size(); ++i) {
+        const auto& next = curve.points[std::min(i + 4, curve.points.size() - 1)].position;
+        const auto& before = curve.points[i < 4 ? 0 : i - 4].position;
+        const Eigen::Vector2f tangent = (next - before).normalized();
+        curve.points[i].normal = {tangent.y(), -tangent.x()};
+        curve.points[i].amplitude = 0.3F;
+        curve.points[i].width_px = 1.2F;
+      }
+    }
+  }
+  const Camera& camera() const { return rig.cameras[0]; }
+  std::vector<MeasuredPoint> points() const { return triangulate(rig, {&graph_, 1}, labeling_); }
+
+  /// Index of a curve of the middle of a family.
+  std::size_t middle_curve(int family) const {
+    std::vector<std::size_t> curves;
+    for (std::size_t k = 0; k < graph_.curves.size(); ++k) {
+      if (graph_.curves[k].family == family && graph_.curves[k].points.size() > 150)
+        curves.push_back(k);
+    }
+    return curves[curves.size() / 2];
+  }
+  void remove_label(std::size_t curve) {
+    std::erase_if(labeling_.runs[0],
+                  [&](const LabeledRun& r) { return r.curve == static_cast<int>(curve); });
+  }
+  /// Label of most points of a curve, -1 where most have none.
+  int label_of(std::size_t curve) const {
+    int points = 0;
+    int line = -1;
+    for (const LabeledRun& run : labeling_.runs[0]) {
+      if (run.curve != static_cast<int>(curve)) continue;
+      points += run.end - run.begin;
+      line = run.label.line;
+    }
+    return 2 * points > static_cast<int>(graph_.curves[curve].points.size()) ? line : -1;
+  }
+
+  GridGraph graph_;
+  Labeling labeling_;
+};
+
+TEST_F(LabeledScene, LocalSurfaceIsTheTrueOneWithinItsSigma) {
+  LocalSurface surface(camera());
+  surface.add(points());
+  int patches = 0;
+  int within = 0;
+  for (const SurfacePatch& patch : surface.patches()) {
+    // Away from the border of what is labelled, where patches extrapolate.
+    const Vec2 pixel = patch.pixel.cast<double>();
+    if (!patch.exists() || (pixel - Vec2(640, 480)).norm() > 70) continue;
+    const double error = 1 - patch.inverse_depth(patch.pixel) * depth_of_surface(camera(), pixel);
+    ++patches;
+    within += std::abs(error) < 2 * patch.sigma + 3e-5;  // 0.03 mm: curvature beyond quadratic
+  }
+  EXPECT_GT(patches, 300);
+  EXPECT_GT(within, 0.95 * patches);
+}
+
+TEST_F(LabeledScene, PredictedLinesAreWhereTheCurvesAre) {
+  LocalSurface surface(camera());
+  surface.add(points());
+  for (int p = 0; p < 2; ++p) {
+    std::vector<std::pair<int, Eigen::Vector2f>> predicted;
+    for (const PredictedPoint& point :
+         predict_lines(rig, camera(), surface, std::array{PatternRef{p, 0}}))
+      predicted.emplace_back(point.line, point.position);
+    std::size_t found = 0;
+    std::size_t all = 0;
+    for (std::size_t k = 0; k < graph_.curves.size(); ++k) {
+      const Curve& curve = graph_.curves[k];
+      if (curve.family != p) continue;
+      for (std::size_t i = 5; i + 5 < curve.points.size(); i += 7) {
+        ++all;
+        bool hit = false;
+        for (const auto& [line, position] : predicted) {
+          hit = hit ||
+                (line == true_lines[0][k] && (position - curve.points[i].position).norm() < 0.8F);
+        }
+        found += hit ? 1 : 0;
+      }
+    }
+    EXPECT_GT(all, 100U);
+    EXPECT_GT(static_cast<double>(found), 0.97 * static_cast<double>(all)) << "projector " << p;
+  }
+}
+
+TEST_F(LabeledScene, UndecidedCurveOnAPredictedLineGetsItsLabel) {
+  const std::size_t curve = middle_curve(0);
+  remove_label(curve);
+  ASSERT_EQ(label_of(curve), -1);
+  const std::vector<std::vector<cv::Mat>> no_images(1);
+  second_look(rig, families, no_images, {&graph_, 1}, labeling_);
+  EXPECT_EQ(label_of(curve), true_lines[0][curve]);
+}
+
+TEST_F(LabeledScene, UndecidedCurveBetweenLinesStaysUndecided) {
+  const std::size_t curve = middle_curve(0);
+  remove_label(curve);
+  // Half a line aside: no line is there.
+  for (CurvePoint& p : graph_.curves[curve].points) p.position += 6.F * p.normal;
+  const std::vector<std::vector<cv::Mat>> no_images(1);
+  second_look(rig, families, no_images, {&graph_, 1}, labeling_);
+  EXPECT_EQ(label_of(curve), -1);
+}
+
+TEST_F(LabeledScene, CurveMuchWiderThanThePredictedLineGetsNoLabel) {
+  const std::size_t curve = middle_curve(0);
+  remove_label(curve);
+  for (CurvePoint& p : graph_.curves[curve].points) p.width_px *= 2;
+  second_look(rig, families, std::vector<std::vector<cv::Mat>>(1), {&graph_, 1}, labeling_);
+  EXPECT_EQ(label_of(curve), -1);
+}
+
+TEST_F(LabeledScene, TentativeLabelIsConfirmedWhereTheSurfaceAgreesOnly) {
+  const std::size_t good = middle_curve(0);
+  const std::size_t bad = middle_curve(1);
+  for (const std::size_t k : {good, bad}) {
+    remove_label(k);
+    const int line = true_lines[0][k] + (k == bad ? 3 : 0);
+    labeling_.tentative[0].push_back({static_cast<int>(k), 0,
+                                      static_cast<int>(graph_.curves[k].points.size()),
+                                      CurveLabel{{k == bad ? 1 : 0, 0}, line, 1.0 * line, 0.8F}});
+  }
+  SecondLookOptions options;
+  options.min_adopted = 1000000;  // nothing but tentative labels
+  options.min_whole = 1000000;
+  second_look(rig, families, std::vector<std::vector<cv::Mat>>(1), {&graph_, 1}, labeling_,
+              options);
+  EXPECT_EQ(label_of(good), true_lines[0][good]);
+  EXPECT_EQ(label_of(bad), -1);
+}
+
+TEST_F(LabeledScene, MissedLineIsFoundInTheImageWhereItIsAndNotWhereItIsDark) {
+  std::vector<cv::Mat> presence;
+  for (int f = 0; f < 2; ++f) {
+    std::vector<Curve> of_family;
+    for (const Curve& curve : graph_.curves) {
+      if (curve.family == f) of_family.push_back(curve);
+    }
+    presence.push_back(render_curves(of_family, {camera().width, camera().height}));
+    Random random(11);
+    for (int y = 0; y < presence.back().rows; ++y) {
+      for (int x = 0; x < presence.back().cols; ++x)
+        presence.back().at<float>(y, x) += static_cast<float>(random.normal(0, 0.01));
+    }
+  }
+  // One curve is in the image but was not detected, another was never projected.
+  const std::size_t missed = middle_curve(0);
+  const std::size_t dark = missed + 2;
+  presence[0] -= render_curves({graph_.curves[dark]}, presence[0].size());
+  const std::vector<CurvePoint> truth = graph_.curves[missed].points;
+  const int line = true_lines[0][missed];
+  for (const std::size_t k : {missed, dark}) {
+    remove_label(k);
+    graph_.curves[k].points.clear();
+  }
+  const std::size_t before = graph_.curves.size();
+  const std::vector<std::vector<cv::Mat>> images = {presence};
+  second_look(rig, families, images, {&graph_, 1}, labeling_);
+  std::size_t found = 0;
+  for (const LabeledRun& run : labeling_.runs[0]) {
+    if (run.curve < static_cast<int>(before)) continue;
+    EXPECT_EQ(run.label.pattern, (PatternRef{0, 0}));
+    EXPECT_EQ(run.label.line, line);
+    for (int i = run.begin; i < run.end; ++i) {
+      const auto& p = graph_.curves[static_cast<std::size_t>(run.curve)]
+                          .points[static_cast<std::size_t>(i)]
+                          .position;
+      float nearest = 1e9F;
+      for (const CurvePoint& t : truth) nearest = std::min(nearest, (t.position - p).norm());
+      EXPECT_LT(nearest, 1.F);
+      ++found;
+    }
+  }
+  EXPECT_GT(static_cast<double>(found), 0.5 * static_cast<double>(truth.size()));
+}
+
+TEST_F(LabeledScene, SettledPointsAreCloserToTheSurface) {
+  const std::vector<MeasuredPoint> before = points();
+  LocalSurface surface(camera());
+  surface.add(before);
+  const std::vector<MeasuredPoint> after = settle_points(rig, before, {&surface, 1});
+  const auto rms = [&](const std::vector<MeasuredPoint>& list) {
+    double sum = 0;
+    for (const MeasuredPoint& p : list) {
+      const double z = (camera().device_from_world * Vec3(p.x, p.y, p.z)).z();
+      sum += std::pow(z - depth_of_surface(camera(), Vec2(p.u, p.v)), 2);
+    }
+    return std::sqrt(sum / static_cast<double>(list.size()));
+  };
+  EXPECT_GT(after.size(), 0.99 * static_cast<double>(before.size()));
+  // Dozens of points share a patch; its own error and bumps beyond quadratic leave part of it.
+  EXPECT_LT(rms(after), 0.65 * rms(before));
+  for (const MeasuredPoint& p : after) {
+    const auto pixel = camera().project(Vec3(p.x, p.y, p.z));
+    ASSERT_TRUE(pixel);
+    EXPECT_NEAR(pixel->x(), p.u, 1e-2);
+    EXPECT_NEAR(pixel->y(), p.v, 1e-2);
+  }
+}
+
+TEST_F(LabeledScene, SettlingDropsAStretchOfAWrongLine) {
+  // One piece of the curve, as a solution labels it.
+  const std::size_t curve = middle_curve(0);
+  const int wrong = true_lines[0][curve] + 8;
+  std::vector<LabeledRun>& runs = labeling_.runs[0];
+  const auto run = std::find_if(runs.begin(), runs.end(), [&](const LabeledRun& r) {
+    return r.curve == static_cast<int>(curve);
+  });
+  const int middle = (run->begin + run->end) / 2;
+  LabeledRun piece = *run;
+  LabeledRun rest = *run;
+  run->end = piece.begin = middle - 6;
+  rest.begin = piece.end = middle + 6;
+  piece.label.line += 8;
+  piece.label.plane += 8;
+  runs.insert(run + 1, {piece, rest});
+  const std::vector<MeasuredPoint> before = points();
+  LocalSurface surface(camera());
+  surface.add(before);
+  const std::vector<MeasuredPoint> after = settle_points(rig, before, {&surface, 1});
+  std::set<std::pair<float, float>> places;
+  for (int i = piece.begin; i < piece.end; ++i) {
+    const auto& p = graph_.curves[curve].points[static_cast<std::size_t>(i)].position;
+    places.insert({p.x(), p.y()});
+  }
+  const auto of_piece = [&](const MeasuredPoint& p) {
+    return p.projector == 0 && p.line == wrong && places.count({p.u, p.v}) != 0;
+  };
+  EXPECT_GT(std::count_if(before.begin(), before.end(), of_piece), 8);
+  EXPECT_EQ(std::count_if(after.begin(), after.end(), of_piece), 0);
+}
+
+}  // namespace
+}  // namespace pencilscan

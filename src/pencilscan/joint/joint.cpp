@@ -1,0 +1,302 @@
+#include "pencilscan/joint/joint.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "pencilscan/core/parallel.h"
+#include "pencilscan/grid/local_ids.h"
+#include "pencilscan/joint/min_sum.h"
+#include "pencilscan/joint/next_lines.h"
+#include "pencilscan/joint/other_views.h"
+#include "pencilscan/joint/piece_labels.h"
+#include "pencilscan/joint/surroundings.h"
+
+namespace pencilscan {
+namespace {
+
+constexpr float kOutlierCost = 0;
+constexpr float kSameLineReward = 2.F;  ///< of consecutive pieces of one curve
+
+/// Adds a table over the labels of two pieces, each with "outlier" as its last label (cost 0).
+template <class Cost>
+void add_edge(PairwiseEnergy& energy, int a, int b, const std::vector<PieceLabel>& labels_a,
+              const std::vector<PieceLabel>& labels_b, Cost cost) {
+  const std::size_t table = energy.tables.size();
+  energy.edges.push_back({a, b, table});
+  energy.tables.resize(table + (labels_a.size() + 1) * (labels_b.size() + 1), 0.F);
+  float* entry = energy.tables.data() + table;
+  for (const PieceLabel& la : labels_a) {
+    for (const PieceLabel& lb : labels_b) *entry++ = cost(la, lb);
+    ++entry;
+  }
+}
+
+void add(const std::vector<std::vector<float>>& costs, std::vector<std::vector<float>>& sum) {
+  for (std::size_t p = 0; p < sum.size(); ++p) {
+    for (std::size_t k = 0; k < sum[p].size(); ++k) sum[p][k] += costs[p][k];
+  }
+}
+
+void set_unary(const LabelledPieces& pieces, const std::vector<std::vector<float>>& views,
+               PairwiseEnergy& energy) {
+  energy.unary.clear();
+  for (std::size_t p = 0; p < pieces.labels.size(); ++p) {
+    for (std::size_t k = 0; k < pieces.labels[p].size(); ++k)
+      energy.unary.push_back(pieces.labels[p][k].cost + views[p][k]);
+    energy.unary.push_back(kOutlierCost);
+  }
+}
+
+PairwiseEnergy pairwise_energy(const LabelledPieces& pieces, const JointOptions& options) {
+  PairwiseEnergy energy;
+  energy.first.push_back(0);
+  for (const auto& labels : pieces.labels)
+    energy.first.push_back(energy.first.back() + static_cast<int>(labels.size()) + 1);
+  std::size_t size = 0;
+  const auto add_size = [&](int a, int b) {
+    size += static_cast<std::size_t>(energy.labels(a)) * static_cast<std::size_t>(energy.labels(b));
+  };
+  for (const PieceCrossing& x : pieces.graph.crossings) add_size(x.a, x.b);
+  for (const auto& [a, b] : pieces.graph.continuations) add_size(a, b);
+  energy.tables.reserve(size);
+  const CrossingCost crossing_cost(pieces, options);
+  for (const PieceCrossing& x : pieces.graph.crossings) {
+    add_edge(energy, x.a, x.b, pieces.labels[static_cast<std::size_t>(x.a)],
+             pieces.labels[static_cast<std::size_t>(x.b)],
+             [&](const PieceLabel& a, const PieceLabel& b) { return crossing_cost(a, b, x); });
+  }
+  for (const auto& [a, b] : pieces.graph.continuations) {
+    add_edge(energy, a, b, pieces.labels[static_cast<std::size_t>(a)],
+             pieces.labels[static_cast<std::size_t>(b)],
+             [&](const PieceLabel& la, const PieceLabel& lb) {
+               return la.pattern == lb.pattern && la.line == lb.line
+                          ? -kSameLineReward
+                          : static_cast<float>(options.change_cost);
+             });
+  }
+  return energy;
+}
+
+/// Where nothing crosses: pieces side by side are lines side by side.
+void add_order(const Rig& rig, const GridGraph& graph, const LabelledPieces& pieces,
+               std::span<const NextPiece> beside, PairwiseEnergy& energy) {
+  const Camera& camera = rig.camera(graph.camera);
+  for (const NextPiece& next : beside) {
+    const auto& a = pieces.labels[static_cast<std::size_t>(next.a)];
+    const auto& b = pieces.labels[static_cast<std::size_t>(next.b)];
+    const Vec3 ray = camera.normalized_from_pixel(next.pixel.cast<double>()).homogeneous();
+    PatternRef known{-1, -1};
+    int order = 0;
+    add_edge(energy, next.a, next.b, a, b, [&](const PieceLabel& la, const PieceLabel& lb) {
+      if (!(la.pattern == known)) {  // labels are ordered by pattern
+        known = la.pattern;
+        const double depth = 1 / la.q.cast<double>().dot(ray);
+        order = line_order_sign(rig, camera, known, next.pixel.cast<double>(),
+                                next.tangent.cast<double>(), depth);
+        if (next.side < 0) order = -order;
+      }
+      return next_piece_cost(la, lb, order);
+    });
+  }
+}
+
+/// Beliefs as probabilities of each label; what is missing to 1 is "outlier".
+PieceBeliefs beliefs_of(const LabelledPieces& pieces, const std::vector<float>& costs) {
+  constexpr float kTemperature = 2;  // loops count evidence more than once
+  PieceBeliefs beliefs;
+  std::size_t at = 0;
+  for (const auto& labels : pieces.labels) {
+    const auto first = costs.begin() + static_cast<std::ptrdiff_t>(at);
+    const auto last = first + static_cast<std::ptrdiff_t>(labels.size() + 1);
+    const float lowest = *std::min_element(first, last);
+    float sum = 0;
+    std::vector<float> p;
+    for (auto it = first; it != last; ++it) {
+      p.push_back(std::exp((lowest - *it) / kTemperature));
+      sum += p.back();
+    }
+    p.pop_back();
+    for (float& x : p) x /= sum;
+    beliefs.push_back(std::move(p));
+    at += labels.size() + 1;
+  }
+  return beliefs;
+}
+
+struct Decision {
+  int label = -1;  ///< -1: outlier
+  float margin = 0;
+};
+
+std::vector<Decision> decisions_of(const LabelledPieces& pieces, const std::vector<float>& costs) {
+  std::vector<Decision> decisions;
+  std::size_t at = 0;
+  for (const auto& labels : pieces.labels) {
+    const std::size_t n = labels.size() + 1;
+    std::size_t best = n - 1;
+    for (std::size_t k = 0; k < n; ++k) {
+      if (costs[at + k] < costs[at + best]) best = k;
+    }
+    float second = 1e9F;
+    for (std::size_t k = 0; k < n; ++k) {
+      if (k != best) second = std::min(second, costs[at + k]);
+    }
+    decisions.push_back({best + 1 == n ? -1 : static_cast<int>(best), second - costs[at + best]});
+    at += n;
+  }
+  return decisions;
+}
+
+/// Without crossings only the code tells lines apart: a piece is ambiguous where a line a whole
+/// period away is possible too.
+void leave_periodic(const Rig& rig, const LabelledPieces& pieces,
+                    std::vector<Decision>& decisions) {
+  for (std::size_t p = 0; p < decisions.size(); ++p) {
+    if (decisions[p].label < 0) continue;
+    const PieceLabel& best = pieces.labels[p][static_cast<std::size_t>(decisions[p].label)];
+    const int period = rig.pattern(best.pattern).period();
+    for (const PieceLabel& other : pieces.labels[p]) {
+      const int apart = std::abs(other.line - best.line);
+      if (other.pattern == best.pattern && apart > 0 && apart % period == 0)
+        decisions[p].margin = 0;
+    }
+  }
+}
+
+/// Pieces side by side vouch for each other, also for the lines of another projector. So where no
+/// chain of neighbours leads to a piece that others cross, what neighbours said does not count.
+void leave_unanchored(const LabelledPieces& pieces, std::span<const NextPiece> beside,
+                      std::vector<Decision>& decisions) {
+  constexpr float kPerNeighbor = 3;  // what one adds to the margin, about
+  const auto label_of = [&](int p) -> const PieceLabel* {
+    const auto k = static_cast<std::size_t>(p);
+    return decisions[k].label < 0 ? nullptr
+                                  : &pieces.labels[k][static_cast<std::size_t>(decisions[k].label)];
+  };
+  std::vector<std::vector<int>> linked(decisions.size());
+  std::vector<int> neighbors(decisions.size(), 0);
+  const auto link = [&](int a, int b, int lines_apart) {
+    const PieceLabel* la = label_of(a);
+    const PieceLabel* lb = label_of(b);
+    if (la == nullptr || lb == nullptr || !(la->pattern == lb->pattern) ||
+        std::abs(la->line - lb->line) != lines_apart)
+      return;
+    linked[static_cast<std::size_t>(a)].push_back(b);
+    linked[static_cast<std::size_t>(b)].push_back(a);
+    neighbors[static_cast<std::size_t>(a)] += lines_apart;
+    neighbors[static_cast<std::size_t>(b)] += lines_apart;
+  };
+  for (const NextPiece& next : beside) link(next.a, next.b, 1);
+  for (const auto& [a, b] : pieces.graph.continuations) link(a, b, 0);
+  std::vector<char> is_anchored = crossed_pieces(pieces.graph);
+  std::vector<int> open;
+  for (std::size_t p = 0; p < is_anchored.size(); ++p) {
+    if (is_anchored[p] != 0) open.push_back(static_cast<int>(p));
+  }
+  while (!open.empty()) {
+    const int p = open.back();
+    open.pop_back();
+    for (const int q : linked[static_cast<std::size_t>(p)]) {
+      if (is_anchored[static_cast<std::size_t>(q)] != 0) continue;
+      is_anchored[static_cast<std::size_t>(q)] = 1;
+      open.push_back(q);
+    }
+  }
+  for (std::size_t p = 0; p < decisions.size(); ++p) {
+    if (is_anchored[p] == 0) decisions[p].margin -= kPerNeighbor * static_cast<float>(neighbors[p]);
+  }
+}
+
+/// Share of points that are right at this margin: a logistic fit over five rendered scenes (bunny
+/// with and without texture, hand, two balls, cube); benchmarks/accuracy prints the comparison.
+float confidence_of(float margin) { return 1 / (1 + std::exp(0.13F - 0.52F * margin)); }
+
+/// Runs of the decided pieces of one camera, and why the others are not.
+void write_decisions(const LabelledPieces& pieces, const std::vector<Decision>& decisions,
+                     const JointOptions& options, std::vector<LabeledRun>& runs,
+                     std::vector<LabeledRun>& tentative, std::vector<UndecidedRun>& undecided) {
+  const std::vector<char> is_crossed = crossed_pieces(pieces.graph);
+  for (std::size_t p = 0; p < decisions.size(); ++p) {
+    const CurvePiece& piece = pieces.graph.pieces[p];
+    const auto leave = [&](UndecidedReason reason) {
+      undecided.push_back({piece.curve, piece.begin, piece.end, reason});
+    };
+    const float confidence = confidence_of(decisions[p].margin);
+    if (pieces.labels[p].empty()) {
+      leave(UndecidedReason::kOutsideVolume);
+      continue;
+    }
+    const bool is_sure = confidence >= static_cast<float>(options.min_confidence);
+    if (decisions[p].label >= 0) {
+      const PieceLabel& label = pieces.labels[p][static_cast<std::size_t>(decisions[p].label)];
+      (is_sure ? runs : tentative)
+          .push_back(
+              {piece.curve, piece.begin, piece.end,
+               CurveLabel{label.pattern, label.line, static_cast<double>(label.line), confidence}});
+      if (is_sure) continue;
+    }
+    leave(is_crossed[p] == 0       ? UndecidedReason::kNoCrossing
+          : decisions[p].label < 0 ? UndecidedReason::kContradicted
+                                   : UndecidedReason::kAmbiguous);
+  }
+}
+
+}  // namespace
+
+float JointOptions::disagreement_cost() const {
+  return static_cast<float>(-std::log(crossing_outliers));
+}
+
+Labeling solve_joint(const Rig& rig, const std::vector<ColorFamily>& families,
+                     std::span<const GridGraph> graphs, const JointOptions& options) {
+  std::vector<LabelledPieces> pieces(graphs.size());
+  parallel_for(graphs.size(), [&](std::size_t g) {
+    pieces[g] = possible_labels(rig, families, graphs[g], options);
+  });
+  const OtherViews others(rig, graphs, pieces);
+  std::vector<std::optional<Surroundings>> surroundings(graphs.size());
+  std::vector<PairwiseEnergy> energies(graphs.size());
+  std::vector<std::vector<NextPiece>> beside(graphs.size());
+  parallel_for(graphs.size(), [&](std::size_t g) {
+    surroundings[g].emplace(rig.camera(graphs[g].camera), graphs[g], pieces[g]);
+    energies[g] = pairwise_energy(pieces[g], options);
+    beside[g] = next_pieces(rig.camera(graphs[g].camera), graphs[g], pieces[g].graph);
+    add_order(rig, graphs[g], pieces[g], beside[g], energies[g]);
+  });
+  std::vector<std::vector<Decision>> decisions(graphs.size());
+  std::vector<PieceBeliefs> beliefs(graphs.size());
+  for (int pass = 0; pass < options.passes; ++pass) {
+    std::vector<PieceBeliefs> next(graphs.size());
+    parallel_for(graphs.size(), [&](std::size_t g) {
+      auto evidence = others.costs(g, beliefs);
+      add(surroundings[g]->costs(beliefs[g]), evidence);
+      set_unary(pieces[g], evidence, energies[g]);
+      // Order and code reach a piece over as many neighbours as the code is long, and more.
+      const int rounds = lacks_crossings(pieces[g].graph) ? 6 * options.rounds : options.rounds;
+      const std::vector<float> costs =
+          options.inference ? options.inference(energies[g])
+                            : min_sum(energies[g], rounds, static_cast<float>(options.damping));
+      next[g] = beliefs_of(pieces[g], costs);
+      decisions[g] = decisions_of(pieces[g], costs);
+      if (lacks_crossings(pieces[g].graph)) {
+        leave_periodic(rig, pieces[g], decisions[g]);
+      } else {
+        leave_unanchored(pieces[g], beside[g], decisions[g]);
+      }
+    });
+    beliefs = std::move(next);
+  }
+  Labeling labeling;
+  labeling.runs.resize(rig.cameras.size());
+  labeling.tentative.resize(rig.cameras.size());
+  labeling.undecided.resize(rig.cameras.size());
+  for (std::size_t g = 0; g < graphs.size(); ++g) {
+    const auto camera = static_cast<std::size_t>(graphs[g].camera);
+    write_decisions(pieces[g], decisions[g], options, labeling.runs[camera],
+                    labeling.tentative[camera], labeling.undecided[camera]);
+  }
+  return labeling;
+}
+
+}  // namespace pencilscan

@@ -1,0 +1,93 @@
+#include "pencilscan/joint/next_lines.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "pencilscan/view/places.h"
+
+namespace pencilscan {
+namespace {
+
+using Eigen::Vector2f;
+
+struct LinePlace {
+  Vector2f pixel;
+  Vector2f tangent;
+  int curve;
+  int piece;
+};
+
+constexpr int kNextLineCellPx = 16;
+constexpr float kNextLinePx = 48;
+
+}  // namespace
+
+bool lacks_crossings(const PieceGraph& graph) {
+  return 10 * graph.crossings.size() < graph.pieces.size();
+}
+
+std::vector<NextPiece> next_pieces(const Camera& camera, const GridGraph& graph,
+                                   const PieceGraph& pieces) {
+  Places<LinePlace> places(camera.width, camera.height, kNextLineCellPx);
+  for (std::size_t p = 0; p < pieces.pieces.size(); ++p) {
+    const CurvePiece& piece = pieces.pieces[p];
+    for (int i = piece.begin; i < piece.end; ++i) {
+      const CurvePoint& point =
+          graph.curves[static_cast<std::size_t>(piece.curve)].points[static_cast<std::size_t>(i)];
+      places.add(point.position,
+                 {point.position, point.tangent(), piece.curve, static_cast<int>(p)});
+    }
+  }
+  std::vector<NextPiece> result;
+  std::set<std::pair<int, int>> seen;
+  const std::vector<char> is_crossed = crossed_pieces(pieces);
+  for (std::size_t p = 0; p < pieces.pieces.size(); ++p) {
+    if (is_crossed[p] != 0) continue;
+    const CurvePiece& piece = pieces.pieces[p];
+    const Curve& curve = graph.curves[static_cast<std::size_t>(piece.curve)];
+    const CurvePoint& middle =
+        curve.points[static_cast<std::size_t>((piece.begin + piece.end) / 2)];
+    const Vector2f tangent = middle.tangent();
+    const Vector2f normal(tangent.y(), -tangent.x());
+    for (const float side : {1.F, -1.F}) {
+      float nearest = kNextLinePx;
+      const LinePlace* found = nullptr;
+      const Vector2f& at = middle.position;
+      places.around(at, kNextLinePx, [&](const LinePlace& place) {
+        const Vector2f way = place.pixel - at;
+        const float across = side * way.dot(normal);
+        if (across < 1.5F || across >= nearest || std::abs(way.dot(tangent)) > 1) return;
+        if (place.curve == piece.curve || std::abs(place.tangent.dot(tangent)) < 0.85F ||
+            graph.curves[static_cast<std::size_t>(place.curve)].family != curve.family)
+          return;
+        nearest = across;
+        found = &place;
+      });
+      if (found == nullptr) continue;
+      const int a = static_cast<int>(p);
+      if (!seen.insert(std::minmax(a, found->piece)).second) continue;
+      result.push_back({a, found->piece, at, tangent, side});
+    }
+  }
+  return result;
+}
+
+float next_piece_cost(const PieceLabel& a, const PieceLabel& b, int order) {
+  constexpr float kNext = -1.5F;
+  constexpr float kOneMissed = 0.5F;
+  constexpr float kMoreMissed = 2;
+  constexpr float kWrongOrder = 3;
+  if (order == 0) return 0;
+  if (!(a.pattern == b.pattern)) return kMoreMissed;
+  switch ((b.line - a.line) * order) {
+    case 1:
+      return kNext;
+    case 2:
+      return kOneMissed;
+    default:
+      return (b.line - a.line) * order > 0 ? kMoreMissed : kWrongOrder;
+  }
+}
+
+}  // namespace pencilscan

@@ -1,0 +1,150 @@
+#include "pencilscan/joint/other_views.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "pencilscan/core/parallel.h"
+
+namespace pencilscan {
+
+OtherViews::OtherViews(const Rig& rig, std::span<const GridGraph> graphs,
+                       std::span<const LabelledPieces> pieces)
+    : rig_(rig), graphs_(graphs), pieces_(pieces), sightings_(graphs.size()) {
+  std::vector<View> views(graphs.size());
+  parallel_for(graphs.size(), [&](std::size_t g) { views[g] = make_view(g); });
+  parallel_for(graphs.size(), [&](std::size_t g) { sightings_[g] = look_from_others(g, views); });
+}
+
+OtherViews::View OtherViews::make_view(std::size_t g) const {
+  const Camera& camera = rig_.camera(graphs_[g].camera);
+  int families = 0;
+  for (const Curve& curve : graphs_[g].curves) families = std::max(families, curve.family + 1);
+  std::vector<std::vector<Entry>> entries(static_cast<std::size_t>(families));
+  const auto& list = pieces_[g].graph.pieces;
+  for (std::size_t p = 0; p < list.size(); ++p) {
+    const Curve& curve = graphs_[g].curves[static_cast<std::size_t>(list[p].curve)];
+    for (int i = list[p].begin; i < list[p].end; ++i) {
+      const CurvePoint& point = curve.points[static_cast<std::size_t>(i)];
+      entries[static_cast<std::size_t>(curve.family)].push_back(
+          {point.position, point.tangent(), static_cast<int>(p)});
+    }
+  }
+  View view;
+  for (const auto& of_family : entries) {
+    CellIndex index({camera.width, camera.height}, kCellPx, of_family.size(), [&](std::size_t i) {
+      return std::pair(of_family[i].position.x(), of_family[i].position.y());
+    });
+    std::vector<Entry> ordered;
+    ordered.reserve(of_family.size());
+    for (const int i : index.items()) ordered.push_back(of_family[static_cast<std::size_t>(i)]);
+    view.push_back({std::move(index), std::move(ordered)});
+  }
+  return view;
+}
+
+int OtherViews::find(const FamilyView& view, const Eigen::Vector2f& position,
+                     const Eigen::Vector2f& tangent) {
+  constexpr float kMaxAcross = 1.8F;
+  constexpr float kMaxAlong = 1;
+  constexpr float kMinCosine = 0.9F;
+  float best = kMaxAcross;
+  int piece = -1;
+  const float reach = std::sqrt(kMaxAcross * kMaxAcross + kMaxAlong * kMaxAlong);
+  view.index.ranges(position.x(), position.y(), reach, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const Entry& e = view.entries[i];
+      const Eigen::Vector2f way = position - e.position;
+      if (std::abs(way.dot(e.tangent)) > kMaxAlong) continue;
+      const float across = std::abs(way.x() * e.tangent.y() - way.y() * e.tangent.x());
+      if (across >= best || std::abs(e.tangent.dot(tangent)) < kMinCosine) continue;
+      best = across;
+      piece = e.piece;
+    }
+    return true;
+  });
+  return piece;
+}
+
+std::vector<OtherViews::Sighting> OtherViews::look_from_others(std::size_t g,
+                                                               std::span<const View> views) const {
+  const int camera_index = graphs_[g].camera;
+  const Camera& camera = rig_.camera(camera_index);
+  const RigidTransform world_from_camera = camera.device_from_world.inverse();
+  std::vector<std::size_t> others;
+  for (const int c : adjacent_cameras(rig_, camera_index)) {
+    for (std::size_t k = 0; k < graphs_.size(); ++k) {
+      if (graphs_[k].camera == c) others.push_back(k);
+    }
+  }
+  constexpr float kPixels = 3;
+  const float ahead = kPixels / static_cast<float>(camera.K(0, 0));
+  std::vector<Sighting> sightings;
+  for (std::size_t p = 0; p < pieces_[g].labels.size(); ++p) {
+    const CurvePiece& piece = pieces_[g].graph.pieces[p];
+    const int family = graphs_[g].curves[static_cast<std::size_t>(piece.curve)].family;
+    for (std::size_t k = 0; k < pieces_[g].labels[p].size(); ++k) {
+      const PieceLabel& label = pieces_[g].labels[p][k];
+      const auto point = [&](const Eigen::Vector2f& at) -> Vec3 {
+        const Eigen::Vector3f ray = at.homogeneous();
+        return world_from_camera * (ray / label.q.dot(ray)).cast<double>().eval();
+      };
+      const Vec3 here = point(piece.middle);
+      const Vec3 next = point(piece.middle + ahead * piece.tangent);
+      for (const std::size_t o : others) {
+        const Camera& other = rig_.camera(graphs_[o].camera);
+        const auto a = other.project(here);
+        if (!a || !other.contains(*a)) continue;
+        const auto b = other.project(next);
+        if (!b) continue;
+        const Eigen::Vector2f tangent = (*b - *a).cast<float>().normalized();
+        Sighting sighting{static_cast<int>(p), static_cast<int>(k), static_cast<int>(o), -1, -1};
+        if (static_cast<std::size_t>(family) < views[o].size()) {
+          sighting.hit =
+              find(views[o][static_cast<std::size_t>(family)], a->cast<float>(), tangent);
+        }
+        if (sighting.hit >= 0) {
+          const auto& their = pieces_[o].labels[static_cast<std::size_t>(sighting.hit)];
+          for (std::size_t j = 0; j < their.size(); ++j) {
+            if (their[j].pattern == label.pattern && their[j].line == label.line)
+              sighting.same = static_cast<int>(j);
+          }
+        }
+        sightings.push_back(sighting);
+      }
+    }
+  }
+  return sightings;
+}
+
+std::vector<std::vector<float>> OtherViews::costs(std::size_t g,
+                                                  std::span<const PieceBeliefs> beliefs) const {
+  // A true label is hit where the other camera sees it (about 0.6) or by chance; a wrong one by
+  // chance only.
+  constexpr float kHitIfTrue = 0.7F;
+  constexpr float kHitByChance = 0.2F;
+  constexpr float kSameIfTrue = 0.85F;
+  constexpr float kSameByChance = 0.03F;
+  const float miss = -std::log((1 - kHitIfTrue) / (1 - kHitByChance));
+  const float unknown_hit = -std::log(kHitIfTrue / kHitByChance);
+  std::vector<std::vector<float>> result;
+  for (const auto& labels : pieces_[g].labels) result.emplace_back(labels.size(), 0.F);
+  for (const Sighting& s : sightings_[g]) {
+    float& cost = result[static_cast<std::size_t>(s.piece)][static_cast<std::size_t>(s.label)];
+    const PieceBeliefs& their = beliefs[static_cast<std::size_t>(s.graph)];
+    if (s.hit < 0) {
+      cost += miss;
+    } else if (their.empty()) {
+      cost += unknown_hit;
+    } else {
+      const float same =
+          s.same < 0 ? 0.F
+                     : their[static_cast<std::size_t>(s.hit)][static_cast<std::size_t>(s.same)];
+      cost -= std::log(same * kSameIfTrue / kSameByChance +
+                       (1 - same) * (1 - kSameIfTrue) / (1 - kSameByChance));
+    }
+  }
+  return result;
+}
+
+}  // namespace pencilscan

@@ -1,0 +1,60 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "pencilscan/joint/piece_labels.h"
+#include "pencilscan/view/cell_index.h"
+
+namespace pencilscan {
+
+/// What the other cameras say of the labels of one: a true label puts the piece where another
+/// camera, if nothing is in its way, sees a curve of the same family, direction and line.
+class OtherViews {
+ public:
+  OtherViews(const Rig& rig, std::span<const GridGraph> graphs,
+             std::span<const LabelledPieces> pieces);
+
+  /// Cost of every label of every piece of graphs[g]; `beliefs` per graph, empty at first, when
+  /// only places and directions count.
+  [[nodiscard]] std::vector<std::vector<float>> costs(std::size_t g,
+                                                      std::span<const PieceBeliefs> beliefs) const;
+
+ private:
+  /// A label of a piece, seen from another camera.
+  struct Sighting {
+    int piece = 0;
+    int label = 0;
+    int graph = 0;  ///< of the other camera
+    int hit = -1;   ///< piece there; -1: nothing where it should be
+    int same = -1;  ///< its label with the same line; -1: it has none
+  };
+
+  struct Entry {
+    Eigen::Vector2f position;
+    Eigen::Vector2f tangent;
+    int piece;
+  };
+  /// Curve points of one camera and family, by place.
+  struct FamilyView {
+    CellIndex index;
+    std::vector<Entry> entries;  ///< in the index's order
+  };
+  using View = std::vector<FamilyView>;
+  static constexpr int kCellPx = 2;
+
+  /// The piece nearest to a place, of this direction; -1: none.
+  [[nodiscard]] static int find(const FamilyView& view, const Eigen::Vector2f& position,
+                                const Eigen::Vector2f& tangent);
+
+  [[nodiscard]] View make_view(std::size_t g) const;
+  [[nodiscard]] std::vector<Sighting> look_from_others(std::size_t g,
+                                                       std::span<const View> views) const;
+
+  const Rig& rig_;
+  std::span<const GridGraph> graphs_;
+  std::span<const LabelledPieces> pieces_;
+  std::vector<std::vector<Sighting>> sightings_;  ///< per graph
+};
+
+}  // namespace pencilscan

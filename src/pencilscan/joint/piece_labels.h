@@ -1,0 +1,80 @@
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <span>
+#include <vector>
+
+#include "pencilscan/joint/curve_pieces.h"
+#include "pencilscan/joint/joint_options.h"
+#include "pencilscan/joint/line_sheets.h"
+#include "pencilscan/labeling/labeling.h"
+
+namespace pencilscan {
+
+/// A line that a piece may show.
+struct PieceLabel {
+  PatternRef pattern;
+  int line = 0;
+  Eigen::Vector3f q = Eigen::Vector3f::Zero();  ///< inverse depth = q . (x, y, 1)
+  float inverse_depth_per_px = 0;               ///< per projector px across the line
+  float cost = 0;                               ///< negative log-likelihood without other pieces
+};
+
+/// The pieces of one camera with their possible labels.
+struct LabelledPieces {
+  PieceGraph graph;
+  std::vector<std::vector<PieceLabel>> labels;  ///< per piece, without "outlier"
+  float inverse_depth_range = 1;                ///< of the volume
+  std::vector<Eigen::Vector3f> lights;          ///< per projector: its centre in the camera's frame
+};
+
+/// Probability of each label of each piece of one camera; what is missing to 1 is "no line".
+using PieceBeliefs = std::vector<std::vector<float>>;
+
+/// All lines of the piece's family whose depth lies in the volume, with the cost of the piece's
+/// colours and of the slant that the line would give the surface; then those that its crossings
+/// support best (options.max_labels).
+[[nodiscard]] LabelledPieces possible_labels(const Rig& rig,
+                                             const std::vector<ColorFamily>& families,
+                                             const GridGraph& graph, const JointOptions& options);
+
+/// Energy of two crossing pieces having these labels: both give the crossing a depth, which agree
+/// for the true ones, and the surface through both curves faces both projectors. The negative
+/// logarithm of its likelihood against depths at random. Keeps a reference to `pieces`.
+class CrossingCost {
+ public:
+  CrossingCost(const LabelledPieces& pieces, const JointOptions& options);
+
+  [[nodiscard]] float operator()(const PieceLabel& a, const PieceLabel& b,
+                                 const PieceCrossing& crossing) const {
+    constexpr float kFarthest2 = 36;  // squared standard deviations; beyond, nothing is left
+    if (a.pattern == b.pattern) return disagreement_;  // lines of one pattern do not cross
+    const Eigen::Vector3f q = a.q - b.q;
+    const float r = q.dot(crossing.position.homogeneous());
+    const float s2 = projection2_ * (a.inverse_depth_per_px * a.inverse_depth_per_px +
+                                     b.inverse_depth_per_px * b.inverse_depth_per_px) +
+                     crossing.sigma * crossing.sigma * q.head<2>().squaredNorm();
+    if (r * r > kFarthest2 * s2) return disagreement_;
+    const float right = density_ / std::sqrt(s2) * std::exp(-0.5F * r * r / s2);
+    return -std::log(wrong_ + right * lit_share(a, b, crossing));
+  }
+  /// No cost of labels with at least these inverse depths per projector px is lower.
+  [[nodiscard]] float lowest(float a_per_px, float b_per_px) const {
+    const float s2 = projection2_ * (a_per_px * a_per_px + b_per_px * b_per_px);
+    return std::min(disagreement_, -std::log(wrong_ + density_ / std::sqrt(s2)));
+  }
+
+ private:
+  /// Probability that both projectors light the side of the surface that the camera sees.
+  [[nodiscard]] float lit_share(const PieceLabel& a, const PieceLabel& b,
+                                const PieceCrossing& crossing) const;
+
+  const std::vector<Eigen::Vector3f>& lights_;
+  float wrong_;
+  float disagreement_;
+  float projection2_;  ///< variance, squared projector px
+  float density_;      ///< of right depths, at its peak for unit deviation
+};
+
+}  // namespace pencilscan

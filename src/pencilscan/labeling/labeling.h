@@ -1,0 +1,78 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "pencilscan/grid/grid_graph.h"
+
+namespace pencilscan {
+
+/// Which projected line a curve is, according to a solution.
+struct CurveLabel {
+  PatternRef pattern;
+  int line = 0;
+  double plane = 0;      ///< line coordinate that is triangulated
+  float confidence = 0;  ///< 0..1
+};
+
+/// What a solution says of one connected component of one camera.
+struct ComponentReport {
+  int camera = 0;
+  int curves = 0;
+  int crossings = 0;
+  bool solved = false;
+  std::string reason;          ///< why not, in plain words
+  double sigma_min = 0;        ///< smallest singular value of the scaled M, px per line
+  double sigma_second = 0;     ///< the next one
+  double residual_rms_px = 0;  ///< of equations (6), as image distance
+  // Where one degree of freedom is searched (multi-view, single projector):
+  std::vector<double> sweep_s;  ///< lines of the most moving curve
+  std::vector<double> sweep_cost;
+  double best_s = 0;
+  double margin = 0;  ///< second minimum of the cost minus the first
+};
+
+/// A stretch of a curve with one label.
+struct LabeledRun {
+  int curve = 0;
+  int begin = 0;  ///< first point
+  int end = 0;    ///< one past the last
+  CurveLabel label;
+};
+
+enum class UndecidedReason {
+  kNoCrossing,     ///< nothing crosses it, and its surroundings do not decide
+  kAmbiguous,      ///< several lines fit
+  kContradicted,   ///< no line fits its crossings
+  kOutsideVolume,  ///< no line meets its rays in the volume
+};
+
+/// A stretch of a curve that a solution left undecided; a second look may have labelled some of it.
+struct UndecidedRun {
+  int curve = 0;
+  int begin = 0;  ///< first point
+  int end = 0;    ///< one past the last
+  UndecidedReason reason = UndecidedReason::kAmbiguous;
+};
+
+/// Result of a solution over all cameras; curve points in no run are undecided.
+struct Labeling {
+  std::vector<std::vector<LabeledRun>> runs;  ///< per camera, ordered by (curve, begin), disjoint
+  /// Per camera, the likeliest labels of undecided stretches; joint only.
+  std::vector<std::vector<LabeledRun>> tentative;
+  std::vector<ComponentReport> components;           ///< all but joint
+  std::vector<std::vector<UndecidedRun>> undecided;  ///< per camera; joint only
+};
+
+[[nodiscard]] std::size_t labelled_points(std::span<const LabeledRun> runs);
+/// Of all cameras.
+[[nodiscard]] std::size_t labelled_points(const Labeling& labeling);
+
+/// Points of undecided runs that no labelled run holds, per reason (the order of the enum).
+[[nodiscard]] std::array<std::size_t, 4> undecided_points(std::span<const UndecidedRun> undecided,
+                                                          std::span<const LabeledRun> labelled);
+
+}  // namespace pencilscan

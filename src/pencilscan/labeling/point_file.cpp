@@ -1,0 +1,134 @@
+#include "pencilscan/labeling/point_file.h"
+
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include "pencilscan/core/error.h"
+#include "pencilscan/io/file.h"
+#include "pencilscan/io/little_endian.h"
+#include "pencilscan/io/ply.h"
+
+namespace pencilscan {
+namespace {
+
+void append_point(std::string& bytes, const MeasuredPoint& point) {
+  for (const float value : {point.x, point.y, point.z, point.u, point.v}) {
+    append_little_endian(bytes, value);
+  }
+  append_little_endian(bytes, point.camera);
+  append_little_endian(bytes, point.projector);
+  append_little_endian(bytes, point.pattern);
+  append_little_endian(bytes, point.line);
+  for (const float value : {point.sigma, point.confidence, point.plane}) {
+    append_little_endian(bytes, value);
+  }
+}
+
+/// Access to the scalar properties of one vertex element, with the errors of a user's file.
+class Columns {
+ public:
+  Columns(std::string path, const PlyElement& vertices)
+      : path_(std::move(path)), vertices_(vertices) {}
+
+  [[nodiscard]] const std::vector<double>& required(const char* name) const {
+    const auto* values = optional(name);
+    if (values == nullptr)
+      throw InputError(path_, name, "", "the vertices must have this property");
+    return *values;
+  }
+  [[nodiscard]] const std::vector<double>* optional(const char* name) const {
+    const PlyColumn* column = vertices_.find(name);
+    return column != nullptr && !column->is_list ? &column->values : nullptr;
+  }
+  template <class T>
+  [[nodiscard]] T index(const char* name, const std::vector<double>& values, std::size_t i) const {
+    const double value = values[i];
+    if (!(value >= 0) || value > std::numeric_limits<T>::max() || value != std::floor(value)) {
+      throw InputError(
+          path_, field(name, i), std::to_string(value),
+          "must be an integer from 0 to " + std::to_string(std::numeric_limits<T>::max()));
+    }
+    return static_cast<T>(value);
+  }
+  [[nodiscard]] float finite(const char* name, const std::vector<double>& values,
+                             std::size_t i) const {
+    if (!std::isfinite(values[i])) {
+      throw InputError(path_, field(name, i), std::to_string(values[i]), "must be finite");
+    }
+    return static_cast<float>(values[i]);
+  }
+
+ private:
+  static std::string field(const char* name, std::size_t i) {
+    return "vertex[" + std::to_string(i) + "]." + name;
+  }
+  std::string path_;
+  const PlyElement& vertices_;
+};
+
+}  // namespace
+
+void write_points(const std::filesystem::path& path, const std::vector<MeasuredPoint>& points) {
+  write_atomically(path, [&](std::ostream& stream) {
+    stream << "ply\nformat binary_little_endian 1.0\ncomment unit mm, world frame of rig.json\n"
+           << "element vertex " << points.size() << "\n";
+    for (const char* name : {"x", "y", "z", "u", "v"}) stream << "property float " << name << "\n";
+    for (const char* name : {"camera", "projector", "pattern"}) {
+      stream << "property uchar " << name << "\n";
+    }
+    stream << "property ushort line\n";
+    for (const char* name : {"sigma", "confidence", "plane"}) {
+      stream << "property float " << name << "\n";
+    }
+    stream << "end_header\n";
+    std::string bytes;
+    for (const MeasuredPoint& point : points) {
+      append_point(bytes, point);
+      if (bytes.size() > (std::size_t{1} << 16)) {
+        stream << bytes;
+        bytes.clear();
+      }
+    }
+    stream << bytes;
+  });
+}
+
+std::vector<MeasuredPoint> read_points(const std::filesystem::path& path) {
+  const PlyFile file = read_ply(path);
+  const PlyElement* vertices = file.find("vertex");
+  if (vertices == nullptr) throw InputError(path.string(), "", "", "must have an element `vertex`");
+  const Columns columns(path.string(), *vertices);
+  const auto& x = columns.required("x");
+  const auto& y = columns.required("y");
+  const auto& z = columns.required("z");
+  const auto& u = columns.required("u");
+  const auto& v = columns.required("v");
+  const auto& camera = columns.required("camera");
+  const auto& projector = columns.required("projector");
+  const auto& line = columns.required("line");
+  const auto* pattern = columns.optional("pattern");
+  const auto* sigma = columns.optional("sigma");
+  const auto* confidence = columns.optional("confidence");
+  const auto* plane = columns.optional("plane");
+  std::vector<MeasuredPoint> points(vertices->count);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    MeasuredPoint& point = points[i];
+    point.x = columns.finite("x", x, i);
+    point.y = columns.finite("y", y, i);
+    point.z = columns.finite("z", z, i);
+    point.u = columns.finite("u", u, i);
+    point.v = columns.finite("v", v, i);
+    point.camera = columns.index<std::uint8_t>("camera", camera, i);
+    point.projector = columns.index<std::uint8_t>("projector", projector, i);
+    point.line = columns.index<std::uint16_t>("line", line, i);
+    if (pattern != nullptr) point.pattern = columns.index<std::uint8_t>("pattern", *pattern, i);
+    point.sigma = sigma != nullptr ? static_cast<float>((*sigma)[i]) : 0.0F;
+    point.confidence = confidence != nullptr ? static_cast<float>((*confidence)[i]) : 1.0F;
+    point.plane =
+        plane != nullptr ? columns.finite("plane", *plane, i) : static_cast<float>(point.line);
+  }
+  return points;
+}
+
+}  // namespace pencilscan

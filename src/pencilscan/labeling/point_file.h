@@ -1,0 +1,17 @@
+#pragma once
+
+#include <filesystem>
+#include <vector>
+
+#include "pencilscan/labeling/measured_point.h"
+
+namespace pencilscan {
+
+/// Writes points.ply, binary little endian, whole or not at all. The property `pattern` is written
+/// always.
+void write_points(const std::filesystem::path& path, const std::vector<MeasuredPoint>& points);
+/// Reads any points.ply with at least x y z u v camera projector line, in any order and with more
+/// properties; missing sigma, confidence, pattern, plane get 0, 1, 0, line. InputError otherwise.
+[[nodiscard]] std::vector<MeasuredPoint> read_points(const std::filesystem::path& path);
+
+}  // namespace pencilscan

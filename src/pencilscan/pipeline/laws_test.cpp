@@ -1,0 +1,195 @@
+// What must not change a result: the rig's unit, the pictures' gain, the order and the place of the
+// devices; and rigs beyond the usual must not break anything.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <opencv2/core.hpp>
+#include <tuple>
+
+#include "pencilscan/core/median.h"
+#include "pencilscan/geometry/ray_scene.h"
+#include "pencilscan/pipeline/frame.h"
+#include "pencilscan/rig/sample_devices.h"
+#include "pencilscan/simulation/panel_light.h"
+#include "pencilscan/simulation/render.h"
+#include "pencilscan/simulation/simulated_object.h"
+
+namespace pencilscan {
+namespace {
+
+Frame picture(const Rig& rig, const TriangleMesh& mesh) {
+  const SimulatedObject object(mesh);
+  const auto lights = line_lights(rig);
+  Frame frame;
+  frame.name = "000000";
+  for (std::size_t c = 0; c < rig.cameras.size(); ++c)
+    frame.images.push_back(cv::min(render_camera(rig, c, object, lights), 1.0));
+  return frame;
+}
+
+ShapeOptions coarse() {
+  ShapeOptions options;
+  options.surface.max_depth = 5;
+  options.fusion.max_depth = 5;
+  return options;
+}
+
+class Laws : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    rig_ = new Rig(sample::small_rig(480, 360, 110));
+    frame_ = new Frame(picture(*rig_, make_sphere(95, 48)));
+    result_ = new FrameResult(reconstruct_frame(*rig_, *frame_, {}, coarse()));
+  }
+  static void TearDownTestSuite() {
+    delete result_;
+    delete frame_;
+    delete rig_;
+  }
+
+  using Pixel = std::tuple<int, int, long, long>;  // camera, projector, u, v
+  /// Line at each measured pixel.
+  static std::map<Pixel, int> names(const std::vector<MeasuredPoint>& points) {
+    std::map<Pixel, int> lines;
+    for (const MeasuredPoint& p : points)
+      lines[{p.camera, p.projector, std::lround(p.u), std::lround(p.v)}] = p.line;
+    return lines;
+  }
+  /// Share of the points of both that the other one has too, with the same line.
+  static double agreement(const std::vector<MeasuredPoint>& a,
+                          const std::vector<MeasuredPoint>& b) {
+    const auto in_a = names(a);
+    const auto in_b = names(b);
+    std::size_t same = 0;
+    for (const auto& [pixel, line] : in_a) {
+      const auto at = in_b.find(pixel);
+      same += at != in_b.end() && at->second == line ? 1U : 0U;
+    }
+    return static_cast<double>(same) / static_cast<double>(std::max(in_a.size(), in_b.size()));
+  }
+  /// Median distance of the mesh's measured vertices from the ball, mm.
+  static double error(const FrameResult& result, double scale = 1, const Vec3& center = {0, 0, 0}) {
+    std::vector<double> off;
+    for (const Vec3& x : result.shape.surface.measured.vertices)
+      off.push_back(std::abs((x / scale - center).norm() - 95));
+    return upper_median(std::move(off));
+  }
+  static double median_sigma(const FrameResult& result) {
+    std::vector<double> sigmas;
+    for (const float s : result.shape.surface.measured.sigma)
+      sigmas.push_back(static_cast<double>(s));
+    return upper_median(std::move(sigmas));
+  }
+
+  static Rig* rig_;
+  static Frame* frame_;
+  static FrameResult* result_;
+};
+Rig* Laws::rig_ = nullptr;
+Frame* Laws::frame_ = nullptr;
+FrameResult* Laws::result_ = nullptr;
+
+TEST_F(Laws, TheRigsUnitDoesNotMatter) {
+  const double of_mm = error(*result_);
+  ASSERT_LT(of_mm, 0.3);
+  for (const double scale : {0.001, 0.01, 30.0}) {
+    const FrameResult other = reconstruct_frame(scaled(*rig_, scale), *frame_, {}, coarse());
+    EXPECT_GT(agreement(result_->points.points, other.points.points), 0.999) << scale;
+    EXPECT_NEAR(error(other, scale), of_mm, 0.01 * of_mm) << scale;
+    EXPECT_NEAR(median_sigma(other) / scale, median_sigma(*result_), 0.01 * median_sigma(*result_));
+    const SurfaceReport& report = other.shape.surface.report;
+    EXPECT_NEAR(report.spacing_mm / scale, result_->shape.surface.report.spacing_mm, 0.01);
+    EXPECT_EQ(report.edges.boundary + report.edges.non_manifold, 0U) << scale;
+  }
+}
+
+TEST_F(Laws, TheGainDecidesNothing) {
+  Frame darker = *frame_;
+  for (cv::Mat& image : darker.images) image = 0.5 * image;
+  const FrameResult other = reconstruct_frame(*rig_, darker, {}, coarse(), false);
+  const FrameResult same = reconstruct_frame(*rig_, *frame_, {}, coarse(), false);
+  EXPECT_GT(agreement(same.points.points, other.points.points), 0.98);
+}
+
+TEST_F(Laws, TheOrderOfDevicesDoesNotMatter) {
+  Rig turned = *rig_;
+  std::swap(turned.cameras[0], turned.cameras[1]);
+  std::swap(turned.projectors[0], turned.projectors[1]);
+  Frame frame = *frame_;
+  std::swap(frame.images[0], frame.images[1]);
+  FrameResult other = reconstruct_frame(turned, frame, {}, coarse(), false);
+  FrameResult same = reconstruct_frame(*rig_, *frame_, {}, coarse(), false);
+  for (MeasuredPoint& p : other.points.points) {
+    p.camera = static_cast<std::uint8_t>(1 - p.camera);
+    p.projector = static_cast<std::uint8_t>(1 - p.projector);
+  }
+  EXPECT_GT(agreement(same.points.points, other.points.points), 0.97);
+}
+
+TEST_F(Laws, TheWorldMayTurnAndMove) {
+  RigidTransform world;
+  world.rotation = Eigen::AngleAxisd(0.7, Vec3(1, 2, 3).normalized()).toRotationMatrix();
+  world.translation = Vec3(1000, -500, 250);
+  Rig moved = *rig_;
+  const auto move = [&](Device& device) {
+    RigidTransform& pose = device.device_from_world;
+    const Mat3 rotation = pose.rotation * world.rotation.transpose();
+    pose = {rotation, pose.translation - rotation * world.translation};
+  };
+  for (Camera& camera : moved.cameras) move(camera);
+  for (Projector& projector : moved.projectors) move(projector);
+  moved.volume->center = world.translation;
+  const FrameResult other = reconstruct_frame(moved, *frame_, {}, coarse());
+  EXPECT_GT(agreement(result_->points.points, other.points.points), 0.97);
+  EXPECT_NEAR(error(other, 1, world.translation), error(*result_), 0.1 * error(*result_));
+}
+
+TEST_F(Laws, SixteenColorFamiliesAndEightyPatternsBreakNothing) {
+  const std::vector<std::vector<PatternColor>> sets = {{"blue", "cyan"},   {"red", "yellow"},
+                                                       {"green"},          {"blue"},
+                                                       {"cyan"},           {"red"},
+                                                       {"yellow"},         {"magenta"},
+                                                       {"white"},          {"blue", "green"},
+                                                       {"red", "green"},   {"red", "blue"},
+                                                       {"cyan", "white"},  {"yellow", "magenta"},
+                                                       {"green", "white"}, {"magenta", "blue"}};
+  Rig many = sample::small_rig(120, 90, 110);
+  for (Camera& camera : many.cameras) {
+    camera.K(0, 0) = camera.K(1, 1) = 225;
+  }
+  const Frame small = picture(many, make_sphere(95, 48));
+  for (std::size_t k = 2; k < 80; ++k) {
+    Projector& projector = many.projectors[k % 2];
+    LinePattern pattern = projector.patterns.front();
+    pattern.colors = sets[k % sets.size()];
+    pattern.alphabet = static_cast<int>(pattern.colors.size());
+    if (pattern.alphabet == 1) pattern.sequence = {0};
+    pattern.offset_px += static_cast<double>(k) / 10;
+    projector.patterns.push_back(pattern);
+  }
+  try {
+    static_cast<void>(reconstruct_frame(many, small, {}, coarse()));
+  } catch (const NothingFound&) {
+    // The pictures show two of the patterns: nothing need be found, and nothing may break.
+  }
+  // And with sixteen families alone.
+  Rig families = many;
+  for (Projector& projector : families.projectors) projector.patterns.resize(1);
+  for (std::size_t k = 2; k < sets.size(); ++k) {
+    LinePattern pattern = families.projectors[0].patterns.front();
+    pattern.colors = sets[k];
+    pattern.alphabet = static_cast<int>(pattern.colors.size());
+    if (pattern.alphabet == 1) pattern.sequence = {0};
+    families.projectors[k % 2].patterns.push_back(pattern);
+  }
+  EXPECT_EQ(color_families(families).size(), 16U);
+  try {
+    static_cast<void>(reconstruct_frame(families, small, {}, coarse()));
+  } catch (const NothingFound&) {
+  }
+}
+
+}  // namespace
+}  // namespace pencilscan

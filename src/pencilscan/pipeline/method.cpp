@@ -1,0 +1,52 @@
+#include "pencilscan/pipeline/method.h"
+
+#include <algorithm>
+#include <array>
+
+namespace pencilscan {
+
+std::span<const SolutionMethod> solution_methods() {
+  using Families = std::vector<ColorFamily>;
+  using Graphs = std::span<const GridGraph>;
+  // In the order of the alternatives of MethodOptions.
+  static const std::array<SolutionMethod, 4> kMethods = {{
+      {"joint",
+       {.may_be_guided = true, .allows_dense_depth = true, .corrects_rig = true},
+       JointOptions{},
+       [](const Rig& rig, const Families& families, Graphs graphs, const MethodOptions& options) {
+         return solve_joint(rig, families, graphs, std::get<JointOptions>(options));
+       }},
+      {"multiview",
+       {.needs_identities = true},
+       MultiviewOptions{},
+       [](const Rig& rig, const Families&, Graphs graphs, const MethodOptions& options) {
+         return solve_multiview(rig, graphs, std::get<MultiviewOptions>(options));
+       }},
+      {"linear",
+       {.needs_identities = true},
+       LinearOptions{},
+       [](const Rig& rig, const Families&, Graphs graphs, const MethodOptions&) {
+         return solve_linear(rig, graphs);
+       }},
+      {"single-projector",
+       {.needs_identities = true, .needs_grid = true},
+       SingleProjectorOptions{},
+       [](const Rig& rig, const Families&, Graphs graphs, const MethodOptions& options) {
+         return solve_projector_grids(rig, graphs, std::get<SingleProjectorOptions>(options));
+       }},
+  }};
+  return kMethods;
+}
+
+const SolutionMethod& solution_method(const MethodOptions& options) {
+  return solution_methods()[options.index()];
+}
+
+const SolutionMethod* find_method(std::string_view name) {
+  const auto methods = solution_methods();
+  const auto it = std::find_if(methods.begin(), methods.end(),
+                               [name](const SolutionMethod& m) { return m.name == name; });
+  return it == methods.end() ? nullptr : &*it;
+}
+
+}  // namespace pencilscan

@@ -1,0 +1,120 @@
+#include "pencilscan/points/settle.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "pencilscan/core/parallel.h"
+
+namespace pencilscan {
+namespace {
+
+/// What the surface around a point says of it.
+struct Opinion {
+  double depth = 0;  ///< camera z, mm
+  double sigma = 0;  ///< mm along the ray
+};
+
+Opinion opinion_of(const SurfacePatch& patch, const Camera& camera, const Eigen::Vector2f& pixel,
+                   double ray_length, const SettleOptions& options) {
+  const double w = patch.inverse_depth(pixel);
+  const double footprint = 1 / (w * camera.K(0, 0));
+  const double depth_per_footprint = patch.gradient(pixel).norm() / w * camera.K(0, 0);
+  const double model = options.model_px * footprint * (1 + depth_per_footprint) *
+                       std::max(1.0, static_cast<double>(patch.spread));
+  return {1 / w, std::hypot(patch.sigma / w, model) * ray_length};
+}
+
+/// Standard deviation of a settled point, mm along the ray. Neither a point's noise nor a patch's
+/// knows what the quadratic cannot follow, curve ends at depth steps or errors that neighbours
+/// share. So the error grows more slowly than the propagated one (`propagated`), but also with the
+/// disagreement of the points around, where they lie to one side, with the patch's bend and where
+/// point and patch are `deviations` of their own apart. Exponents and scale fitted to the errors of
+/// rendered objects, most of them those of experiments/objects.py.
+double settled_sigma(double propagated, double deviations, const Camera& camera, double footprint,
+                     const SurfacePatch& patch) {
+  constexpr double kScale = 0.43;
+  constexpr double kLeastSpread = 0.3;
+  constexpr double kUsualBend = 0.6;  // footprints over the patch's scale
+  const double bend = static_cast<double>(patch.coefficients.tail<3>().norm()) * camera.K(0, 0);
+  return kScale * footprint * std::pow(propagated / footprint, 0.7) *
+         std::pow(std::max(kLeastSpread, static_cast<double>(patch.spread)), 0.55) *
+         std::exp(1.9 * static_cast<double>(patch.one_sidedness)) *
+         std::pow(1 + bend / kUsualBend, 0.25) * std::pow(1 + deviations * deviations, 0.35);
+}
+
+/// The point settled; nothing if it contradicts its surroundings.
+std::optional<MeasuredPoint> settled(const MeasuredPoint& point, const LocalSurface& surface,
+                                     const Camera& camera, const Vec3& center, const Vec3& forward,
+                                     const SettleOptions& options) {
+  const Eigen::Vector2f pixel(point.u, point.v);
+  const SurfacePatch* patch = surface.nearest(pixel);
+  if (patch == nullptr) {
+    if (point.confidence < static_cast<float>(options.min_alone_confidence)) return std::nullopt;
+    constexpr float kAlone = 1.8F;  // such points lie at depth steps
+    MeasuredPoint result = point;
+    result.sigma *= kAlone;
+    return result;
+  }
+  const Vec3 way = Vec3(point.x, point.y, point.z) - center;
+  const double depth = way.dot(forward);
+  const double ray_length = way.norm() / depth;
+  const Opinion others = opinion_of(*patch, camera, pixel, ray_length, options);
+  const double own2 = static_cast<double>(point.sigma) * point.sigma;
+  const double others2 = others.sigma * others.sigma;
+  const double apart = (others.depth - depth) * ray_length;
+  const double deviations = std::abs(apart) / std::sqrt(own2 + others2);
+  if (deviations > options.max_deviations) return std::nullopt;
+  const double own_share = others2 / (own2 + others2);
+  // Inverse depth is what varies linearly over the image.
+  const double w = 1 / others.depth + own_share * (1 / depth - 1 / others.depth);
+  const Vec3 x = center + way / (depth * w);
+  MeasuredPoint result = point;
+  result.x = static_cast<float>(x.x());
+  result.y = static_cast<float>(x.y());
+  result.z = static_cast<float>(x.z());
+  result.sigma = static_cast<float>(settled_sigma(std::sqrt(own_share * own2), deviations, camera,
+                                                  others.depth / camera.K(0, 0), *patch));
+  if (options.errors_are_shared) result.sigma = std::max(result.sigma, point.sigma);
+  return result;
+}
+
+std::vector<std::vector<MeasuredPoint>> points_by_camera(const Rig& rig,
+                                                         std::span<const MeasuredPoint> points) {
+  std::vector<std::vector<MeasuredPoint>> by_camera(rig.cameras.size());
+  for (const MeasuredPoint& p : points) by_camera[p.camera].push_back(p);
+  return by_camera;
+}
+
+}  // namespace
+
+std::vector<LocalSurface> local_surfaces(const Rig& rig, std::span<const MeasuredPoint> points,
+                                         const LocalSurfaceOptions& options) {
+  std::vector<LocalSurface> surfaces;
+  for (const Camera& camera : rig.cameras) surfaces.emplace_back(camera, options);
+  const auto by_camera = points_by_camera(rig, points);
+  parallel_for(surfaces.size(), [&](std::size_t c) { surfaces[c].add(by_camera[c]); });
+  return surfaces;
+}
+
+std::vector<MeasuredPoint> settle_points(const Rig& rig, std::span<const MeasuredPoint> points,
+                                         std::span<const LocalSurface> surfaces,
+                                         const SettleOptions& options) {
+  auto by_camera = points_by_camera(rig, points);
+  parallel_for(by_camera.size(), [&](std::size_t c) {
+    const Camera& camera = rig.cameras[c];
+    const Vec3 center = camera.center();
+    const Vec3 forward = camera.forward();
+    std::vector<MeasuredPoint> kept;
+    for (const MeasuredPoint& p : by_camera[c]) {
+      if (const auto point = settled(p, surfaces[c], camera, center, forward, options))
+        kept.push_back(*point);
+    }
+    by_camera[c] = std::move(kept);
+  });
+  std::vector<MeasuredPoint> result;
+  for (const auto& part : by_camera) result.insert(result.end(), part.begin(), part.end());
+  return result;
+}
+
+}  // namespace pencilscan

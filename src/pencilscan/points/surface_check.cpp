@@ -1,0 +1,181 @@
+#include "pencilscan/points/surface_check.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <utility>
+
+#include "pencilscan/core/check.h"
+#include "pencilscan/core/chunks.h"
+
+namespace pencilscan {
+namespace {
+
+enum class RayVerdict : char { kKept, kUnseen, kContradicted };
+
+class SurfaceCheck {
+ public:
+  SurfaceCheck(const Rig& rig, const RayScene& surface) : rig_(rig), surface_(surface) {}
+
+  using Hit = std::optional<RayScene::Hit>;
+
+  /// Where a ray meets the surface; nothing where that was not measured.
+  [[nodiscard]] Hit look(const Ray& ray) const {
+    Hit hit = surface_.first_hit(ray);
+    const TriangleMesh& mesh = surface_.mesh();
+    if (hit && std::any_of(mesh.faces[hit->face].begin(), mesh.faces[hit->face].end(), [&](int v) {
+          return !(mesh.confidence[static_cast<std::size_t>(v)] > 0);
+        }))
+      hit.reset();
+    return hit;
+  }
+
+  /// `hit`: where the ray through the pixel meets the surface.
+  [[nodiscard]] bool contradicts(const Camera& camera, const Vec2& pixel, PatternRef pattern,
+                                 int line, const Hit& hit) const {
+    RayVerdict verdict = verdict_of(hit, pattern, line);
+    bool is_seen = verdict == RayVerdict::kContradicted;
+    for (const Vec2& beside : {Vec2(1, 0), Vec2(-1, 0), Vec2(0, 1), Vec2(0, -1)}) {
+      if (verdict == RayVerdict::kKept) return false;
+      verdict = verdict_of(look(camera.ray(pixel + beside)), pattern, line);
+      is_seen = is_seen || verdict == RayVerdict::kContradicted;
+    }
+    return is_seen && verdict != RayVerdict::kKept;
+  }
+
+ private:
+  [[nodiscard]] RayVerdict verdict_of(const Hit& hit, PatternRef ref, int line) const {
+    constexpr double kSameLine = 0.5;
+    if (!hit) return RayVerdict::kUnseen;
+    const Projector& projector = rig_.projector(ref.projector);
+    const LinePattern& pattern = rig_.pattern(ref);
+    const auto place = projector.project(hit->point);
+    if (!place) return RayVerdict::kContradicted;
+    const double there = pattern.coordinate((*place)[static_cast<Eigen::Index>(pattern.axis)]);
+    return std::abs(there - line) <= kSameLine && may_be_lit(*hit, projector)
+               ? RayVerdict::kKept
+               : RayVerdict::kContradicted;
+  }
+
+  /// False where the surface turns away from the projector, or measured surface stands in its
+  /// light.
+  [[nodiscard]] bool may_be_lit(const RayScene::Hit& hit, const Projector& projector) const {
+    constexpr double kTurnedAway = -0.1;  // cosine; the mesh's own slope errs by some degrees
+    constexpr double kOff = 3;            // footprints that roughness and errors of the mesh take
+    const Vec3 to_light = (projector.center() - hit.point).normalized();
+    const Vec3 normal = face_normal(surface_.mesh(), hit.face);
+    if (normal.dot(to_light) < kTurnedAway) return false;
+    return !look(Ray{hit.point + kOff * (normal + to_light), to_light});
+  }
+
+  const Rig& rig_;
+  const RayScene& surface_;
+};
+
+}  // namespace
+
+std::size_t drop_contradicted(const Rig& rig, const RayScene& surface,
+                              std::span<const GridGraph> graphs, Labeling& labeling) {
+  constexpr int kStride = 3;    // points that are judged as one
+  constexpr int kShortest = 4;  // points of a run that are worth keeping
+  const SurfaceCheck check(rig, surface);
+  std::size_t dropped = 0;
+  for (const GridGraph& graph : graphs) {
+    const auto c = static_cast<std::size_t>(graph.camera);
+    const Camera& camera = rig.cameras[c];
+    const std::vector<LabeledRun> runs = std::move(labeling.runs[c]);
+    std::vector<std::vector<LabeledRun>> kept(runs.size());
+    parallel_for(runs.size(), [&](std::size_t k) {
+      const LabeledRun& run = runs[k];
+      const auto& points = graph.curves[static_cast<std::size_t>(run.curve)].points;
+      int begin = run.begin;
+      const auto keep = [&](int end) {
+        if (end - begin >= std::min(kShortest, run.end - run.begin))
+          kept[k].push_back({run.curve, begin, end, run.label});
+      };
+      for (int i = run.begin; i < run.end; i += kStride) {
+        const int end = std::min(i + kStride, run.end);
+        const Vec2 pixel = points[static_cast<std::size_t>((i + end) / 2)].position.cast<double>();
+        if (!check.contradicts(camera, pixel, run.label.pattern, run.label.line,
+                               check.look(camera.ray(pixel))))
+          continue;
+        keep(i);
+        begin = end;
+      }
+      keep(run.end);
+    });
+    labeling.runs[c].clear();
+    for (std::size_t k = 0; k < runs.size(); ++k) {
+      int at = runs[k].begin;
+      const auto undecided_until = [&](int end) {
+        if (end <= at) return;
+        dropped += static_cast<std::size_t>(end - at);
+        labeling.undecided[c].push_back({runs[k].curve, at, end, UndecidedReason::kContradicted});
+      };
+      for (const LabeledRun& run : kept[k]) {
+        undecided_until(run.begin);
+        at = run.end;
+        labeling.runs[c].push_back(run);
+      }
+      undecided_until(runs[k].end);
+    }
+  }
+  return dropped;
+}
+
+SettledPoints settle_on_surface(const Rig& rig, const RayScene& surface,
+                                std::span<const MeasuredPoint> points) {
+  constexpr double kFarthest = 4;  // deviations of the difference
+  constexpr double kLeastCosine = 0.2;
+  // Shares of what the surface says and of its difference from the point: on rendered bunnies, a
+  // statue, a hand and a knot errors are then as large as they should be. So they are for points
+  // that stay where they were, which are the odd ones.
+  constexpr double kOfSurface = 0.95;
+  constexpr double kOfDifference = 0.2;
+  constexpr double kOffSurface = 1.5;
+  const TriangleMesh& mesh = surface.mesh();
+  PENCILSCAN_CHECK(mesh.sigma.size() == mesh.vertices.size() &&
+                   mesh.confidence.size() == mesh.vertices.size());
+  const SurfaceCheck check(rig, surface);
+  SettledPoints settled;
+  settled.points.assign(points.begin(), points.end());
+  settled.on_surface.assign(points.size(), 0);
+  std::vector<char> keep(points.size(), 1);
+  parallel_chunks(points.size(), [&](std::size_t i) {
+    MeasuredPoint& p = settled.points[i];
+    const Camera& camera = rig.cameras[p.camera];
+    const Vec2 pixel(static_cast<double>(p.u), static_cast<double>(p.v));
+    const Ray ray = camera.ray(pixel);
+    const auto hit = check.look(ray);
+    if (check.contradicts(camera, pixel, {p.projector, p.pattern}, p.line, hit)) keep[i] = 0;
+    p.sigma *= static_cast<float>(kOffSurface);
+    if (!hit) return;
+    double across = 0;
+    for (std::size_t k = 0; k < 3; ++k)
+      across += hit->barycentric[static_cast<Eigen::Index>(k)] *
+                static_cast<double>(mesh.sigma[static_cast<std::size_t>(mesh.faces[hit->face][k])]);
+    const double cosine = -face_normal(mesh, hit->face).dot(ray.direction);
+    const double of_surface = across / std::max(cosine, kLeastCosine);
+    const double of_point = static_cast<double>(points[i].sigma);
+    const Vec3 x(static_cast<double>(p.x), static_cast<double>(p.y), static_cast<double>(p.z));
+    const double difference = hit->distance - (x - ray.origin).dot(ray.direction);
+    if (std::abs(difference) > kFarthest * std::hypot(of_surface, of_point)) return;
+    settled.on_surface[i] = 1;
+    p.x = static_cast<float>(hit->point.x());
+    p.y = static_cast<float>(hit->point.y());
+    p.z = static_cast<float>(hit->point.z());
+    p.sigma = static_cast<float>(std::hypot(kOfSurface * of_surface, kOfDifference * difference));
+  });
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < keep.size(); ++i) {
+    if (keep[i] == 0) continue;
+    settled.points[count] = settled.points[i];
+    settled.on_surface[count++] = settled.on_surface[i];
+  }
+  settled.contradicted = keep.size() - count;
+  settled.points.resize(count);
+  settled.on_surface.resize(count);
+  return settled;
+}
+
+}  // namespace pencilscan

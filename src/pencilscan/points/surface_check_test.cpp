@@ -1,0 +1,113 @@
+#include "pencilscan/points/surface_check.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "pencilscan/core/median.h"
+#include "pencilscan/labeling/two_projector_scene.h"
+#include "pencilscan/points/triangulate.h"
+
+namespace pencilscan {
+namespace {
+
+/// The scene's surface as a measured mesh, and one camera's curves with true labels.
+class SurfaceCheckTest : public testing::Test, protected TwoProjectorScene {
+ protected:
+  SurfaceCheckTest() : graph_(graph(0, 50, 0.1, 3)) {
+    constexpr int kSide = 161;
+    constexpr double kStep = 0.75;  // mm
+    for (int row = 0; row < kSide; ++row) {
+      for (int column = 0; column < kSide; ++column)
+        mesh_.vertices.push_back(surface((column - kSide / 2) * kStep, (row - kSide / 2) * kStep));
+    }
+    for (int row = 0; row + 1 < kSide; ++row) {
+      for (int column = 0; column + 1 < kSide; ++column) {
+        const int v = row * kSide + column;
+        mesh_.faces.push_back({v, v + 1, v + kSide});
+        mesh_.faces.push_back({v + 1, v + kSide + 1, v + kSide});
+      }
+    }
+    mesh_.sigma.assign(mesh_.vertices.size(), 0.02F);
+    mesh_.confidence.assign(mesh_.vertices.size(), 1.F);
+    labeling_.runs.resize(2);
+    labeling_.undecided.resize(2);
+    for (std::size_t k = 0; k < graph_.curves.size(); ++k) {
+      const int line = true_lines[0][k];
+      labeling_.runs[0].push_back({static_cast<int>(k), 0,
+                                   static_cast<int>(graph_.curves[k].points.size()),
+                                   CurveLabel{{graph_.curves[k].family, 0}, line, 1.0 * line, 1}});
+    }
+  }
+  std::vector<MeasuredPoint> points() const { return triangulate(rig, {&graph_, 1}, labeling_); }
+  std::size_t drop() { return drop_contradicted(rig, RayScene(mesh_), {&graph_, 1}, labeling_); }
+  static double error(const MeasuredPoint& p) {
+    return std::abs(static_cast<double>(p.x) - surface(p.y, p.z).x());
+  }
+  /// Gives a curve its neighbour's line.
+  void name_wrongly(std::size_t curve) {
+    CurveLabel& label = labeling_.runs[0][curve].label;
+    ++label.line;
+    label.plane = label.line;
+  }
+
+  GridGraph graph_;
+  TriangleMesh mesh_;
+  Labeling labeling_;
+};
+
+TEST_F(SurfaceCheckTest, LabelsThatTheSurfaceContradictsGoAndTheOthersStay) {
+  const std::size_t all = labelled_points(labeling_);
+  EXPECT_EQ(drop(), 0U);
+  EXPECT_EQ(labelled_points(labeling_), all);
+
+  const std::size_t wrong = graph_.curves.size() / 3;
+  name_wrongly(wrong);
+  const std::size_t points_of_wrong = graph_.curves[wrong].points.size();
+  EXPECT_EQ(drop(), points_of_wrong);
+  EXPECT_EQ(labelled_points(labeling_), all - points_of_wrong);
+  EXPECT_TRUE(
+      std::none_of(labeling_.runs[0].begin(), labeling_.runs[0].end(),
+                   [&](const LabeledRun& run) { return run.curve == static_cast<int>(wrong); }));
+  EXPECT_EQ(undecided_points(labeling_.undecided[0], labeling_.runs[0])[2], points_of_wrong);
+}
+
+TEST_F(SurfaceCheckTest, WhatWasNotMeasuredContradictsNothing) {
+  name_wrongly(graph_.curves.size() / 3);
+  mesh_.confidence.assign(mesh_.vertices.size(), 0.F);
+  EXPECT_EQ(drop(), 0U);
+  const SettledPoints settled = settle_on_surface(rig, RayScene(mesh_), points());
+  EXPECT_EQ(settled.contradicted, 0U);
+  EXPECT_EQ(std::count(settled.on_surface.begin(), settled.on_surface.end(), 1), 0);
+}
+
+TEST_F(SurfaceCheckTest, PointsSettleOnTheSurfaceAndTheirSigmaTellsOfTheWayThere) {
+  name_wrongly(graph_.curves.size() / 3);
+  const std::vector<MeasuredPoint> before = points();
+  const SettledPoints settled = settle_on_surface(rig, RayScene(mesh_), before);
+  const auto is_far_off = [](const MeasuredPoint& p) { return error(p) > 1; };
+  EXPECT_GT(std::count_if(before.begin(), before.end(), is_far_off), 100);
+  EXPECT_EQ(std::count_if(settled.points.begin(), settled.points.end(), is_far_off), 0);
+  EXPECT_EQ(settled.contradicted, before.size() - settled.points.size());
+  ASSERT_EQ(settled.on_surface.size(), settled.points.size());
+  std::vector<double> errors;
+  std::size_t moved_far = 0;
+  for (std::size_t i = 0, j = 0; i < settled.points.size(); ++i, ++j) {
+    while (before[j].u != settled.points[i].u || before[j].v != settled.points[i].v) ++j;
+    if (settled.on_surface[i] == 0) continue;
+    errors.push_back(error(settled.points[i]));
+    const double way =
+        std::hypot(before[j].x - settled.points[i].x, before[j].y - settled.points[i].y,
+                   before[j].z - settled.points[i].z);
+    EXPECT_GE(settled.points[i].sigma, 0.19 * way);
+    EXPECT_GE(settled.points[i].sigma, 0.94F * 0.02F);
+    moved_far += way > 0.05 ? 1 : 0;
+  }
+  EXPECT_GT(errors.size(), before.size() / 2);
+  EXPECT_GT(moved_far, 20U) << "the noise of the curves ought to be seen";
+  EXPECT_LT(upper_median(std::move(errors)), 0.01);
+}
+
+}  // namespace
+}  // namespace pencilscan

@@ -1,0 +1,132 @@
+#include "pencilscan/points/triangulate.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <tuple>
+#include <utility>
+
+#include "pencilscan/core/parallel.h"
+
+namespace pencilscan {
+namespace {
+
+/// d(line coordinate, projector px)/d(camera px across the curve) at equal depth, lens distortion
+/// neglected. `x`: the point in the camera frame.
+double coordinate_per_pixel(const Camera& camera, const Projector& projector,
+                            const RigidTransform& projector_from_camera, Axis axis,
+                            const Eigen::Vector2f& normal, const Vec3& x) {
+  const Vec3 moved(x.z() * normal.x() / camera.K(0, 0), x.z() * normal.y() / camera.K(1, 1), 0);
+  const Vec3 h = projector_from_camera * x;
+  const Vec3 dh = projector_from_camera.rotation * moved;
+  const Vec2 change = (dh.head<2>() - h.head<2>() * (dh.z() / h.z())) / h.z();
+  return std::abs(projector.K.row(static_cast<Eigen::Index>(axis)).head<2>().dot(change));
+}
+
+/// std::hypot for numbers whose squares neither over- nor underflow.
+double root_of_squares(double a, double b) { return std::sqrt(a * a + b * b); }
+
+/// Standard deviation of a curve point across the curve, px.
+double position_sigma(const Curve& curve, int i, const TriangulationOptions& options) {
+  const int from_end = std::min(i, static_cast<int>(curve.points.size()) - 1 - i);
+  const double end = options.end_sigma_px * std::exp(-from_end / options.end_reach);
+  return root_of_squares(
+      options.position_factor * curve.points[static_cast<std::size_t>(i)].sigma_px, end);
+}
+
+void add_run(const Rig& rig, const GridGraph& graph, const LabeledRun& run, const Sphere& volume,
+             const TriangulationOptions& options, std::vector<MeasuredPoint>& points) {
+  const Camera& camera = rig.camera(graph.camera);
+  const Curve& curve = graph.curves[static_cast<std::size_t>(run.curve)];
+  const CurveLabel& label = run.label;
+  const Projector& projector = rig.projector(label.pattern.projector);
+  const LinePattern& pattern = rig.pattern(label.pattern);
+  const RigidTransform world_from_camera = camera.device_from_world.inverse();
+  const RigidTransform projector_from_camera = projector.device_from_world * world_from_camera;
+  const double coordinate = pattern.position_px(label.plane);
+  for (int i = run.begin; i < run.end; ++i) {
+    const CurvePoint& p = curve.points[static_cast<std::size_t>(i)];
+    const Vec2 pixel = p.position.cast<double>();
+    const Vec3 direction = camera.normalized_from_pixel(pixel).homogeneous();
+    const RayInProjector ray(projector_from_camera, projector, direction.head<2>());
+    const auto depth = ray.depth(coordinate, pattern.axis);
+    if (!depth) continue;
+    const Vec3 x_in_camera = *depth * direction;
+    const Vec3 x = world_from_camera * x_in_camera;
+    if ((x - volume.center).norm() > options.volume_margin * volume.radius) continue;
+    const double slope = std::abs(ray.slope(*depth, pattern.axis));
+    const double gain = coordinate_per_pixel(camera, projector, projector_from_camera, pattern.axis,
+                                             p.normal, x_in_camera);
+    const double position = position_sigma(curve, i, options);
+    const double sigma_px = root_of_squares(gain * position, options.projection_sigma_px);
+    const double footprint = options.footprint_sigma_px * *depth / camera.K(0, 0);
+    const double ray_length = direction.norm();
+    MeasuredPoint point;
+    point.x = static_cast<float>(x.x());
+    point.y = static_cast<float>(x.y());
+    point.z = static_cast<float>(x.z());
+    point.u = p.position.x();
+    point.v = p.position.y();
+    point.camera = static_cast<std::uint8_t>(graph.camera);
+    point.projector = static_cast<std::uint8_t>(label.pattern.projector);
+    point.pattern = static_cast<std::uint8_t>(label.pattern.pattern);
+    point.line = static_cast<std::uint16_t>(label.line);
+    point.sigma = static_cast<float>(root_of_squares(sigma_px / std::max(1e-6, slope), footprint) *
+                                     ray_length);
+    point.confidence = label.confidence;
+    point.plane = static_cast<float>(label.plane);
+    points.push_back(point);
+  }
+}
+
+/// Of one camera's points.
+void keep_one_per_pixel(std::vector<MeasuredPoint>& points) {
+  struct Place {
+    std::uint64_t key;  ///< projector, pattern, line, row, column
+    std::uint32_t point;
+  };
+  const auto bits = [](float pixel) {
+    constexpr float kMargin = 1024;  // curves may leave the image a little
+    return static_cast<std::uint64_t>(std::clamp(pixel + kMargin + 0.5F, 0.F, 65535.F));
+  };
+  std::vector<Place> places;
+  places.reserve(points.size());
+  for (std::uint32_t i = 0; i < points.size(); ++i) {
+    const MeasuredPoint& p = points[i];
+    const std::uint64_t line =
+        std::uint64_t{p.projector} << 24 | std::uint64_t{p.pattern} << 16 | std::uint64_t{p.line};
+    places.push_back({line << 32 | bits(p.v) << 16 | bits(p.u), i});
+  }
+  std::sort(places.begin(), places.end(), [&](const Place& a, const Place& b) {
+    if (a.key != b.key) return a.key < b.key;
+    const MeasuredPoint& p = points[a.point];
+    const MeasuredPoint& q = points[b.point];
+    return std::tie(p.sigma, p.u, p.v) < std::tie(q.sigma, q.u, q.v);
+  });
+  std::vector<MeasuredPoint> kept;
+  kept.reserve(points.size());
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    if (i == 0 || places[i].key != places[i - 1].key) kept.push_back(points[places[i].point]);
+  }
+  points = std::move(kept);
+}
+
+}  // namespace
+
+std::vector<MeasuredPoint> triangulate(const Rig& rig, std::span<const GridGraph> graphs,
+                                       const Labeling& labeling,
+                                       const TriangulationOptions& options) {
+  const Sphere volume = working_volume(rig);
+  std::vector<std::vector<MeasuredPoint>> per_camera(graphs.size());
+  parallel_for(graphs.size(), [&](std::size_t g) {
+    for (const LabeledRun& run : labeling.runs[static_cast<std::size_t>(graphs[g].camera)]) {
+      add_run(rig, graphs[g], run, volume, options, per_camera[g]);
+    }
+    keep_one_per_pixel(per_camera[g]);
+  });
+  std::vector<MeasuredPoint> points;
+  for (const auto& part : per_camera) points.insert(points.end(), part.begin(), part.end());
+  return points;
+}
+
+}  // namespace pencilscan

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "pencilscan/labeling/labeling.h"
+#include "pencilscan/labeling/measured_point.h"
+
+namespace pencilscan {
+
+struct TriangulationOptions {
+  double volume_margin = 1.1;         ///< points farther out than this many radii are dropped
+  double projection_sigma_px = 0.03;  ///< error of the projector model across the line
+  // What the profile fit cannot see; measured on rendered bunny, hand and balls (the "sigma"
+  // figures of `evaluate`).
+  double position_factor = 2.2;     ///< real over fitted deviation: errors are alike along a curve
+  double end_sigma_px = 0.5;        ///< more at the end of a curve, where its profile is cut ...
+  double end_reach = 4;             ///< ... fading over so many points
+  double footprint_sigma_px = 0.1;  ///< of the surface within a pixel, in pixel footprints
+};
+
+/// Camera ray meets light sheet, for every pixel of every labelled curve. sigma: position noise,
+/// projector error and the footprint of a pixel, carried along the ray by the slope of the line
+/// coordinate. At most one point per (camera, projector, pattern, line, pixel): the most certain
+/// one.
+[[nodiscard]] std::vector<MeasuredPoint> triangulate(const Rig& rig,
+                                                     std::span<const GridGraph> graphs,
+                                                     const Labeling& labeling,
+                                                     const TriangulationOptions& options = {});
+
+}  // namespace pencilscan

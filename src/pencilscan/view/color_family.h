@@ -1,0 +1,30 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "pencilscan/rig/rig.h"
+
+namespace pencilscan {
+
+/// All patterns drawn with one set of colours. One family = one ridge image: `presence` weighs
+/// unmixed projector red, green, blue so that each of its colours gives 1 and those of the other
+/// families give 0 (blue/cyan against red/yellow: the blue channel).
+struct ColorFamily {
+  std::vector<PatternColor> colors;
+  std::vector<PatternRef> patterns;
+  Vec3 presence = Vec3::Zero();
+  double leakage = 0;  ///< largest |presence . colour of another family|; 0: separable
+
+  /// Index in `colors` of each symbol of a pattern's alphabet.
+  [[nodiscard]] std::vector<int> color_of_symbol(const LinePattern& pattern) const;
+};
+
+[[nodiscard]] std::vector<ColorFamily> color_families(const Rig& rig);
+
+/// The rig with every pattern where the projector's model has the colours by which its lines are
+/// found (presence), so that color_registration of projectors is spent: twice is as once. Lines of
+/// one pattern that different colours show get the mean over the pattern's colours.
+[[nodiscard]] Rig with_registered_patterns(Rig rig);
+
+}  // namespace pencilscan
