@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
 #include <filesystem>
 #include <set>
@@ -217,9 +218,14 @@ TEST_F(GigE, LostPacketsAreNamed) {
   const auto live = open_all();
   const RecordReport report = record_frames(*live, 12);
   EXPECT_LT(report.whole, 12U);
-  ASSERT_FALSE(report.faults.empty());
-  EXPECT_EQ(report.faults[0].kind, "lost_packets");
-  for (const Fault& fault : report.faults) EXPECT_EQ(fault.device, "cam1") << fault;
+  // A busy machine may add faults of other kinds, also of the other camera.
+  std::size_t lost = 0;
+  for (const Fault& fault : report.faults) {
+    if (fault.kind != "lost_packets") continue;
+    ++lost;
+    EXPECT_EQ(fault.device, "cam1") << fault;
+  }
+  EXPECT_GT(lost, 0U);
 }
 
 TEST_F(GigE, APulledCableIsNamed) {
@@ -235,9 +241,9 @@ TEST_F(GigE, APulledCableIsNamed) {
         if (so_far.frames >= 5 && cameras_.size() == 2) cameras_.pop_back();
         return true;
       });
-  ASSERT_FALSE(report.faults.empty());
-  EXPECT_EQ(report.faults[0].kind, "dead");
-  EXPECT_EQ(report.faults[0].device, "cam1");
+  EXPECT_TRUE(std::any_of(report.faults.begin(), report.faults.end(), [](const Fault& fault) {
+    return fault.kind == "dead" && fault.device == "cam1";
+  }));
   EXPECT_LT(report.whole, report.frames);
 }
 
