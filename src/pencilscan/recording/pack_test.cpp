@@ -26,7 +26,7 @@ class Pack : public ::testing::Test {
   TemporaryFolder temporary_{::testing::UnitTest::GetInstance()->current_test_info()->name()};
 };
 
-bool same(const cv::Mat& a, const cv::Mat& b) {
+bool equal_pixels(const cv::Mat& a, const cv::Mat& b) {
   return a.size() == b.size() && a.type() == b.type() && cv::norm(a, b, cv::NORM_INF) == 0;
 }
 
@@ -51,7 +51,8 @@ TEST_F(Pack, FoldersComeBackAsTheyWere) {
   EXPECT_EQ(unpack_recording(recording, sets, again).pictures, 5U);
   for (const char* file : {"000000/left.png", "000000/right.png", "000002/left.png",
                            "000003/left.png", "000003/right.png"})
-    EXPECT_TRUE(same(read_stored_image(frames() / file), read_stored_image(again / file))) << file;
+    EXPECT_TRUE(equal_pixels(read_stored_image(frames() / file), read_stored_image(again / file)))
+        << file;
   EXPECT_FALSE(fs::exists(again / "000002" / "right.png"));
   EXPECT_TRUE(fs::exists(again / "timestamps.csv"));
 }
