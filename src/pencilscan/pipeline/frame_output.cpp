@@ -8,6 +8,7 @@
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/report/overlay.h"
 #include "pencilscan/report/pictures.h"
+#include "pencilscan/rig/camera_light.h"
 
 namespace pencilscan {
 namespace {
@@ -217,10 +218,13 @@ void write_frame_pictures(const std::filesystem::path& folder, const Rig& rig, c
     const OverlayKey key = i % 2 == 0 ? OverlayKey::kLocalId : OverlayKey::kProjector;
     OverlayOptions options;
     options.key_name = key == OverlayKey::kLocalId ? "local ID" : "projector";
+    // Raw samples have no colours to draw on.
+    const Camera& camera = rig.cameras[c];
+    const cv::Mat shown = camera.mosaic ? linear_light(camera, frame.images[c]) : frame.images[c];
     overlays[i] = {
         rig.cameras[c].name + (i % 2 == 0 ? "_local_id" : "_projector"),
-        draw_overlay(frame.images[c],
-                     overlay_curves(rig, points.graphs[c], points.labeling.runs[c], key), options)};
+        draw_overlay(shown, overlay_curves(rig, points.graphs[c], points.labeling.runs[c], key),
+                     options)};
   });
   write_pictures(folder, overlays);
   FrameResults results{.rig = rig};
