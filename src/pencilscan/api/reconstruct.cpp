@@ -67,24 +67,17 @@ PointOptions point_options(const Rig& rig, const ReconstructionOptions& options)
                      "must be joint, linear, multiview or single-projector");
   }
   points.method = method->defaults;
-  if (options.multiview_cost != "normalized" && options.multiview_cost != "published") {
+  if (!set_multiview_cost(options.multiview_cost, points.method)) {
     throw InputError("options", "multiview_cost", options.multiview_cost,
                      "must be normalized or published");
-  }
-  if (auto* multiview = std::get_if<MultiviewOptions>(&points.method)) {
-    multiview->cost = options.multiview_cost == "published" ? MultiviewCost::kPublished
-                                                            : MultiviewCost::kNormalized;
   }
   for (std::size_t p = 0; p < rig.projectors.size(); ++p) {
     if (rig.projectors[p].patterns.empty())
       throw InputError("rig", "projectors[" + std::to_string(p) + "].pattern", "",
                        "this key is missing: there is nothing to see of this projector");
   }
-  if (method->capabilities.needs_grid && !shows_grid(rig)) {
-    throw InputError("rig", "projectors", "",
-                     "must hold one with a vertical and a horizontal pattern, which the method "
-                     "single-projector needs");
-  }
+  const std::string_view rule = broken_rule(rig, points.method);
+  if (!rule.empty()) throw InputError("rig", "projectors", "", std::string(rule));
   return points;
 }
 

@@ -1,23 +1,16 @@
 #include "pencilscan/calibration/verdict.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdio>
 
 #include "pencilscan/bundle/bundle_device.h"
 #include "pencilscan/calibration/suspects.h"
+#include "pencilscan/core/formatted.h"
 
 namespace pencilscan {
 namespace {
 
 constexpr int kCells = 4;
-
-std::string formatted(double value, const char* format = "%.2g") {
-  std::array<char, 40> text{};
-  std::snprintf(text.data(), text.size(), format, value);
-  return text.data();
-}
 
 std::string percent(double share) { return formatted(100 * share, "%.3g") + " %"; }
 

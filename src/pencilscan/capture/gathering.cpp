@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 #include "pencilscan/core/check.h"
+#include "pencilscan/core/formatted.h"
 #include "pencilscan/core/median.h"
 
 namespace pencilscan {
@@ -18,12 +18,6 @@ constexpr double kOddDriftPpm = 300;
 constexpr std::size_t kRememberedLosses = 16;
 /// Share of a new difference that a camera's shift takes over: sixteen pictures average the jitter.
 constexpr double kShiftGain = 1.0 / 16;
-
-std::string number_text(double value, const char* format = "%.3g") {
-  char text[32];
-  std::snprintf(text, sizeof text, format, value);
-  return text;
-}
 
 }  // namespace
 
@@ -213,7 +207,7 @@ std::vector<Fault> FrameGathering::faults(std::int64_t now_ns) const {
     if (quiet_s > silence_s)
       add("dead",
           (heard == 0 ? "no picture at all"
-                      : "no picture since " + number_text(quiet_s, "%.1f") + " s"),
+                      : "no picture since " + formatted(quiet_s, "%.1f") + " s"),
           "check its power, its cable, its trigger; other programs that hold it");
     if (tally.incomplete > 0)
       add("lost_packets",
@@ -228,12 +222,12 @@ std::vector<Fault> FrameGathering::faults(std::int64_t now_ns) const {
     if (tally.late > 0)
       add("late",
           std::to_string(tally.late) + " pictures arrived more than " +
-              number_text(options_.patience_s + 1 / options_.rate_hz) + " s after their time",
+              formatted(options_.patience_s + 1 / options_.rate_hz, "%.3g") + " s after their time",
           "a lower frame rate, fewer cameras per network card");
     if (const auto drift = clocks_[c].drift();
         drift && std::abs(drift->ppm) > kOddDriftPpm + 3 * drift->sigma_ppm)
       add("clock",
-          "its clock runs " + number_text(std::abs(drift->ppm) / 1e4) + " % too " +
+          "its clock runs " + formatted(std::abs(drift->ppm) / 1e4, "%.3g") + " % too " +
               (drift->ppm > 0 ? "fast" : "slow") + ", which no crystal does",
           "its time stamps are in other units than it says; update its firmware, or trigger by "
           "wire");
@@ -245,7 +239,7 @@ std::vector<Fault> FrameGathering::faults(std::int64_t now_ns) const {
     if (std::abs(apart) <= period_ns_) continue;
     faults.push_back({"clock", options_.cameras[c],
                       "its clock and that of " + options_.cameras[0] + " are " +
-                          number_text(std::abs(static_cast<double>(apart)) / kNsPerSecond) +
+                          formatted(std::abs(static_cast<double>(apart)) / kNsPerSecond, "%.3g") +
                           " s apart, though PTP is to make them one",
                       "look at PtpStatus of both: one has to be Master, the others Slave"});
   }
@@ -253,8 +247,8 @@ std::vector<Fault> FrameGathering::faults(std::int64_t now_ns) const {
     const Spread all = spread();
     faults.push_back({"spread", "",
                       std::to_string(beyond_) + " of " + std::to_string(all.sets) +
-                          " frames have pictures up to " + number_text(all.largest_ms) +
-                          " ms apart (at most " + number_text(options_.max_spread_ms) +
+                          " frames have pictures up to " + formatted(all.largest_ms, "%.3g") +
+                          " ms apart (at most " + formatted(options_.max_spread_ms, "%.3g") +
                           " ms is asked)",
                       "trigger all cameras by one wire, or by PTP"});
   }

@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
+#include "pencilscan/core/formatted.h"
 #include "pencilscan/core/median.h"
 
 namespace pencilscan {
@@ -28,12 +28,6 @@ constexpr int kLeastBlocks = 60;
 constexpr float kMoved = 0.15F;
 constexpr double kMovedShare = 0.02;
 constexpr double kLampChange = 0.1;
-
-std::string percent_text(double share) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.2g %%", 100 * share);
-  return text;
-}
 
 }  // namespace
 
@@ -97,7 +91,7 @@ std::string pair_trouble(const cv::Mat& pattern, const cv::Mat& inverse, const L
   if (within < kLeastBlocks) return {};
   const double share = static_cast<double>(wrong) / within;
   if (share <= kWrongShare) return {};
-  return percent_text(share) +
+  return formatted(100 * share, "%.2g %%") +
          " of what it lights is alike in a pattern and its inverse: one of them came late, or "
          "something moved";
 }
@@ -112,14 +106,14 @@ std::string white_again_trouble(const cv::Mat& white, const cv::Mat& again, cons
   if (static_cast<int>(ratios.size()) < kLeastBlocks) return {};
   const double change = upper_median(ratios);
   if (std::abs(change) > kLampChange)
-    return "the projector's white changed by " + percent_text(change) +
+    return "the projector's white changed by " + formatted(100 * change, "%.2g %%") +
            " during the capture: its lamp warms up, or an automatic exposure is on";
   const auto moved = std::count_if(ratios.begin(), ratios.end(), [&](float ratio) {
     return std::abs(ratio - static_cast<float>(change)) > kMoved;
   });
   const double share = static_cast<double>(moved) / static_cast<double>(ratios.size());
   if (share <= kMovedShare) return {};
-  return percent_text(share) +
+  return formatted(100 * share, "%.2g %%") +
          " of what is lit changed from the first to the last picture: the object or the camera "
          "moved";
 }

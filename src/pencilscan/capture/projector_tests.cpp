@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <thread>
 
+#include "pencilscan/core/formatted.h"
 #include "pencilscan/core/host_clock.h"
 #include "pencilscan/core/random.h"
 
@@ -28,12 +28,6 @@ constexpr double kUsualRefreshHz = 60;
 constexpr double kPeriodSlack = 0.02;
 
 constexpr std::int64_t ns(double ms) { return static_cast<std::int64_t>(1e6 * ms); }
-
-std::string number_text(double value, const char* format) {
-  char text[48];
-  std::snprintf(text, sizeof text, format, value);
-  return text;
-}
 
 /// Share of the change from black to white that a picture has, over the lit blocks.
 double level_of(const cv::Mat& coarse, const LitView& view) {
@@ -143,10 +137,10 @@ void Tester::judge_flicker(std::size_t projector, ProjectorTiming& timing,
   const double period = 1000 / refresh(projector);
   faults.push_back(
       {"flicker", screen_.projectors()[projector].name,
-       "its white changes by " + number_text(100 * timing.flicker, "%.2g %%") +
+       "its white changes by " + formatted(100 * timing.flicker, "%.2g %%") +
            " from picture to picture in " + cameras_.group().name(worst),
-       "set exposures to a whole multiple of its period: " + number_text(period, "%.2f, ") +
-           number_text(2 * period, "%.2f or ") + number_text(3 * period, "%.2f ms")});
+       "set exposures to a whole multiple of its period: " + formatted(period, "%.2f, ") +
+           formatted(2 * period, "%.2f or ") + formatted(3 * period, "%.2f ms")});
 }
 
 void Tester::flash(std::size_t projector, bool white, const ProjectorTiming& timing,
@@ -231,10 +225,9 @@ void Tester::measure_delay(std::size_t projector, ProjectorTiming& timing,
   const double period = 1000 / refresh(projector);
   timing.use_ms = timing.most_ms + period;
   if (!timing.measured || jitter <= period) return;
-  faults.push_back(
-      {"jitter", screen_.projectors()[projector].name,
-       "its delay changes by " + number_text(jitter, "%.0f ms") + " from flash to flash",
-       "switch off its picture processing; trigger the cameras by a wire"});
+  faults.push_back({"jitter", screen_.projectors()[projector].name,
+                    "its delay changes by " + formatted(jitter, "%.0f ms") + " from flash to flash",
+                    "switch off its picture processing; trigger the cameras by a wire"});
 }
 
 ProjectorTiming Tester::test(std::size_t projector, std::vector<Fault>& faults) {
@@ -277,8 +270,8 @@ void compare_delays(const ProjectorScreen& screen, ProjectorTestReport& report) 
     if (behind_ms - doubt_ms < 500 / refresh) continue;
     report.faults.push_back(
         {"late", screen.projectors()[p].name,
-         "its light comes " + number_text(behind_ms, "%.0f ms") + " (" +
-             number_text(timing.frames_behind, "%.1f frames") + ") after that of " +
+         "its light comes " + formatted(behind_ms, "%.0f ms") + " (" +
+             formatted(timing.frames_behind, "%.1f frames") + ") after that of " +
              screen.projectors()[first].name,
          "captures wait for it; to be faster, switch off its picture processing (\"game mode\")"});
   }
@@ -295,10 +288,10 @@ void judge_exposures(const LiveCameras& cameras, const ProjectorScreen& screen,
       if (std::abs(periods - std::max(1.0, std::round(periods))) > kPeriodSlack)
         report.faults.push_back(
             {"exposure", group.name(c),
-             "exposes " + number_text(*exposure / 1000, "%.2f ms") + ", " +
-                 number_text(periods, "%.2f periods") + " of the projectors",
+             "exposes " + formatted(*exposure / 1000, "%.2f ms") + ", " +
+                 formatted(periods, "%.2f periods") + " of the projectors",
              "set a whole multiple: " +
-                 number_text(std::max(1.0, std::round(periods)) * 1000 / refresh, "%.2f ms")});
+                 formatted(std::max(1.0, std::round(periods)) * 1000 / refresh, "%.2f ms")});
     }
     double brightest = 0;
     double saturated = 0;
@@ -314,13 +307,13 @@ void judge_exposures(const LiveCameras& cameras, const ProjectorScreen& screen,
                                "lens cap? exposure long enough? does it look at the object?"});
     else if (saturated > 0.01)
       report.faults.push_back({"saturated", group.name(c),
-                               number_text(100 * saturated, "%.2g %%") +
+                               formatted(100 * saturated, "%.2g %%") +
                                    " of what one projector lights is at the end of its range",
                                "half the exposure, close the iris, or less gain"});
     else if (brightest < 0.2)
       report.faults.push_back(
           {"dim", group.name(c),
-           "the brightest white is " + number_text(100 * brightest, "%.2g %%") + " of its range",
+           "the brightest white is " + formatted(100 * brightest, "%.2g %%") + " of its range",
            "longer exposure, open the iris, or more gain"});
   }
 }

@@ -46,10 +46,8 @@ void reconstruct(const ReconstructOptions& options) {
   SequenceOptions sequence;
   const SolutionMethod& method = *find_method(options.method);
   sequence.points.method = method.defaults;
-  if (auto* multiview = std::get_if<MultiviewOptions>(&sequence.points.method)) {
-    multiview->cost =
-        options.cost == "published" ? MultiviewCost::kPublished : MultiviewCost::kNormalized;
-  }
+  if (!set_multiview_cost(options.cost, sequence.points.method))
+    throw InputError("--multiview-cost", "", options.cost, "must be published or normalized");
   sequence.shape.depth.enabled = !options.no_depth && method.capabilities.allows_dense_depth;
   sequence.plain_frames = options.plain_frames;
   sequence.refine_rig = options.refine_rig;

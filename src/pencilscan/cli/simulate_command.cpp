@@ -1,10 +1,8 @@
 #include <algorithm>
 #include <filesystem>
-#include <iomanip>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
-#include <sstream>
 #include <vector>
 
 #include "pencilscan/cli/command.h"
@@ -14,6 +12,7 @@
 #include "pencilscan/io/file.h"
 #include "pencilscan/io/image.h"
 #include "pencilscan/io/mesh_file.h"
+#include "pencilscan/recording/pack.h"
 #include "pencilscan/simulation/photography.h"
 #include "pencilscan/simulation/povray.h"
 #include "pencilscan/simulation/truth.h"
@@ -51,12 +50,6 @@ struct SimulateOptions {
 constexpr double kCaptureBlackLevel = 0.004;
 /// First image number of the captures: their noise never repeats that of a frame.
 constexpr std::uint32_t kFirstCaptureImage = 0x40000000;
-
-std::string frame_name(int frame) {
-  std::ostringstream name;
-  name << std::setw(6) << std::setfill('0') << frame;
-  return name.str();
-}
 
 /// The mesh where frame 0 has it; InputError when no camera would see any of it.
 TriangleMesh placed_mesh(const SimulateOptions& options, const Rig& rig) {
@@ -114,21 +107,20 @@ void write_frames(const SimulateOptions& options, const Rig& rig, const Triangle
   const std::size_t total = static_cast<std::size_t>(options.frame_count) * rig.cameras.size();
   for (int frame = 0; frame < options.frame_count; ++frame) {
     const SimulatedObject object(mesh, options.surface, motion.at(frame));
-    const fs::path truth =
-        options.frame_count == 1 ? out / "truth" : out / "truth" / frame_name(frame);
+    const std::string name = six_digits(static_cast<std::size_t>(frame));
+    const fs::path truth = options.frame_count == 1 ? out / "truth" : out / "truth" / name;
     write_mesh(truth / "mesh.ply", object.mesh());
     for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
       const Camera& camera = rig.cameras[c];
       const auto image =
           static_cast<std::uint32_t>(static_cast<std::size_t>(frame) * rig.cameras.size() + c);
       progress("rendering frames", static_cast<double>(image) / static_cast<double>(total));
-      write_image(out / "frames" / frame_name(frame) / (camera.name + ".png"),
+      write_image(out / "frames" / name / (camera.name + ".png"),
                   photograph(rig, c, object, options.photo, image), options.photo.bits);
       if (options.truth_maps) write_truth_maps(truth, rig, c, camera_truth(rig, c, object));
     }
     if (options.export_povray) {
-      write_povray_scene(out / "povray" / frame_name(frame), rig, object,
-                         scene_light(options.photo));
+      write_povray_scene(out / "povray" / name, rig, object, scene_light(options.photo));
     }
   }
   progress("rendering frames", 1);
@@ -150,7 +142,7 @@ int write_captures(const SimulateOptions& options, const Rig& rig, const Triangl
     std::vector<PanelLight> sequence;
     std::vector<std::string> names;
     for (const auto& image : gray_code_sequence(projector.width, projector.height)) {
-      names.push_back(frame_name(static_cast<int>(names.size())).substr(3));
+      names.push_back(six_digits(names.size()).substr(3));
       sequence.push_back(gray_code_light(projector, image, film));
     }
     if (options.color_captures) {

@@ -1,18 +1,10 @@
 #include "pencilscan/display/shown_check.h"
 
-#include <cstdio>
 #include <opencv2/imgproc.hpp>
 
+#include "pencilscan/core/formatted.h"
+
 namespace pencilscan {
-namespace {
-
-std::string percent_text(double share) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.2g %%", 100 * share);
-  return text;
-}
-
-}  // namespace
 
 std::optional<ShownDifference> compare_shown(const cv::Mat& shown, const cv::Mat& expected) {
   ShownDifference result;
@@ -47,7 +39,7 @@ std::optional<ShownDifference> compare_shown(const cv::Mat& shown, const cv::Mat
   constexpr double kWhole = 0.98;
   result.kind = of_panel < kWhole ? "covered" : "other";
   result.sentence =
-      percent_text(result.share) + " of its pixels are not what was drawn" +
+      formatted(100 * result.share, "%.2g %%") + " of its pixels are not what was drawn" +
       (of_panel < kWhole ? ", all within columns " + std::to_string(result.where.x) + " to " +
                                std::to_string(result.where.x + result.where.width - 1) + ", rows " +
                                std::to_string(result.where.y) + " to " +

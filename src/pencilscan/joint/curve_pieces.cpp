@@ -21,8 +21,8 @@ CurveDirection direction(const Camera& camera, std::span<const CurvePoint> point
   const auto& high = points[static_cast<std::size_t>(std::min(last, middle + kHalfChord))];
   const Eigen::Vector2f chord =
       normalized(camera, high.position) - normalized(camera, low.position);
-  const float length = std::max(chord.norm(), pixel_size);
-  return {chord / length, std::hypot(low.sigma_px, high.sigma_px) * pixel_size / length};
+  return {chord.normalized(), std::hypot(low.sigma_px, high.sigma_px) * pixel_size /
+                                  std::max(chord.norm(), pixel_size)};
 }
 
 }  // namespace
@@ -42,14 +42,13 @@ PieceGraph cut_into_pieces(const Camera& camera, const GridGraph& graph, int len
       piece.begin = k * n / count;
       piece.end = (k + 1) * n / count;
       const int middle = (piece.begin + piece.end) / 2;
-      const int low = std::max(piece.begin, middle - 6);
-      const int high = std::min(piece.end - 1, middle + 6);
-      const auto at = [&](int i) {
-        return normalized(camera, points[static_cast<std::size_t>(i)].position);
-      };
-      piece.middle = at(middle);
-      piece.tangent = (at(high) - at(low)).normalized();
-      piece.sigma = points[static_cast<std::size_t>(middle)].sigma_px * pixel_size;
+      const CurvePoint& point = points[static_cast<std::size_t>(middle)];
+      const auto own = std::span(points).subspan(static_cast<std::size_t>(piece.begin),
+                                                 static_cast<std::size_t>(piece.end - piece.begin));
+      piece.middle = normalized(camera, point.position);
+      piece.tangent =
+          direction(camera, own, static_cast<float>(middle - piece.begin), pixel_size).tangent;
+      piece.sigma = point.sigma_px * pixel_size;
       if (k > 0) {
         const int here = static_cast<int>(result.pieces.size());
         result.continuations.emplace_back(here - 1, here);

@@ -143,6 +143,36 @@ void copy_colors(const TriangleMesh& mesh, TriangleMesh& measured) {
   PENCILSCAN_CHECK(measured.color.size() == measured.vertices.size());
 }
 
+void scale(double factor, TriangleMesh& mesh) {
+  for (Vec3& x : mesh.vertices) x *= factor;
+  for (float& sigma : mesh.sigma) sigma *= static_cast<float>(factor);
+}
+
+/// From footprints to the rig's unit.
+void scale(double factor, FrameResult& result) {
+  const auto f = static_cast<float>(factor);
+  for (MeasuredPoint& p : result.points.points) {
+    for (float* length : {&p.x, &p.y, &p.z, &p.sigma}) *length *= f;
+  }
+  ShapeResult& shape = result.shape;
+  scale(factor, shape.surface.mesh);
+  scale(factor, shape.surface.measured);
+  shape.surface.report.spacing_mm *= factor;
+  for (double& area : shape.holes.area_mm2) area *= factor * factor;
+  for (CameraDepthReport& camera : shape.depth.report.cameras) camera.sigma_median_mm *= factor;
+  for (DepthMap& map : shape.depth.maps) {
+    for (DepthNode& node : map.nodes) {
+      for (float* inverse : {&node.w, &node.wx, &node.wy, &node.wxx, &node.wxy, &node.wyy})
+        *inverse /= f;
+      node.sigma *= f;
+    }
+  }
+  // Scaling and files round: what lay apart may lie at one place.
+  separate_vertices(shape.surface.mesh);
+  separate_vertices(shape.surface.measured);
+  shape.scene.reset();
+}
+
 }  // namespace
 
 PointResult detect_frame(const Rig& rig, const Frame& frame, const PointOptions& options) {
@@ -299,40 +329,6 @@ void look_again(const Rig& stated, const PointOptions& options, PointResult& poi
       static_cast<std::size_t>(std::count(shape.surface.used.begin(), shape.surface.used.end(), 1));
   points.times.push_back({"look again", watch.seconds()});
 }
-
-namespace {
-
-void scale(double factor, TriangleMesh& mesh) {
-  for (Vec3& x : mesh.vertices) x *= factor;
-  for (float& sigma : mesh.sigma) sigma *= static_cast<float>(factor);
-}
-
-/// From footprints to the rig's unit.
-void scale(double factor, FrameResult& result) {
-  const auto f = static_cast<float>(factor);
-  for (MeasuredPoint& p : result.points.points) {
-    for (float* length : {&p.x, &p.y, &p.z, &p.sigma}) *length *= f;
-  }
-  ShapeResult& shape = result.shape;
-  scale(factor, shape.surface.mesh);
-  scale(factor, shape.surface.measured);
-  shape.surface.report.spacing_mm *= factor;
-  for (double& area : shape.holes.area_mm2) area *= factor * factor;
-  for (CameraDepthReport& camera : shape.depth.report.cameras) camera.sigma_median_mm *= factor;
-  for (DepthMap& map : shape.depth.maps) {
-    for (DepthNode& node : map.nodes) {
-      for (float* inverse : {&node.w, &node.wx, &node.wy, &node.wxx, &node.wxy, &node.wyy})
-        *inverse /= f;
-      node.sigma *= f;
-    }
-  }
-  // Scaling and files round: what lay apart may lie at one place.
-  separate_vertices(shape.surface.mesh);
-  separate_vertices(shape.surface.measured);
-  shape.scene.reset();
-}
-
-}  // namespace
 
 FrameResult reconstruct_frame(const Rig& stated, const Frame& frame, const PointOptions& points,
                               const ShapeOptions& shape, bool meshes) {

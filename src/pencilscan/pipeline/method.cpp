@@ -49,4 +49,18 @@ const SolutionMethod* find_method(std::string_view name) {
   return it == methods.end() ? nullptr : &*it;
 }
 
+bool set_multiview_cost(std::string_view name, MethodOptions& options) {
+  if (name != "published" && name != "normalized") return false;
+  if (auto* multiview = std::get_if<MultiviewOptions>(&options)) {
+    multiview->cost = name == "published" ? MultiviewCost::kPublished : MultiviewCost::kNormalized;
+  }
+  return true;
+}
+
+std::string_view broken_rule(const Rig& rig, const MethodOptions& options) {
+  if (!solution_method(options).capabilities.needs_grid || shows_grid(rig)) return {};
+  return "must hold one with a vertical and a horizontal pattern, which the method "
+         "single-projector needs";
+}
+
 }  // namespace pencilscan

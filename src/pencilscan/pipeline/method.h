@@ -43,4 +43,11 @@ struct SolutionMethod {
 /// Nothing for a name that no method has.
 [[nodiscard]] const SolutionMethod* find_method(std::string_view name);
 
+/// Sets the multi-view cost, published or normalized; methods without one stay as they are. False
+/// for another name.
+[[nodiscard]] bool set_multiview_cost(std::string_view name, MethodOptions& options);
+
+/// The rule for `projectors` that the rig breaks for this method; empty: none.
+[[nodiscard]] std::string_view broken_rule(const Rig& rig, const MethodOptions& options);
+
 }  // namespace pencilscan

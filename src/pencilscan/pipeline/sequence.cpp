@@ -11,7 +11,6 @@
 #include "pencilscan/io/hash.h"
 #include "pencilscan/io/mesh_file.h"
 #include "pencilscan/labeling/point_file.h"
-#include "pencilscan/paper/single_projector.h"
 #include "pencilscan/pipeline/curve_output.h"
 #include "pencilscan/pipeline/depth_output.h"
 #include "pencilscan/pipeline/frame_output.h"
@@ -237,11 +236,8 @@ SequenceOutcome reconstruct_sequence(const fs::path& rig_path, const fs::path& f
     throw InputError("--rig", "", rig_path.string(),
                      "must not be the rig.json in --out, where the refined rig is written");
   }
-  if (solution_method(options.points.method).capabilities.needs_grid && !shows_grid(rig)) {
-    throw InputError(rig_path.string(), "projectors", "",
-                     "must hold one with a vertical and a horizontal pattern, which the method "
-                     "single-projector needs");
-  }
+  const std::string_view rule = broken_rule(rig, options.points.method);
+  if (!rule.empty()) throw InputError(rig_path.string(), "projectors", "", std::string(rule));
   // One of several shards leaves the other frames to the others, and a broken one is a failed one.
   if (!options.shard) check_images(rig, frames, progress);
   const std::vector<std::size_t> own = options.shard.value_or(Shard{}).frames_of(frames.size());

@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
+#include "pencilscan/core/formatted.h"
 #include "pencilscan/planning/rig_check.h"
 
 namespace pencilscan {
@@ -31,17 +31,7 @@ constexpr double kPartnerShare = 0.2;
 /// Fewer shared samples than this say nothing about a pair.
 constexpr double kFewSamples = 10;
 
-std::string percent(double share) {
-  char text[16];
-  std::snprintf(text, sizeof text, "%.0f %%", 100 * share);
-  return text;
-}
-
-std::string number(double value, const char* format) {
-  char text[32];
-  std::snprintf(text, sizeof text, format, value);
-  return text;
-}
+std::string percent(double share) { return formatted(100 * share, "%.0f %%"); }
 
 /// Collects the warnings of one rig.
 class Collector {
@@ -133,7 +123,7 @@ class Collector {
         none, none ? "no_depth" : "little_depth",
         "the " + std::string(rows ? "horizontal" : "vertical") + " lines of " + name(family) +
             (none ? " give no depth" : " give little depth") + " (mean sensitivity " +
-            number(sensitivity, "%.2f") + "; " + number(options_.min_sensitivity, "%.2f") +
+            formatted(sensitivity, "%.2f") + "; " + formatted(options_.min_sensitivity, "%.2f") +
             " is reached on " + percent(share) +
             " of what cameras see of them): they run along the epipolar lines of the cameras; " +
             (rows ? "raise or lower this projector to about 30 degrees off the cameras' height, or "
@@ -177,8 +167,8 @@ class Collector {
       }
       warn(severe, "coplanar_axes",
            "the line directions of " + name(axes.first) + " and " + name(axes.second) +
-               " lie in one plane (skewness " + number(axes.skewness, "%.3f") + ", axes " +
-               number(axes.distance_mm, "%.0f") +
+               " lie in one plane (skewness " + formatted(axes.skewness, "%.3f") + ", axes " +
+               formatted(axes.distance_mm, "%.0f") +
                " mm apart): equation (6) keeps a free parameter for this pair, as for "
                "mirror-symmetric diagonal lines; raise one of the two or roll it differently");
     }
@@ -226,7 +216,7 @@ class Collector {
     const double spacing = weighted / static_cast<double>(shared);
     if (spacing >= kWideSpacing) return;
     warn(spacing < kNarrowSpacing, "spacing",
-         "lines lie only " + number(spacing, "%.1f") +
+         "lines lie only " + formatted(spacing, "%.1f") +
              " px apart in the images: enlarge pitch_px or use cameras of higher resolution");
   }
 
