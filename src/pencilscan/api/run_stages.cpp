@@ -4,10 +4,12 @@
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
+#include <deque>
 #include <exception>
 #include <mutex>
 #include <string>
 #include <thread>
+#include <utility>
 
 #include "pencilscan/core/cancellation.h"
 
@@ -19,12 +21,10 @@ constexpr auto kInterval = std::chrono::milliseconds(50);  // Ctrl-C is noticed 
 /// What the working thread and the waiting one share.
 class Work {
  public:
-  explicit Work(std::string_view first_stage) : stage_(first_stage) {}
-
   void announce(std::string_view stage) {
     {
       const std::lock_guard lock(mutex_);
-      stage_ = stage;
+      announced_.emplace_back(stage);
     }
     changed_.notify_one();
     if (stop) throw Cancelled();
@@ -36,12 +36,15 @@ class Work {
     }
     changed_.notify_one();
   }
-  /// The stage at work, after a while or when it is another than `known`; false once it is done.
-  bool wait(std::string& known) {
+  /// The next stage that was announced, however short it was, or the same one after a while; false
+  /// once all were told and the work is done.
+  bool wait(std::string& stage) {
     std::unique_lock lock(mutex_);
-    changed_.wait_for(lock, kInterval, [&] { return finished_ || stage_ != known; });
-    known = stage_;
-    return !finished_;
+    changed_.wait_for(lock, kInterval, [&] { return finished_ || !announced_.empty(); });
+    if (announced_.empty()) return !finished_;
+    stage = std::move(announced_.front());
+    announced_.pop_front();
+    return true;
   }
 
   std::atomic<bool> stop{false};
@@ -49,7 +52,7 @@ class Work {
  private:
   std::mutex mutex_;
   std::condition_variable changed_;
-  std::string stage_;
+  std::deque<std::string> announced_;
   bool finished_ = false;
 };
 
@@ -61,7 +64,7 @@ void run_stages(const StageListener& listener, std::span<const std::string_view>
     work({});
     return;
   }
-  Work shared(stages.front());
+  Work shared;
   std::exception_ptr failure;
   std::thread worker([&] {
     try {
