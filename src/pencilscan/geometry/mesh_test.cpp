@@ -4,6 +4,7 @@
 
 #include <numbers>
 
+#include "pencilscan/core/parallel.h"
 #include "pencilscan/core/random.h"
 #include "pencilscan/geometry/ray_scene.h"
 
@@ -44,6 +45,12 @@ TEST(RayScene, ClosestPointAgreesWithBruteForceOverSamples) {
     EXPECT_LE(closest->distance, nearest_vertex + 1e-9);
     EXPECT_NEAR(closest->distance, std::abs(p.norm() - 50), 0.5);  // facet sagitta below 0.5 mm
   }
+}
+
+TEST(RayScene, LeavesThreadsToOthersWhileItLives) {
+  const int before = thread_count();
+  const RayScene scene(make_sphere(10));
+  EXPECT_EQ(thread_count(), before);
 }
 
 }  // namespace

@@ -1,7 +1,7 @@
 #include "pencilscan/geometry/ray_scene.h"
 
 #include <embree3/rtcore.h>
-#include <tbb/task_arena.h>
+#include <tbb/global_control.h>
 
 #include <cmath>
 #include <utility>
@@ -58,7 +58,9 @@ struct RayScene::State {
 
 RayScene::RayScene(const TriangleMesh& mesh) : state_(std::make_unique<State>()) {
   state_->mesh = mesh;
-  // Not "threads=1": Embree would hold oneTBB's limit for the whole process down while it lives.
+  // One build thread: the tree, and with it the choice among equal hits, must not vary. Not by the
+  // device's "threads=1", which holds oneTBB's limit for the whole process down while it lives.
+  const tbb::global_control one_thread(tbb::global_control::max_allowed_parallelism, 1);
   state_->device = rtcNewDevice(nullptr);
   PENCILSCAN_CHECK(state_->device != nullptr);
   state_->scene = rtcNewScene(state_->device);
@@ -85,8 +87,7 @@ RayScene::RayScene(const TriangleMesh& mesh) : state_(std::make_unique<State>())
     rtcAttachGeometry(state_->scene, geometry);
     rtcReleaseGeometry(geometry);
   }
-  // One build thread: the tree, and with it the choice among equal hits, must not vary.
-  tbb::task_arena(1).execute([this] { rtcJoinCommitScene(state_->scene); });
+  rtcCommitScene(state_->scene);
 }
 
 RayScene::~RayScene() = default;
