@@ -1,4 +1,4 @@
-# pencilscan_module(<name> SOURCES ... [TESTS ...] [DEPENDS modules...] [LIBRARIES targets...] [PRIVATE_LIBRARIES targets...] [NO_PCH])
+# pencilscan_module(<name> SOURCES ... [TESTS ...] [DEPENDS modules...] [LIBRARIES targets...] [PRIVATE_LIBRARIES targets...] [NO_PCH] [AGAINST_CLOCK])
 # One module = one static library pencilscan_<name> (alias pencilscan::<name>) and, with tests on,
 # one GoogleTest program <name>_test made of the *_test.cpp files beside the sources.
 function(pencilscan_target_options target)
@@ -24,7 +24,7 @@ function(pencilscan_target_options target)
 endfunction()
 
 function(pencilscan_module name)
-  cmake_parse_arguments(ARG "NO_PCH" "" "SOURCES;TESTS;DEPENDS;LIBRARIES;PRIVATE_LIBRARIES" ${ARGN})
+  cmake_parse_arguments(ARG "NO_PCH;AGAINST_CLOCK" "" "SOURCES;TESTS;DEPENDS;LIBRARIES;PRIVATE_LIBRARIES" ${ARGN})
   set(target pencilscan_${name})
   if(ARG_SOURCES)
     add_library(${target} STATIC ${ARG_SOURCES})
@@ -53,7 +53,11 @@ function(pencilscan_module name)
     pencilscan_target_options(${name}_test)
     pencilscan_use_pch(${name}_test test)
     target_link_libraries(${name}_test PRIVATE ${target} GTest::gmock GTest::gtest_main)
+    set(serial FALSE)
+    if(ARG_AGAINST_CLOCK)
+      set(serial TRUE)
+    endif()
     gtest_discover_tests(${name}_test TEST_PREFIX "${name}." DISCOVERY_TIMEOUT 60
-                         PROPERTIES TIMEOUT 300)
+                         PROPERTIES TIMEOUT 300 RUN_SERIAL ${serial})
   endif()
 endfunction()

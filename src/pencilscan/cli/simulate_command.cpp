@@ -39,6 +39,8 @@ struct SimulateOptions {
   bool color_captures = false;
   bool truth_maps = false;
   bool export_povray = false;
+  std::string interpolated;  ///< name of a mosaic; empty: three channels
+  std::optional<int> jpeg;   ///< quality
 
   Reflectance surface;
   bool flat = false;
@@ -115,8 +117,13 @@ void write_frames(const SimulateOptions& options, const Rig& rig, const Triangle
       const auto image =
           static_cast<std::uint32_t>(static_cast<std::size_t>(frame) * rig.cameras.size() + c);
       progress("rendering frames", static_cast<double>(image) / static_cast<double>(total));
-      write_image(out / "frames" / name / (camera.name + ".png"),
-                  photograph(rig, c, object, options.photo, image), options.photo.bits);
+      const cv::Mat picture = photograph(rig, c, object, options.photo, image);
+      const fs::path stem = out / "frames" / name / camera.name;
+      if (options.jpeg) {
+        write_jpeg(stem.string() + ".jpg", picture, *options.jpeg);
+      } else {
+        write_image(stem.string() + ".png", picture, options.photo.bits);
+      }
       if (options.truth_maps) write_truth_maps(truth, rig, c, camera_truth(rig, c, object));
     }
     if (options.export_povray) {
@@ -174,6 +181,7 @@ void run_simulate(SimulateOptions options) {
   options.surface.smooth = !options.flat;
   options.photo.render.inverse_square = !options.no_falloff;
   options.photo.seed = options.common.seed;
+  options.photo.interpolated = Mosaic::from_name(options.interpolated);
   const Rig rig = read_rig(options.rig_path);
   const TriangleMesh mesh = placed_mesh(options, rig);
   if (options.export_povray) check_povray_can_show(rig, options.surface, options.rig_path);
@@ -274,6 +282,12 @@ void add_device_options(CLI::App& command, SimulateOptions& options) {
   command.add_option("--bits", options.photo.bits, "8 or 16")
       ->check(CLI::IsMember({8, 16}))
       ->capture_default_str();
+  command
+      .add_option("--interpolated", options.interpolated,
+                  "Colours as a camera fills them in behind this mosaic, where the rig states none")
+      ->check(CLI::IsMember({"RGGB", "BGGR", "GRBG", "GBRG"}));
+  command.add_option("--jpeg", options.jpeg, "Frames as JPEG of this quality; 8 bits")
+      ->check(CLI::Range(1, 100));
 }
 
 }  // namespace

@@ -25,7 +25,7 @@ double incidence(const CameraLight& light, const Vec2& pixel, const Quadric& q, 
 }
 
 bool acceptable(const CameraLight& light, const Vec2& pixel, const WindowFit& fit,
-                const Sphere& volume, int half, const DepthOptions& options) {
+                const ObjectSpace& space, int half, const DepthOptions& options) {
   if (fit.misfit > options.max_misfit) return false;
   if (fit.relative_residual > options.max_relative_residual) return false;
   if (fit.significance < 5) return false;
@@ -33,7 +33,7 @@ bool acceptable(const CameraLight& light, const Vec2& pixel, const WindowFit& fi
     return false;
   if (incidence(light, pixel, fit.q, half) < options.min_cosine) return false;
   const Vec3 x = light.camera->point_at_depth(pixel, 1 / fit.q[0]);
-  return (x - volume.center).norm() <= 1.1 * volume.radius;
+  return space.holds(x);
 }
 
 DepthNode node_of(const WindowFit& fit, int half) {
@@ -92,8 +92,9 @@ double cost(const WindowFit& fit) { return static_cast<double>(fit.misfit); }
 }  // namespace
 
 CameraLight measure_light(const Rig& rig, int camera, const std::vector<ColorFamily>& families,
-                          std::vector<cv::Mat> presence, cv::Mat valid,
-                          std::span<const MeasuredPoint> points, const DepthOptions& options) {
+                          std::vector<cv::Mat> presence, std::vector<cv::Mat> sampled,
+                          cv::Mat valid, std::span<const MeasuredPoint> points,
+                          const DepthOptions& options) {
   CameraLight light;
   light.camera = &rig.cameras[static_cast<std::size_t>(camera)];
   for (std::size_t f = 0; f < families.size(); ++f) {
@@ -103,6 +104,7 @@ CameraLight measure_light(const Rig& rig, int camera, const std::vector<ColorFam
     }
   }
   light.families = std::move(presence);
+  light.sampled = std::move(sampled);
   light.valid = std::move(valid);
   light.noise.assign(families.size(), NoiseModel{});
   // Pilot windows at evenly picked curve points.
@@ -182,7 +184,7 @@ CameraLight measure_light(const Rig& rig, int camera, const std::vector<ColorFam
 }
 
 DepthMap dense_depth(const CameraLight& light, int camera, std::span<const MeasuredPoint> points,
-                     const Sphere& volume, const DepthOptions& options) {
+                     const ObjectSpace& space, const DepthOptions& options) {
   DepthMap map;
   map.camera = camera;
   map.stride = options.stride;
@@ -197,7 +199,7 @@ DepthMap dense_depth(const CameraLight& light, int camera, std::span<const Measu
     std::optional<WindowFit> best;
     for (const Quadric& start : seeds.planes(pixel, options.seed_radius_px, options.half)) {
       const auto fit = fitter.fit(pixel, start, 5);
-      if (fit && acceptable(light, pixel, *fit, volume, options.half, options) &&
+      if (fit && acceptable(light, pixel, *fit, space, options.half, options) &&
           (!best || cost(*fit) < cost(*best))) {
         best = fit;
       }
@@ -235,7 +237,7 @@ DepthMap dense_depth(const CameraLight& light, int camera, std::span<const Measu
         const Vec2 d = map.pixel(j) - map.pixel(next[k].second);
         const Quadric start = shifted(map.nodes[next[k].second], d[0], d[1], options.half);
         const auto fit = fitter.fit(map.pixel(j), start, 5);
-        if (fit && acceptable(light, map.pixel(j), *fit, volume, options.half, options) &&
+        if (fit && acceptable(light, map.pixel(j), *fit, space, options.half, options) &&
             (!best || cost(*fit) < cost(*best))) {
           best = fit;
         }
@@ -251,8 +253,9 @@ DepthMap dense_depth(const CameraLight& light, int camera, std::span<const Measu
   return map;
 }
 
-std::size_t complete_map(const CameraLight& light, const RayScene& surface, const Sphere& volume,
-                         double sigma_factor, const DepthOptions& options, DepthMap& map) {
+std::size_t complete_map(const CameraLight& light, const RayScene& surface,
+                         const ObjectSpace& space, double sigma_factor, const DepthOptions& options,
+                         DepthMap& map) {
   constexpr float kConfidence = 0.9F;  // of rendered objects' nodes, 96 % or more are right
   constexpr double kHardPlaces = 1.8;  // rims and gaps: errors beyond what the window's fit says
   const Camera& camera = *light.camera;
@@ -266,7 +269,7 @@ std::size_t complete_map(const CameraLight& light, const RayScene& surface, cons
     const Vec3 normal = face_normal(surface.mesh(), hit->face);
     const Quadric start = quadric_of(TangentView(camera, hit->point, normal), options.half);
     const auto fit = fitter.fit(pixel, start, 5);
-    if (!fit || !acceptable(light, pixel, *fit, volume, options.half, options)) continue;
+    if (!fit || !acceptable(light, pixel, *fit, space, options.half, options)) continue;
     const double move = (camera.point_at_depth(pixel, 1 / fit->q[0]) - hit->point).norm();
     if (move > options.max_move) continue;
     map.nodes[i] = node_of(*fit, options.half);

@@ -7,6 +7,7 @@
 #include "pencilscan/depth/window_fit.h"
 #include "pencilscan/geometry/ray_scene.h"
 #include "pencilscan/labeling/measured_point.h"
+#include "pencilscan/rig/object_space.h"
 #include "pencilscan/view/color_family.h"
 
 namespace pencilscan {
@@ -22,21 +23,23 @@ struct DepthOptions {
   double max_move = 2;            ///< footprints; of a node started from the closed surface
 };
 
-/// Light as one camera sees it, blur and noise measured from the image itself at the seeds.
+/// Light as one camera sees it (presence, sampled, valid: see CameraLight), blur and noise measured
+/// from the image itself at the seeds.
 [[nodiscard]] CameraLight measure_light(const Rig& rig, int camera,
                                         const std::vector<ColorFamily>& families,
-                                        std::vector<cv::Mat> presence, cv::Mat valid,
-                                        std::span<const MeasuredPoint> points,
+                                        std::vector<cv::Mat> presence, std::vector<cv::Mat> sampled,
+                                        cv::Mat valid, std::span<const MeasuredPoint> points,
                                         const DepthOptions& options);
 
 [[nodiscard]] DepthMap dense_depth(const CameraLight& light, int camera,
-                                   std::span<const MeasuredPoint> points, const Sphere& volume,
+                                   std::span<const MeasuredPoint> points, const ObjectSpace& space,
                                    const DepthOptions& options);
 
 /// Fits the windows of nodes without depth whose rays meet `surface`, starting from its tangent
 /// plane there, and keeps those that stay near it: a surface that is off by a line does not. Their
 /// sigma is widened by `sigma_factor`. Returns the number of nodes that found their depth.
-std::size_t complete_map(const CameraLight& light, const RayScene& surface, const Sphere& volume,
-                         double sigma_factor, const DepthOptions& options, DepthMap& map);
+std::size_t complete_map(const CameraLight& light, const RayScene& surface,
+                         const ObjectSpace& space, double sigma_factor, const DepthOptions& options,
+                         DepthMap& map);
 
 }  // namespace pencilscan

@@ -43,7 +43,7 @@ DepthResult measure_depth(const Rig& rig, const std::vector<ColorFamily>& famili
   for (std::size_t c = 0; c < images.size(); ++c) {
     if (!images[c].empty() && !rig.cameras[c].sees_texture_only) cameras.push_back(c);
   }
-  const Sphere volume = working_volume(rig);
+  const ObjectSpace space(rig);
   result.maps.resize(cameras.size());
   result.lights.resize(cameras.size());
   parallel_for(cameras.size(), [&](std::size_t i) {
@@ -51,11 +51,15 @@ DepthResult measure_depth(const Rig& rig, const std::vector<ColorFamily>& famili
     const Camera& camera = rig.cameras[c];
     const cv::Mat rgb = projector_light(camera, linear_light(camera, images[c]), unmixings[c]);
     std::vector<cv::Mat> presence;
-    for (const ColorFamily& family : families) presence.push_back(presence_image(rgb, family));
+    std::vector<cv::Mat> sampled;
+    for (const ColorFamily& family : families) {
+      presence.push_back(presence_image(rgb, family));
+      sampled.push_back(presence_samples(camera, unmixings[c], family));
+    }
     CameraLight& light = result.lights[i];
     light = measure_light(rig, static_cast<int>(c), families, std::move(presence),
-                          unsaturated(images[c]), points, options.depth);
-    result.maps[i] = dense_depth(light, static_cast<int>(c), points, volume, options.depth);
+                          std::move(sampled), unsaturated(images[c]), points, options.depth);
+    result.maps[i] = dense_depth(light, static_cast<int>(c), points, space, options.depth);
   });
   result.report.seconds_depth = watch.seconds();
 
@@ -76,10 +80,10 @@ DepthResult measure_depth(const Rig& rig, const std::vector<ColorFamily>& famili
 void complete_depth(const Rig& rig, const RayScene& surface, const DepthStageOptions& options,
                     DepthResult& result) {
   PENCILSCAN_CHECK(result.lights.size() == result.maps.size());
-  const Sphere volume = working_volume(rig);
+  const ObjectSpace space(rig);
   std::vector<std::size_t> found(result.maps.size());
   parallel_for(result.maps.size(), [&](std::size_t i) {
-    found[i] = complete_map(result.lights[i], surface, volume,
+    found[i] = complete_map(result.lights[i], surface, space,
                             result.report.consistency.sigma_factor, options.depth, result.maps[i]);
   });
   for (std::size_t i = 0; i < found.size(); ++i) {

@@ -69,6 +69,8 @@ WindowFitter::WindowFitter(const CameraLight& light, int half) : light_(&light),
   }
   const std::size_t families = light.families.size();
   image_.assign(families, Column::Zero(padded_));
+  weight_ = root_ = image_;
+  weight_sum_.assign(families, 0.F);
   offset_.assign(families, 0.F);
   ex_ = ey_ = inverse_variance_ = mean_ = variance_ = offset_;
   profile_.assign(light.patterns.size(), Column::Zero(padded_));
@@ -80,27 +82,40 @@ bool WindowFitter::gather(int u, int v) {
   const cv::Mat& first = light_->families.front();
   if (u < half_ || v < half_ || u + half_ >= first.cols || v + half_ >= first.rows) return false;
   int used = 0;
-  weight_ = taper_;
+  thread_local Column valid, weight;
+  valid = taper_;
   for (int i = 0; i < count_; ++i) {
     const auto k = static_cast<std::size_t>(i);
     if (light_->valid.at<std::uint8_t>(v + dv_[k], u + du_[k]) == 0) {
-      weight_[i] = 0;
+      valid[i] = 0;
     } else {
       ++used;
     }
   }
   if (used * 2 < count_) return false;
-  root_ = weight_.sqrt();
-  const float sum = weight_.sum();
   for (std::size_t f = 0; f < image_.size(); ++f) {
+    weight = valid;
+    if (!light_->sampled[f].empty()) {
+      for (int i = 0; i < count_; ++i) {
+        const auto k = static_cast<std::size_t>(i);
+        if (light_->sampled[f].at<std::uint8_t>(v + dv_[k], u + du_[k]) == 0) weight[i] = 0;
+      }
+    }
+    set_weight(f, weight);
     for (int i = 0; i < count_; ++i) {
       const auto k = static_cast<std::size_t>(i);
       image_[f][i] = light_->families[f].at<float>(v + dv_[k], u + du_[k]);
     }
-    mean_[f] = (weight_ * image_[f]).sum() / sum;
+    mean_[f] = weight_sum_[f] > 0 ? (weight_[f] * image_[f]).sum() / weight_sum_[f] : 0.F;
     inverse_variance_[f] = 1 / light_->noise[f].variance(mean_[f]);
   }
   return true;
+}
+
+void WindowFitter::set_weight(std::size_t family, const Column& weight) {
+  weight_[family] = weight;
+  root_[family] = weight.sqrt();
+  weight_sum_[family] = weight.sum();
 }
 
 void WindowFitter::choose_patterns(const Vec2& m, const Eigen::Matrix2d& jacobian,
@@ -175,9 +190,9 @@ void WindowFitter::solve_amplitudes() {
       }
       const auto n = static_cast<int>(mine.size() + 1);
       for (int i = 0; i + 1 < n; ++i)
-        J_.col(i) = (root_ * profile_[mine[static_cast<std::size_t>(i)]]).matrix();
-      J_.col(n - 1) = root_.matrix();
-      J_.col(n) = (root_ * image_[f]).matrix();
+        J_.col(i) = (root_[f] * profile_[mine[static_cast<std::size_t>(i)]]).matrix();
+      J_.col(n - 1) = root_[f].matrix();
+      J_.col(n) = (root_[f] * image_[f]).matrix();
       const Gram products = gram_of(n + 1);
       Dense A = products.topLeftCorner(n, n).cast<double>();
       const DenseVector b = products.col(n).head(n).cast<double>();
@@ -207,7 +222,6 @@ double WindowFitter::step(Quadric& q, bool last, WindowFit& fit) {
   DenseVector g = DenseVector::Zero(unknowns);
   double chi2 = 0;
   double degrees = 0;
-  const float weight_sum = weight_.sum();
   thread_local Column envelope, sum, geometry, residual;
   // Inverse depth in units of the present one: unknowns of like size.
   const auto unit = static_cast<float>(q[0]);
@@ -219,21 +233,21 @@ double WindowFitter::step(Quadric& q, bool last, WindowFit& fit) {
       if (!lit_[k].on || lit_[k].family != static_cast<int>(f)) continue;
       sum += lit_[k].amplitude * profile_[k];
       geometry += lit_[k].amplitude * slope_[k];
-      J_.col(columns++) = (root_ * envelope * profile_[k]).matrix();
+      J_.col(columns++) = (root_[f] * envelope * profile_[k]).matrix();
     }
-    residual = root_ * (image_[f] - offset_[f] - envelope * sum);
-    J_.col(columns++) = root_.matrix();
-    J_.col(columns++) = (root_ * x_ * sum).matrix();
-    J_.col(columns++) = (root_ * y_ * sum).matrix();
+    residual = root_[f] * (image_[f] - offset_[f] - envelope * sum);
+    J_.col(columns++) = root_[f].matrix();
+    J_.col(columns++) = (root_[f] * x_ * sum).matrix();
+    J_.col(columns++) = (root_[f] * y_ * sum).matrix();
     const double rss = static_cast<double>(residual.square().sum());
-    variance_[f] = static_cast<float>(rss) / weight_sum;
+    variance_[f] = static_cast<float>(rss) / std::max(weight_sum_[f], 1e-6F);
     chi2 += rss * static_cast<double>(inverse_variance_[f]);
-    degrees += static_cast<double>(weight_sum);
+    degrees += static_cast<double>(weight_sum_[f]);
     if (columns == 9) {  // no line of this family: it says nothing of depth, only the offset
       for (int i = 0; i < 3; ++i) H(first[f] + i, first[f] + i) = 1;
       continue;
     }
-    geometry *= root_ * envelope * unit;
+    geometry *= root_[f] * envelope * unit;
     J_.col(0) = geometry.matrix();
     J_.col(1) = (geometry * x_).matrix();
     J_.col(2) = (geometry * y_).matrix();
@@ -346,8 +360,8 @@ void WindowFitter::compare_light() {
         light += lit_[k].amplitude * profile_[k];
     }
     light *= 1.F + ex_[f] * x_ + ey_[f] * y_;
-    seen_ += inverse_variance_[f] * weight_ * light * (image_[f] - offset_[f]);
-    predicted_ += inverse_variance_[f] * weight_ * light.square();
+    seen_ += inverse_variance_[f] * weight_[f] * light * (image_[f] - offset_[f]);
+    predicted_ += inverse_variance_[f] * weight_[f] * light.square();
   }
 }
 
@@ -394,8 +408,8 @@ std::optional<WindowFit> WindowFitter::fit(const Vec2& pixel, const Quadric& sta
   // Where the surface ends within the window, fit what is left of it.
   compare_light();
   if (const auto side = dark_side()) {
-    weight_ *= 1.F - beyond_[*side];
-    root_ *= 1.F - beyond_[*side];
+    for (std::size_t f = 0; f < image_.size(); ++f)
+      set_weight(f, weight_[f] * (1.F - beyond_[*side]));
     choose_patterns(m, jacobian, q);
     if (lit_.empty()) return std::nullopt;
     render(q);

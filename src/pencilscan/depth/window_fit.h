@@ -24,9 +24,11 @@ struct CameraLight {
   const Camera* camera = nullptr;
   std::vector<PatternView> patterns;  ///< of all families
   std::vector<cv::Mat> families;      ///< per family: presence channel, CV_32FC1, linear
-  cv::Mat valid;                      ///< CV_8U, 0 where saturated
-  float blur_px = 0.8F;               ///< standard deviation of camera and projector blur together
-  std::vector<NoiseModel> noise;      ///< per family
+  /// Per family: CV_8U, 0 where a mosaic has no sample of its presence; empty: all pixels have.
+  std::vector<cv::Mat> sampled;
+  cv::Mat valid;                  ///< CV_8U, 0 where saturated
+  float blur_px = 0.8F;           ///< standard deviation of camera and projector blur together
+  std::vector<NoiseModel> noise;  ///< per family
 };
 
 /// Inverse depth over a window: w = q . (1, x, y, x^2, x y, y^2), x = dx / half, y = dy / half.
@@ -75,6 +77,7 @@ class WindowFitter {
   using Gram = Eigen::MatrixXf;
 
   [[nodiscard]] bool gather(int u, int v);
+  void set_weight(std::size_t family, const Column& weight);
   void choose_patterns(const Vec2& m, const Eigen::Matrix2d& jacobian, const Quadric& q);
   void render(const Quadric& q);
   /// Products of the first columns of J_ with each other.
@@ -93,11 +96,12 @@ class WindowFitter {
   int count_ = 0;   ///< pixels in the window
   int padded_ = 0;  ///< rounded up to a multiple of eight; weight 0 beyond count_
   std::vector<int> du_, dv_;
-  Column x_, y_, xx_, xy_, yy_, taper_, weight_, root_, w_;  // root_: of the weight
-  Column middle_;                                            ///< 1 near the centre, 0 elsewhere
-  std::array<Column, 8> beyond_;  ///< 1 on one side of the centre, 0 elsewhere
-  Column seen_, predicted_;       ///< weighted by what a pixel says
-  std::vector<Column> image_;     ///< per family
+  Column x_, y_, xx_, xy_, yy_, taper_, w_;
+  Column middle_;                              ///< 1 near the centre, 0 elsewhere
+  std::array<Column, 8> beyond_;               ///< 1 on one side of the centre, 0 elsewhere
+  Column seen_, predicted_;                    ///< weighted by what a pixel says
+  std::vector<Column> image_, weight_, root_;  ///< per family; root_: of the weight
+  std::vector<float> weight_sum_;              ///< per family
   std::vector<Lit> lit_;
   std::vector<Column> profile_, slope_;  ///< per lit: P, dP/dw
   std::vector<float> offset_, ex_, ey_, inverse_variance_, mean_, variance_;

@@ -151,17 +151,14 @@ std::optional<std::filesystem::path> find_image(const std::filesystem::path& fol
   return std::nullopt;
 }
 
-void write_image(const std::filesystem::path& path, const cv::Mat& image, int bit_depth) {
-  PENCILSCAN_CHECK(!image.empty() && (image.channels() == 1 || image.channels() == 3));
-  PENCILSCAN_CHECK(bit_depth == 8 || bit_depth == 16);
-  const std::string ending = lower_ending(path);
-  if (std::find(kEndings.begin(), kEndings.end(), ending) == kEndings.end()) {
-    throw InputError(path.string(), "", "", "must end with .png, .tiff, .jpg or .bmp");
-  }
+namespace {
+
+void write_encoded(const std::filesystem::path& path, const std::string& ending,
+                   const cv::Mat& image, const std::vector<int>& parameters) {
   std::vector<unsigned char> bytes;
   bool encoded = false;
   try {
-    encoded = cv::imencode(ending, encodable(image, ending, bit_depth), bytes);
+    encoded = cv::imencode(ending, image, bytes, parameters);
   } catch (const cv::Exception& error) {
     throw StageError(path.string() + ": cannot be encoded: " + error.err);
   }
@@ -170,6 +167,23 @@ void write_image(const std::filesystem::path& path, const cv::Mat& image, int bi
     stream.write(reinterpret_cast<const char*>(bytes.data()),
                  static_cast<std::streamsize>(bytes.size()));
   });
+}
+
+}  // namespace
+
+void write_image(const std::filesystem::path& path, const cv::Mat& image, int bit_depth) {
+  PENCILSCAN_CHECK(!image.empty() && (image.channels() == 1 || image.channels() == 3));
+  PENCILSCAN_CHECK(bit_depth == 8 || bit_depth == 16);
+  const std::string ending = lower_ending(path);
+  if (std::find(kEndings.begin(), kEndings.end(), ending) == kEndings.end()) {
+    throw InputError(path.string(), "", "", "must end with .png, .tiff, .jpg or .bmp");
+  }
+  write_encoded(path, ending, encodable(image, ending, bit_depth), {});
+}
+
+void write_jpeg(const std::filesystem::path& path, const cv::Mat& image, int quality) {
+  PENCILSCAN_CHECK(!image.empty() && quality >= 1 && quality <= 100);
+  write_encoded(path, ".jpg", encodable(image, ".jpg", 8), {cv::IMWRITE_JPEG_QUALITY, quality});
 }
 
 }  // namespace pencilscan

@@ -27,5 +27,7 @@ namespace pencilscan {
 /// or not at all. Float images become `bit_depth` (8 or 16) integers, except in .tiff, which keeps
 /// them.
 void write_image(const std::filesystem::path& path, const cv::Mat& image, int bit_depth = 8);
+/// The same as JPEG of a quality in [1, 100].
+void write_jpeg(const std::filesystem::path& path, const cv::Mat& image, int quality);
 
 }  // namespace pencilscan

@@ -10,6 +10,7 @@
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/core/stopwatch.h"
 #include "pencilscan/pipeline/line_naming.h"
+#include "pencilscan/pipeline/picture_check.h"
 #include "pencilscan/points/surface_check.h"
 #include "pencilscan/rig/camera_light.h"
 #include "pencilscan/surface/manifold.h"
@@ -55,11 +56,38 @@ std::vector<std::string> detection_warnings(const Rig& rig, const Frame& frame,
   return warnings;
 }
 
+/// Forgets what the cameras of the findings saw.
+void leave_out(const Rig& rig, const std::vector<PictureFinding>& findings, PointResult& result) {
+  for (const PictureFinding& finding : findings) {
+    const auto c = static_cast<std::size_t>(finding.camera);
+    result.left_out[c] = 1;
+    result.detections[c] = {};
+    result.graphs[c] = {};
+    result.graphs[c].camera = finding.camera;
+    result.warnings.push_back(describe(rig, finding));
+  }
+}
+
+/// The frame without the pictures that were left out.
+Frame without(Frame frame, const std::vector<char>& left_out) {
+  for (std::size_t c = 0; c < left_out.size(); ++c) {
+    if (left_out[c] != 0) frame.images[c] = cv::Mat();
+  }
+  return frame;
+}
+
 /// Error of each plane, projector px, that makes crossings miss each other as they do.
 double plane_error_px(const CrossingDisagreement& crossings) {
   const double noise2 = crossings.expected_px * crossings.expected_px;
   const double devices2 = crossings.median_px * crossings.median_px - noise2;
   return kDeviationPerMedian * std::sqrt(std::max(0.0, devices2) / 2);
+}
+
+/// Why a frame has no points.
+std::string why_nothing(const PointResult& result) {
+  std::string why = "no curve could be given its projector line";
+  for (const std::string& warning : result.warnings) why += "; " + warning;
+  return why;
 }
 
 /// Of all cameras; they share their pixels with the detections.
@@ -207,18 +235,27 @@ PointResult detect_frame(const Rig& rig, const Frame& frame, const PointOptions&
 PointResult measure_points(const Rig& stated, const Frame& frame, const PointOptions& options) {
   const Rig rig = with_registered_patterns(stated);
   PointResult result = detect_frame(rig, frame, options);
+  result.left_out.assign(rig.cameras.size(), 0);
+  leave_out(rig, plain_faults(rig, frame), result);
   announce(options.progress, "solution");
   Stopwatch solution_watch;
   const SolutionMethod& method = solution_method(options.method);
+  result.labeling = method.solve(rig, result.families, result.graphs, options.method);
   if (!method.capabilities.may_be_guided) {
-    result.labeling = method.solve(rig, result.families, result.graphs, options.method);
     result.times.push_back({"solution", solution_watch.seconds()});
     const Stopwatch triangulation_watch;
     result.points = triangulate(rig, result.graphs, result.labeling, options.triangulation);
     result.times.push_back({"triangulation", triangulation_watch.seconds()});
     return result;
   }
-  LineNaming naming = name_lines(rig, result.families, result.graphs, options);
+  const std::vector<PictureFinding> misplaced =
+      misplaced_pictures(rig, frame, result.graphs, result.labeling, options);
+  if (!misplaced.empty()) {
+    leave_out(rig, misplaced, result);
+    result.labeling = method.solve(rig, result.families, result.graphs, options.method);
+  }
+  LineNaming naming =
+      name_lines(rig, result.families, result.graphs, std::move(result.labeling), options);
   result.labeling = std::move(naming.labeling);
   result.crossings = naming.crossings;
   if (!naming.warning.empty()) result.warnings.push_back(std::move(naming.warning));
@@ -340,9 +377,11 @@ FrameResult reconstruct_frame(const Rig& stated, const Frame& frame, const Point
   }
   FrameResult result;
   result.points = measure_points(rig, frame, points);
-  if (result.points.points.empty())
-    throw NothingFound("no curve could be given its projector line");
-  if (meshes) result.shape = measure_shape(rig, frame, result.points, shape);
+  if (result.points.points.empty()) throw NothingFound(why_nothing(result.points));
+  if (meshes) {
+    const Frame right = without(frame, result.points.left_out);
+    result.shape = measure_shape(rig, right, result.points, shape);
+  }
   std::vector<StageTime>& times = result.points.times;
   times.insert(times.end(), result.shape.times.begin(), result.shape.times.end());
   look_again(rig, points, result.points, result.shape);

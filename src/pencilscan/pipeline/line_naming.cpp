@@ -40,14 +40,15 @@ std::string disagreement_warning(const CrossingDisagreement& crossings, bool lab
 }  // namespace
 
 LineNaming name_lines(const Rig& rig, const std::vector<ColorFamily>& families,
-                      const std::vector<GridGraph>& graphs, const PointOptions& options) {
+                      const std::vector<GridGraph>& graphs, Labeling labeling,
+                      const PointOptions& options) {
   constexpr double kNearlyAll = 0.8;    // of the curves' points; right names reach .9 and more
   constexpr double kClearlyMore = 1.1;  // points named, of those before
   constexpr double kAsWell = 1.2;       // crossings' misses, of those before
   constexpr double kClearlyLess = 0.8;  // the same
   LineNaming result;
   const SolutionMethod& method = solution_method(options.method);
-  result.labeling = method.solve(rig, families, graphs, options.method);
+  result.labeling = std::move(labeling);
   if (!method.capabilities.corrects_rig) return result;
   result.crossings = disagreement(rig, graphs, result.labeling);
   const bool is_off = disagrees(result.crossings);
@@ -62,9 +63,9 @@ LineNaming name_lines(const Rig& rig, const std::vector<ColorFamily>& families,
   refinement.refine.max_remaining = std::numeric_limits<double>::infinity();
   RigRefinement found = refine_rig_on_frames(rig, {&curves, 1}, refinement);
   if (found.report.refined) {
-    Labeling& labeling = found.labelings.front();
-    const CrossingDisagreement left = disagreement(found.rig, graphs, labeling);
-    const auto named = static_cast<double>(labelled_points(labeling));
+    Labeling& again = found.labelings.front();
+    const CrossingDisagreement left = disagreement(found.rig, graphs, again);
+    const auto named = static_cast<double>(labelled_points(again));
     const double misses = left.median_px / result.crossings.median_px;
     const bool agrees = !disagrees(left);
     const bool names_more = named > kClearlyMore * points;
@@ -73,7 +74,7 @@ LineNaming name_lines(const Rig& rig, const std::vector<ColorFamily>& families,
     const bool is_better =
         (names_more && misses < kAsWell) || (named > points && misses < kClearlyLess);
     if (is_off ? agrees || is_better : agrees && names_more) {
-      result.labeling = std::move(labeling);
+      result.labeling = std::move(again);
       result.corrected = std::move(found.rig);
       result.crossings = disagreement(rig, graphs, result.labeling);
     }

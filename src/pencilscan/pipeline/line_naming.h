@@ -16,11 +16,12 @@ struct LineNaming {
   std::string warning;             ///< empty: nothing to say
 };
 
-/// Names the lines with the rig as given. Where their crossings then miss each other, or many
-/// curves stay without a name, with the rig as the crossings correct it (refine_rig_on_frames), if
-/// its own crossings agree, or agree better, or clearly more curves have a name.
+/// Keeps the names that the solution gave with the rig as given. Where their crossings then miss
+/// each other, or many curves stay without a name, with the rig as the crossings correct it
+/// (refine_rig_on_frames), if its own crossings agree, or agree better, or clearly more curves have
+/// a name.
 [[nodiscard]] LineNaming name_lines(const Rig& rig, const std::vector<ColorFamily>& families,
-                                    const std::vector<GridGraph>& graphs,
+                                    const std::vector<GridGraph>& graphs, Labeling labeling,
                                     const PointOptions& options);
 
 }  // namespace pencilscan

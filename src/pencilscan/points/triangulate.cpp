@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "pencilscan/core/parallel.h"
+#include "pencilscan/rig/object_space.h"
 
 namespace pencilscan {
 namespace {
@@ -34,8 +35,9 @@ double position_sigma(const Curve& curve, int i, const TriangulationOptions& opt
       options.position_factor * curve.points[static_cast<std::size_t>(i)].sigma_px, end);
 }
 
-void add_run(const Rig& rig, const GridGraph& graph, const LabeledRun& run, const Sphere& volume,
-             const TriangulationOptions& options, std::vector<MeasuredPoint>& points) {
+void add_run(const Rig& rig, const GridGraph& graph, const LabeledRun& run,
+             const ObjectSpace& space, const TriangulationOptions& options,
+             std::vector<MeasuredPoint>& points) {
   const Camera& camera = rig.camera(graph.camera);
   const Curve& curve = graph.curves[static_cast<std::size_t>(run.curve)];
   const CurveLabel& label = run.label;
@@ -53,7 +55,7 @@ void add_run(const Rig& rig, const GridGraph& graph, const LabeledRun& run, cons
     if (!depth) continue;
     const Vec3 x_in_camera = *depth * direction;
     const Vec3 x = world_from_camera * x_in_camera;
-    if ((x - volume.center).norm() > options.volume_margin * volume.radius) continue;
+    if (!space.holds(x)) continue;
     const double slope = std::abs(ray.slope(*depth, pattern.axis));
     const double gain = coordinate_per_pixel(camera, projector, projector_from_camera, pattern.axis,
                                              p.normal, x_in_camera);
@@ -116,11 +118,11 @@ void keep_one_per_pixel(std::vector<MeasuredPoint>& points) {
 std::vector<MeasuredPoint> triangulate(const Rig& rig, std::span<const GridGraph> graphs,
                                        const Labeling& labeling,
                                        const TriangulationOptions& options) {
-  const Sphere volume = working_volume(rig);
+  const ObjectSpace space(rig, options.volume_margin);
   std::vector<std::vector<MeasuredPoint>> per_camera(graphs.size());
   parallel_for(graphs.size(), [&](std::size_t g) {
     for (const LabeledRun& run : labeling.runs[static_cast<std::size_t>(graphs[g].camera)]) {
-      add_run(rig, graphs[g], run, volume, options, per_camera[g]);
+      add_run(rig, graphs[g], run, space, options, per_camera[g]);
     }
     keep_one_per_pixel(per_camera[g]);
   });

@@ -36,6 +36,9 @@ SensorOptions camera_sensor(const PhotographyOptions& options, const Camera& cam
   sensor.read_noise = options.read_noise.value_or(sensor.read_noise);
   sensor.gain = options.gain;
   sensor.gamma = camera.gamma;
+  sensor.black_level = camera.black_level;
+  sensor.mosaic = camera.mosaic ? camera.mosaic : options.interpolated;
+  sensor.interpolated = !camera.mosaic;
   sensor.bit_depth = options.bits;
   return sensor;
 }

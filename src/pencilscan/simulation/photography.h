@@ -24,6 +24,8 @@ struct PhotographyOptions {
   std::optional<double> read_noise;
   double gain = 1;
   int bits = 8;  ///< 8 or 16
+  /// Pictures of cameras without a mosaic come through this one, interpolated.
+  std::optional<Mosaic> interpolated;
   std::uint64_t seed = 1;
 };
 
@@ -32,7 +34,8 @@ struct PhotographyOptions {
 /// options.render with the ambient light of the preset, unless it is stated.
 [[nodiscard]] RenderOptions scene_light(const PhotographyOptions& options);
 
-/// What camera `camera` of the rig stores of the rig's patterns on the object: 8U or 16U, RGB. A
+/// What camera `camera` of the rig stores of the rig's patterns on the object: 8U or 16U, RGB, or
+/// one channel of a camera with a mosaic. A
 /// texture camera sees white light instead. `image`: a number of its own for every picture of a
 /// run, which its noise depends on.
 [[nodiscard]] cv::Mat photograph(const Rig& rig, std::size_t camera, const SimulatedObject& object,

@@ -48,15 +48,43 @@ void mix_channels(cv::Mat& image, const SensorOptions& options) {
   });
 }
 
-/// Stored value of one linear value.
+/// What the sensor reads of one linear value.
 double expose(double linear, const SensorOptions& options, Random& random) {
   double value = std::max(0.0, linear);
   if (options.full_well > 0) {
     value = photo_electrons(random, value * options.full_well) / options.full_well;
   }
   if (options.read_noise > 0) value += options.read_noise / 255 * random.normal();
-  value = std::clamp(value * options.gain, 0.0, 1.0);
-  return options.gamma == 1 ? value : std::pow(value, 1 / options.gamma);
+  return value * options.gain;
+}
+
+/// Stored value in [0, 1] of what was read.
+double encode(double value, const SensorOptions& options) {
+  const double black = options.black_level;
+  value = std::clamp(value, options.gamma == 1 ? -black / (1 - black) : 0.0, 1.0);
+  if (options.gamma != 1) value = std::pow(value, 1 / options.gamma);
+  return black + (1 - black) * value;
+}
+
+/// Integers of an image like `light`: read(y, encode_next) hands on the values of row y in order.
+template <class Read>
+cv::Mat stored_rows(const cv::Mat& light, const SensorOptions& options, Read read) {
+  const bool wide = options.bit_depth == 16;
+  const double top = wide ? 65535 : 255;
+  cv::Mat stored(light.size(), CV_MAKETYPE(wide ? CV_16U : CV_8U, light.channels()));
+  parallel_for(static_cast<std::size_t>(light.rows), [&](std::size_t row) {
+    const int y = static_cast<int>(row);
+    int i = 0;
+    read(y, [&](double value) {
+      const long number = std::lround(top * encode(value, options));
+      if (wide) {
+        stored.ptr<std::uint16_t>(y)[i++] = static_cast<std::uint16_t>(number);
+      } else {
+        stored.ptr<std::uint8_t>(y)[i++] = static_cast<std::uint8_t>(number);
+      }
+    });
+  });
+  return stored;
 }
 
 }  // namespace
@@ -94,24 +122,30 @@ cv::Mat apply_sensor(const cv::Mat& linear, const SensorOptions& options, std::u
   cv::Mat light = linear.clone();
   mix_channels(light, options);
   light = blurred(light, options.blur_px);
-  const bool wide = options.bit_depth == 16;
-  const double top = wide ? 65535 : 255;
-  cv::Mat stored(light.size(), CV_MAKETYPE(wide ? CV_16U : CV_8U, light.channels()));
+  const bool has_mosaic = options.mosaic && light.channels() == 3;
+  if (has_mosaic) light = sampled(light, *options.mosaic);
+  const auto noise_of_row = [&](int y) {
+    return Random(seed, (static_cast<std::uint64_t>(image) << 32U) | static_cast<std::uint64_t>(y));
+  };
+  if (!has_mosaic || !options.interpolated) {
+    return stored_rows(light, options, [&](int y, auto encode_next) {
+      Random random = noise_of_row(y);
+      const float* in = light.ptr<float>(y);
+      for (int i = 0; i < light.cols * light.channels(); ++i)
+        encode_next(expose(in[i], options, random));
+    });
+  }
   parallel_for(static_cast<std::size_t>(light.rows), [&](std::size_t row) {
-    const int y = static_cast<int>(row);
-    Random random(seed, (static_cast<std::uint64_t>(image) << 32U) | row);
-    const float* in = light.ptr<float>(y);
-    const int count = light.cols * light.channels();
-    for (int i = 0; i < count; ++i) {
-      const long value = std::lround(top * expose(in[i], options, random));
-      if (wide) {
-        stored.ptr<std::uint16_t>(y)[i] = static_cast<std::uint16_t>(value);
-      } else {
-        stored.ptr<std::uint8_t>(y)[i] = static_cast<std::uint8_t>(value);
-      }
-    }
+    Random random = noise_of_row(static_cast<int>(row));
+    float* values = light.ptr<float>(static_cast<int>(row));
+    for (int i = 0; i < light.cols; ++i)
+      values[i] = static_cast<float>(expose(values[i], options, random));
   });
-  return stored;
+  light = demosaiced(light, *options.mosaic);
+  return stored_rows(light, options, [&](int y, auto encode_next) {
+    const float* in = light.ptr<float>(y);
+    for (int i = 0; i < light.cols * light.channels(); ++i) encode_next(in[i]);
+  });
 }
 
 }  // namespace pencilscan

@@ -65,6 +65,45 @@ TEST(ApplySensor, BlurKeepsLightAndSpreadsItByItsVariance) {
   EXPECT_NEAR(spread / sum, 0.49, 0.01);  // a sampled Gaussian of 0.7 px, cut at 4 sigma
 }
 
+TEST(ApplySensor, MosaicKeepsOneColourAPixelAboveItsBlackLevel) {
+  SensorOptions options;
+  options.mosaic = Mosaic::from_name("RGGB");
+  options.black_level = 0.1;
+  options.bit_depth = 16;
+  const cv::Mat flat(4, 4, CV_32FC3, cv::Scalar(0.2, 0.4, 0.6));
+  const cv::Mat raw = apply_sensor(flat, options);
+  ASSERT_EQ(raw.type(), CV_16UC1);
+  const auto linear = [&](int x, int y) {
+    return (raw.at<std::uint16_t>(y, x) / 65535.0 - 0.1) / 0.9;
+  };
+  EXPECT_NEAR(linear(0, 0), 0.2, 1e-4);
+  EXPECT_NEAR(linear(1, 0), 0.4, 1e-4);
+  EXPECT_NEAR(linear(2, 3), 0.4, 1e-4);
+  EXPECT_NEAR(linear(3, 3), 0.6, 1e-4);
+}
+
+TEST(ApplySensor, InterpolatedColoursHaveLessNoiseThanTheirSamples) {
+  SensorOptions options;
+  options.mosaic = Mosaic::from_name("RGGB");
+  options.interpolated = true;
+  options.full_well = 6000;
+  options.bit_depth = 16;
+  const cv::Mat flat(300, 300, CV_32FC3, cv::Scalar(0.3, 0.3, 0.3));
+  cv::Mat picture;
+  apply_sensor(flat, options).convertTo(picture, CV_64F, 1 / 65535.0);
+  ASSERT_EQ(picture.channels(), 3);
+  double of_samples = 0;
+  double between = 0;  // the mean of four samples
+  for (int y = 1; y < 299; ++y) {
+    for (int x = 1; x < 299; ++x) {
+      const double error = picture.at<cv::Vec3d>(y, x)[0] - 0.3;
+      if (x % 2 == 0 && y % 2 == 0) of_samples += error * error;
+      if (x % 2 == 1 && y % 2 == 1) between += error * error;
+    }
+  }
+  EXPECT_NEAR(between / of_samples, 0.25, 0.015);  // 22,201 samples each: good to 1 %, correlated
+}
+
 TEST(CrosstalkMatrix, KeepsGreyAndReproducesTheDocumentedRows) {
   const Mat3 matrix = crosstalk_matrix(0.08);
   EXPECT_LT((matrix * Vec3::Ones() - Vec3::Ones()).norm(), 1e-12);

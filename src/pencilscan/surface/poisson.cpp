@@ -30,9 +30,6 @@ TriangleMesh poisson_surface(std::span<const SurfaceSample> samples, int depth, 
   } catch (const std::runtime_error& error) {
     throw StageError(std::string("surface: Poisson reconstruction failed: ") + error.what());
   }
-  if (signed_volume(mesh) < 0) {
-    for (auto& face : mesh.faces) std::swap(face[1], face[2]);
-  }
   return mesh;
 }
 

@@ -178,6 +178,21 @@ cv::Mat projector_light(const Camera& camera, const cv::Mat& linear, const Unmix
   return registered(camera, result, corner);
 }
 
+cv::Mat presence_samples(const Camera& camera, const Unmixing& unmixing,
+                         const ColorFamily& family) {
+  if (!camera.mosaic || !camera.color_registration.none()) return {};
+  const Eigen::RowVector3d share =
+      (family.presence.transpose() * unmixing.projector_from_camera).cwiseAbs();
+  Eigen::Index color = 0;
+  if (2 * share.maxCoeff(&color) <= share.sum()) return {};
+  cv::Mat samples(camera.height, camera.width, CV_8U);
+  for (int y = 0; y < samples.rows; ++y) {
+    auto* row = samples.ptr<std::uint8_t>(y);
+    for (int x = 0; x < samples.cols; ++x) row[x] = camera.mosaic->color(x, y) == color ? 255 : 0;
+  }
+  return samples;
+}
+
 cv::Mat presence_image(const cv::Mat& unmixed_image, const ColorFamily& family) {
   const cv::Matx13f weights(static_cast<float>(family.presence[0]),
                             static_cast<float>(family.presence[1]),

@@ -32,6 +32,12 @@ struct Unmixing {
 [[nodiscard]] cv::Mat projector_light(const Camera& camera, const cv::Mat& linear,
                                       const Unmixing& unmixing, cv::Point corner = {0, 0});
 
+/// Where a camera's mosaic has a sample that makes more than half of a family's presence, CV_8UC1:
+/// 255; elsewhere presence is filled in from around. Empty where no colour makes so much of it, for
+/// a camera without a mosaic, and where colours are registered away from their pixels.
+[[nodiscard]] cv::Mat presence_samples(const Camera& camera, const Unmixing& unmixing,
+                                       const ColorFamily& family);
+
 /// Presence channel of a family, CV_32FC1.
 [[nodiscard]] cv::Mat presence_image(const cv::Mat& unmixed_image, const ColorFamily& family);
 

@@ -1,0 +1,282 @@
+#include "pencilscan/pipeline/picture_check.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <opencv2/imgproc.hpp>
+
+#include "pencilscan/core/median.h"
+#include "pencilscan/core/parallel.h"
+#include "pencilscan/rig/camera_light.h"
+
+namespace pencilscan {
+namespace {
+
+/// Light of a picture in blocks of 8 x 8 px is above its noise by less than this many deviations:
+/// of 20,000 blocks of noise alone, the largest lies 4 above the median.
+constexpr double kBlackDeviations = 6;
+
+/// Every eighth row, which tells as much of what a whole picture is; shares the pixels.
+cv::Mat some_rows(const cv::Mat& picture) {
+  return {picture.rows / 8, picture.cols, picture.type(), picture.data, 8 * picture.step};
+}
+
+/// Mean absolute difference of neighbours in a row, as a deviation of one pixel (Gaussian noise:
+/// E|d| = 2 sigma / sqrt(pi)). Lines raise it, which only makes the rule for black stricter.
+double pixel_noise(const cv::Mat& grey) {
+  const cv::Mat left = grey.colRange(0, grey.cols - 2);
+  const cv::Mat right = grey.colRange(2, grey.cols);  // the same colour of a mosaic
+  return cv::norm(left, right, cv::NORM_L1) / static_cast<double>(left.total()) * std::sqrt(M_PI) /
+         2;
+}
+
+bool is_black(const cv::Mat& picture) {
+  constexpr int kBlock = 8;
+  if (picture.cols < 4 * kBlock || picture.rows < 4 * kBlock) return false;
+  const auto grey = [](const cv::Mat& rgb) {
+    cv::Mat sum = rgb;
+    if (rgb.channels() == 3) cv::transform(rgb, sum, cv::Matx13f(1, 1, 1));
+    return sum;
+  };
+  cv::Mat blocks;
+  cv::resize(picture, blocks, {picture.cols / kBlock, picture.rows / kBlock}, 0, 0, cv::INTER_AREA);
+  blocks = grey(blocks);
+  std::vector<float> values(blocks.begin<float>(), blocks.end<float>());
+  const float brightest = *std::max_element(values.begin(), values.end());
+  const float usual = upper_median(std::move(values));
+  return static_cast<double>(brightest - usual) <=
+         kBlackDeviations * pixel_noise(grey(some_rows(picture))) / kBlock;
+}
+
+bool needs_color(const Rig& rig) {
+  const std::vector<ColorFamily> families = color_families(rig);
+  return families.size() > 1 || (families.size() == 1 && families[0].colors.size() > 1);
+}
+
+bool is_grey(const cv::Mat& picture) {
+  if (picture.channels() != 3) return false;
+  constexpr float kStep = 2.5F / 255;  // JPEG's rounding of its colour differences
+  const cv::Mat rows = some_rows(picture);
+  std::vector<cv::Mat> rgb;
+  cv::split(rows, rgb);
+  const cv::Mat colorful = (cv::abs(rgb[0] - rgb[1]) > kStep) | (cv::abs(rgb[2] - rgb[1]) > kStep);
+  return cv::countNonZero(colorful) * 1000 < static_cast<int>(rows.total());
+}
+
+bool is_same(const cv::Mat& a, const cv::Mat& b) {
+  const auto equal = [](const cv::Mat& x, const cv::Mat& y) {
+    return cv::norm(x, y, cv::NORM_INF) == 0;
+  };
+  return a.size() == b.size() && a.type() == b.type() &&
+         equal(a.row(a.rows / 2), b.row(b.rows / 2)) && equal(a, b);
+}
+
+cv::Mat flipped(const cv::Mat& picture, int code) {
+  cv::Mat result;
+  cv::flip(picture, result, code);
+  return result;
+}
+
+cv::Mat with_red_for_blue(const cv::Mat& picture) {
+  cv::Mat result;
+  cv::cvtColor(picture, result, cv::COLOR_RGB2BGR);
+  return result;
+}
+
+/// Undoes what may have happened to a picture.
+struct Remedy {
+  PictureFault fault;
+  std::function<cv::Mat(const cv::Mat&)> undo;
+};
+
+const std::vector<Remedy>& remedies() {
+  static const std::vector<Remedy> all = {
+      {PictureFault::kRedBlueExchanged, with_red_for_blue},
+      {PictureFault::kTurned, [](const cv::Mat& p) { return flipped(p, -1); }},
+      {PictureFault::kMirrored, [](const cv::Mat& p) { return flipped(p, 1); }},
+      {PictureFault::kUpsideDown, [](const cv::Mat& p) { return flipped(p, 0); }}};
+  return all;
+}
+
+std::size_t curve_points_of(const GridGraph& graph) {
+  std::size_t count = 0;
+  for (const Curve& curve : graph.curves) count += curve.points.size();
+  return count;
+}
+
+/// Share of a camera's curve points that have a name, of those that a right picture could have named:
+/// what nothing crosses, or lies outside the volume (walls, people), says nothing.
+double named_share(const Labeling& labeling, std::size_t c) {
+  const std::size_t named = labelled_points(labeling.runs[c]);
+  const auto undecided = undecided_points(labeling.undecided[c], labeling.runs[c]);
+  const std::size_t unnamed = undecided[static_cast<std::size_t>(UndecidedReason::kAmbiguous)] +
+                              undecided[static_cast<std::size_t>(UndecidedReason::kContradicted)];
+  if (named == 0) return 0;
+  return static_cast<double>(named) / static_cast<double>(named + unnamed);
+}
+
+/// Names the curves of single pictures.
+class PictureTrial {
+ public:
+  PictureTrial(const Rig& rig, const PointOptions& options) : rig_(rig), options_(options) {
+    options_.progress = {};
+    // The pictures come as linear light of three colours.
+    for (Camera& camera : rig_.cameras) {
+      camera.gamma = 1;
+      camera.black_level = 0;
+      camera.mosaic.reset();
+    }
+  }
+
+  /// named_share() of `light` where camera c stands.
+  [[nodiscard]] double named(std::size_t c, const cv::Mat& light) const {
+    Frame frame;
+    frame.images.resize(rig_.cameras.size());
+    frame.images[c] = light;
+    const PointResult found = detect_frame(rig_, frame, options_);
+    const Labeling labeling =
+        solution_method(options_.method).solve(rig_, found.families, found.graphs, options_.method);
+    return named_share(labeling, c);
+  }
+
+ private:
+  Rig rig_;
+  PointOptions options_;
+};
+
+/// A camera that may have a wrong picture.
+struct Suspect {
+  std::size_t camera = 0;
+  double named = 0;  ///< named_share() of its own picture, alone
+  cv::Mat light;
+  PictureFinding best;
+  double best_named = 0;
+};
+
+}  // namespace
+
+std::string describe(const Rig& rig, const PictureFinding& finding) {
+  const auto name = [&](int camera) { return rig.camera(camera).name; };
+  const std::string who = "camera " + name(finding.camera) + ": its picture ";
+  const std::string out = "; reconstructed without it";
+  switch (finding.fault) {
+    case PictureFault::kBlack:
+      return who + "is black: no projector's light is in it" + out;
+    case PictureFault::kGrey:
+      return who + "is grey, and lines are told apart by colour: take it in colour" + out;
+    case PictureFault::kRepeated:
+      return who + "is the same as camera " + name(finding.other) + "'s: one of them is a copy" +
+             out;
+    case PictureFault::kRedBlueExchanged:
+      return who + "has red and blue exchanged (BGR for RGB): store it as RGB" + out;
+    case PictureFault::kExchanged:
+      return who + "is that of camera " + name(finding.other) + ": exchange their files" + out;
+    case PictureFault::kTurned:
+      return who + "is turned by half a turn: turn it back, or calibrate it as it is" + out;
+    case PictureFault::kMirrored:
+      return who + "is mirrored, left for right" + out;
+    case PictureFault::kUpsideDown:
+      return who + "is mirrored, top for bottom" + out;
+    case PictureFault::kDoesNotFit:
+      break;
+  }
+  return who +
+         "does not fit the rig as the others' do: the camera was moved, or the picture is of "
+         "another moment or rig" +
+         out;
+}
+
+std::vector<PictureFinding> plain_faults(const Rig& rig, const Frame& frame) {
+  std::vector<PictureFinding> findings;
+  const bool colored = needs_color(rig);
+  std::vector<char> faulty(rig.cameras.size(), 0);
+  const auto find = [&](PictureFault fault, std::size_t c, int other = -1) {
+    faulty[c] = 1;
+    findings.push_back({fault, static_cast<int>(c), other});
+  };
+  for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
+    const cv::Mat& picture = frame.images[c];
+    if (picture.empty() || rig.cameras[c].sees_texture_only) continue;
+    if (is_black(picture)) {
+      find(PictureFault::kBlack, c);
+      continue;
+    }
+    if (colored && is_grey(picture)) {
+      find(PictureFault::kGrey, c);
+      continue;
+    }
+    // A copy of a picture says nothing of which camera took it: both are left out.
+    for (std::size_t other = 0; other < c; ++other) {
+      if (frame.images[other].empty() || !is_same(picture, frame.images[other])) continue;
+      if (!faulty[other]) find(PictureFault::kRepeated, other, static_cast<int>(c));
+      find(PictureFault::kRepeated, c, static_cast<int>(other));
+      break;
+    }
+  }
+  return findings;
+}
+
+std::vector<PictureFinding> misplaced_pictures(const Rig& rig, const Frame& frame,
+                                               const std::vector<GridGraph>& graphs,
+                                               const Labeling& labeling,
+                                               const PointOptions& options) {
+  // Right pictures have .58 and more named (an object on a lit floor between walls), wrong ones .21
+  // and less.
+  constexpr double kFew = 0.4;
+  constexpr double kFarLess = 0.5;      // of what the other cameras have
+  constexpr double kFarMore = 2;        // of what the picture as it is has, alone
+  constexpr std::size_t kLeastPoints = 500;
+  std::vector<double> shares(rig.cameras.size(), 0);
+  std::vector<double> of_others;
+  std::vector<Suspect> suspects;
+  for (std::size_t c = 0; c < graphs.size(); ++c) {
+    if (frame.images[c].empty() || curve_points_of(graphs[c]) < kLeastPoints) continue;
+    shares[c] = named_share(labeling, c);
+    if (shares[c] < kFew) {
+      Suspect suspect;
+      suspect.camera = c;
+      suspects.push_back(std::move(suspect));
+    } else {
+      of_others.push_back(shares[c]);
+    }
+  }
+  if (suspects.empty()) return {};
+  const std::size_t others = of_others.size();
+  const double usual = others == 0 ? 2 * kFew : upper_median(std::move(of_others));
+
+  const PictureTrial trial(rig, options);
+  parallel_for(suspects.size(), [&](std::size_t i) {
+    Suspect& s = suspects[i];
+    const Camera& camera = rig.cameras[s.camera];
+    s.light = linear_light(camera, frame.images[s.camera]);
+    s.named = trial.named(s.camera, s.light);
+  });
+  const auto consider = [&](Suspect& s, const PictureFinding& finding, double named) {
+    if (named <= s.best_named || named < kFarMore * s.named || named < kFarLess * usual) return;
+    s.best = finding;
+    s.best_named = named;
+  };
+  for (Suspect& s : suspects) {
+    for (const Remedy& remedy : remedies()) {
+      consider(s, {remedy.fault, static_cast<int>(s.camera), -1},
+               trial.named(s.camera, remedy.undo(s.light)));
+    }
+    for (const Suspect& other : suspects) {
+      if (other.camera == s.camera || other.light.size() != s.light.size()) continue;
+      consider(
+          s, {PictureFault::kExchanged, static_cast<int>(s.camera), static_cast<int>(other.camera)},
+          trial.named(other.camera, s.light));
+    }
+  }
+  std::vector<PictureFinding> findings;
+  for (const Suspect& s : suspects) {
+    if (s.best_named > 0) {
+      findings.push_back(s.best);
+    } else if (shares[s.camera] < kFarLess * usual && suspects.size() < others) {
+      findings.push_back({PictureFault::kDoesNotFit, static_cast<int>(s.camera), -1});
+    }
+  }
+  return findings;
+}
+
+}  // namespace pencilscan

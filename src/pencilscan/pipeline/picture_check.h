@@ -1,0 +1,43 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "pencilscan/pipeline/frame.h"
+
+namespace pencilscan {
+
+/// What is wrong with the picture of a camera.
+enum class PictureFault {
+  kBlack,             ///< no light in it
+  kGrey,              ///< its colours are gone, and lines are told apart by colour
+  kRepeated,          ///< another camera has the same picture
+  kRedBlueExchanged,  ///< its channels are stored as blue, green, red
+  kExchanged,         ///< it fits where another camera stands
+  kTurned,            ///< by half a turn
+  kMirrored,          ///< left and right
+  kUpsideDown,        ///< mirrored top and bottom
+  kDoesNotFit,        ///< none of these: the camera was moved, or it is of another moment
+};
+
+struct PictureFinding {
+  PictureFault fault = PictureFault::kBlack;
+  int camera = 0;
+  int other = -1;  ///< the camera that has the same picture, or that it is of
+};
+
+/// One sentence for the user: which camera, what is wrong, what to do.
+[[nodiscard]] std::string describe(const Rig& rig, const PictureFinding& finding);
+
+/// Faults that show without looking for lines: black, grey, repeated. One a camera at most.
+[[nodiscard]] std::vector<PictureFinding> plain_faults(const Rig& rig, const Frame& frame);
+
+/// Cameras of which the solution could name few curves while it names many elsewhere, or few
+/// everywhere, and why: each of the faults above is undone and the camera's curves are named alone;
+/// what then names most of them was the fault. `labeling`: of all cameras (joint).
+[[nodiscard]] std::vector<PictureFinding> misplaced_pictures(const Rig& rig, const Frame& frame,
+                                                             const std::vector<GridGraph>& graphs,
+                                                             const Labeling& labeling,
+                                                             const PointOptions& options);
+
+}  // namespace pencilscan

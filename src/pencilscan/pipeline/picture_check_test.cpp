@@ -1,0 +1,147 @@
+#include "pencilscan/pipeline/picture_check.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+#include <utility>
+
+#include "pencilscan/planning/ring.h"
+#include "pencilscan/simulation/photography.h"
+#include "pencilscan/simulation/simulated_object.h"
+
+namespace pencilscan {
+namespace {
+
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+/// Six cameras and six projectors around an egg with bumps.
+class PictureCheck : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    RingOptions ring;
+    ring.camera_width = 480;
+    ring.camera_height = 360;
+    ring.camera_focal_px = 860;
+    ring.pitch_px = 24;
+    ring.line_width_px = 8;
+    rig_ = new Rig(make_ring(ring));
+    TriangleMesh mesh = make_sphere(120, 48);
+    for (Vec3& x : mesh.vertices) {
+      const Vec3 d = x.normalized();
+      x *= 1 + 0.08 * std::sin(5 * d.x() + 1) * std::cos(4 * d.z()) + 0.1 * d.y();
+    }
+    const SimulatedObject object(mesh);
+    PhotographyOptions photo;
+    photo.noise = "medium";
+    frame_ = new Frame;
+    frame_->name = "000000";
+    for (std::size_t c = 0; c < rig_->cameras.size(); ++c) {
+      cv::Mat values;
+      photograph(*rig_, c, object, photo, static_cast<std::uint32_t>(c))
+          .convertTo(values, CV_32F, 1 / 255.0);
+      frame_->images.push_back(values);
+    }
+  }
+  static void TearDownTestSuite() {
+    delete frame_;
+    delete rig_;
+  }
+
+  /// What is said of a frame, and of which cameras.
+  static std::vector<std::string> said_of(const Frame& frame, const Rig& rig = *rig_) {
+    const PointResult result = measure_points(rig, frame);
+    std::vector<std::string> said;
+    for (const std::string& warning : result.warnings) {
+      if (warning.find("its picture") != std::string::npos) said.push_back(warning);
+    }
+    const auto left_out = std::count(result.left_out.begin(), result.left_out.end(), 1);
+    EXPECT_EQ(static_cast<std::size_t>(left_out), said.size());
+    return said;
+  }
+  static void expect_said(const Frame& frame, const std::vector<std::string>& parts) {
+    const std::vector<std::string> said = said_of(frame);
+    ASSERT_EQ(said.size(), parts.size()) << testing::PrintToString(said);
+    for (std::size_t i = 0; i < parts.size(); ++i) EXPECT_THAT(said[i], HasSubstr(parts[i]));
+  }
+  static Frame with(std::size_t camera, const cv::Mat& picture) {
+    Frame frame = *frame_;
+    frame.images[camera] = picture;
+    return frame;
+  }
+  static cv::Mat flipped(std::size_t camera, int code) {
+    cv::Mat result;
+    cv::flip(frame_->images[camera], result, code);
+    return result;
+  }
+  static cv::Mat bgr(std::size_t camera) {
+    cv::Mat result;
+    cv::cvtColor(frame_->images[camera], result, cv::COLOR_RGB2BGR);
+    return result;
+  }
+
+  static Rig* rig_;
+  static Frame* frame_;
+};
+Rig* PictureCheck::rig_ = nullptr;
+Frame* PictureCheck::frame_ = nullptr;
+
+TEST_F(PictureCheck, RightPicturesAreNotAccused) {
+  EXPECT_THAT(said_of(*frame_), IsEmpty());
+  Frame dark = *frame_;
+  for (cv::Mat& image : dark.images) image = 0.1 * image;
+  EXPECT_THAT(said_of(dark), IsEmpty());
+  Frame some = *frame_;
+  some.images[1] = some.images[3] = some.images[5] = cv::Mat();
+  EXPECT_THAT(said_of(some), IsEmpty());
+}
+
+TEST_F(PictureCheck, ExchangedCamerasAreNamed) {
+  Frame frame = *frame_;
+  std::swap(frame.images[0], frame.images[1]);
+  expect_said(frame, {"camera cam0: its picture is that of camera cam1",
+                      "camera cam1: its picture is that of camera cam0"});
+}
+
+TEST_F(PictureCheck, TurnedAndMirroredPicturesAreNamed) {
+  expect_said(with(4, flipped(4, -1)), {"camera cam4: its picture is turned by half a turn"});
+  expect_said(with(2, flipped(2, 1)), {"camera cam2: its picture is mirrored, left for right"});
+  expect_said(with(3, flipped(3, 0)), {"camera cam3: its picture is mirrored, top for bottom"});
+}
+
+TEST_F(PictureCheck, ExchangedColorsAreNamed) {
+  expect_said(with(5, bgr(5)), {"camera cam5: its picture has red and blue exchanged"});
+  Frame frame = *frame_;
+  for (std::size_t c = 0; c < frame.images.size(); ++c) frame.images[c] = bgr(c);
+  for (const std::string& said : said_of(frame)) EXPECT_THAT(said, HasSubstr("BGR"));
+  EXPECT_EQ(said_of(frame).size(), 6U);
+}
+
+TEST_F(PictureCheck, BlackGreyAndRepeatedPicturesAreNamed) {
+  cv::Mat black(frame_->images[0].size(), CV_32FC3);
+  cv::randn(black, 0.01, 0.005);
+  expect_said(with(0, black), {"camera cam0: its picture is black"});
+  expect_said(with(0, cv::Mat::zeros(black.size(), CV_32FC3)),
+              {"camera cam0: its picture is black"});
+  cv::Mat grey;
+  cv::cvtColor(frame_->images[1], grey, cv::COLOR_RGB2GRAY);
+  cv::cvtColor(grey, grey, cv::COLOR_GRAY2RGB);
+  expect_said(with(1, grey), {"camera cam1: its picture is grey"});
+  expect_said(with(2, frame_->images[3]),
+              {"camera cam2: its picture is the same as camera cam3's",
+               "camera cam3: its picture is the same as camera cam2's"});
+}
+
+TEST_F(PictureCheck, AMovedCameraIsNamed) {
+  Rig moved = *rig_;
+  RigidTransform& pose = moved.cameras[2].device_from_world;
+  pose.rotation = Eigen::AngleAxisd(0.1, Vec3::UnitZ()).toRotationMatrix() * pose.rotation;
+  const auto said = said_of(*frame_, moved);
+  ASSERT_EQ(said.size(), 1U);
+  EXPECT_THAT(said[0], HasSubstr("camera cam2: its picture does not fit the rig"));
+}
+
+}  // namespace
+}  // namespace pencilscan

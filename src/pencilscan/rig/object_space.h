@@ -1,0 +1,30 @@
+#pragma once
+
+#include <optional>
+
+#include "pencilscan/rig/rig.h"
+
+namespace pencilscan {
+
+/// Distance of neighbouring light sheets at the volume's centre, in the rig's unit: the median over
+/// the patterns; 0 without any.
+[[nodiscard]] double line_spacing(const Rig& rig);
+
+/// Where the object can be: in the volume, with a margin, and more than a line spacing above the
+/// floor where the rig states one.
+class ObjectSpace {
+ public:
+  explicit ObjectSpace(const Rig& rig, double volume_margin = 1.1);
+
+  [[nodiscard]] bool holds(const Vec3& x) const {
+    return (x - volume_.center).norm() <= volume_.radius &&
+           (!floor_ || floor_->height(x) > least_height_);
+  }
+
+ private:
+  Sphere volume_;  ///< margin included
+  std::optional<Floor> floor_;
+  double least_height_;
+};
+
+}  // namespace pencilscan
