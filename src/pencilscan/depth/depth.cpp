@@ -1,6 +1,7 @@
 #include "pencilscan/depth/depth.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "pencilscan/core/check.h"
 #include "pencilscan/core/median.h"
@@ -16,6 +17,16 @@ cv::Mat unsaturated(const cv::Mat& values) {
   cv::Mat valid;
   cv::bitwise_and(~overexposed(values), 1, valid);
   return valid;
+}
+
+/// A mosaic leaves a quarter of the samples, so noise at a window's centre doubles. It falls as 1 /
+/// r with the radius r, what a quadric leaves of the surface grows as r^4: the best r goes as the
+/// fifth root of the noise.
+DepthOptions options_for(const Camera& camera, DepthOptions options) {
+  constexpr double kWider = 1.1487;  // 2^(1/5)
+  if (camera.mosaic)
+    options.half = static_cast<int>(std::lround((options.half + 0.5) * kWider - 0.5));
+  return options;
 }
 
 CameraDepthReport camera_report(const DepthMap& map, double blur_px) {
@@ -57,9 +68,10 @@ DepthResult measure_depth(const Rig& rig, const std::vector<ColorFamily>& famili
       sampled.push_back(presence_samples(camera, unmixings[c], family));
     }
     CameraLight& light = result.lights[i];
+    const DepthOptions depth = options_for(camera, options.depth);
     light = measure_light(rig, static_cast<int>(c), families, std::move(presence),
-                          std::move(sampled), unsaturated(images[c]), points, options.depth);
-    result.maps[i] = dense_depth(light, static_cast<int>(c), points, space, options.depth);
+                          std::move(sampled), unsaturated(images[c]), points, depth);
+    result.maps[i] = dense_depth(light, static_cast<int>(c), points, space, depth);
   });
   result.report.seconds_depth = watch.seconds();
 
@@ -83,8 +95,9 @@ void complete_depth(const Rig& rig, const RayScene& surface, const DepthStageOpt
   const ObjectSpace space(rig);
   std::vector<std::size_t> found(result.maps.size());
   parallel_for(result.maps.size(), [&](std::size_t i) {
-    found[i] = complete_map(result.lights[i], surface, space,
-                            result.report.consistency.sigma_factor, options.depth, result.maps[i]);
+    found[i] =
+        complete_map(result.lights[i], surface, space, result.report.consistency.sigma_factor,
+                     options_for(*result.lights[i].camera, options.depth), result.maps[i]);
   });
   for (std::size_t i = 0; i < found.size(); ++i) {
     result.report.completed += found[i];

@@ -218,6 +218,25 @@ struct VisiblePattern {
   std::vector<std::size_t> colors;  ///< of one period
 };
 
+/// Where lines may lie: the volume, and where a good part of the curves misses it, so that there is
+/// a room around the object, what is near it, too. A floor's line that had no label of its own
+/// would take that of a place in the air above it.
+Sphere reach_of_labels(const Camera& camera, const Sphere& volume, const GridGraph& graph,
+                       const PieceGraph& pieces) {
+  constexpr double kRoom =
+      0.1;  // of the pieces: rims of an object that fills the volume stay below
+  constexpr double kSurround = 2;  // radii; what lies farther rarely meets other lines by chance
+  std::size_t outside = 0;
+  for (const CurvePiece& piece : pieces.pieces) {
+    const Curve& curve = graph.curves[static_cast<std::size_t>(piece.curve)];
+    const auto middle = static_cast<std::size_t>((piece.begin + piece.end) / 2);
+    if (!depth_range(camera, volume, curve.points[middle].position.cast<double>())) ++outside;
+  }
+  const bool is_room =
+      static_cast<double>(outside) > kRoom * static_cast<double>(pieces.pieces.size());
+  return {volume.center, is_room ? kSurround * volume.radius : volume.radius};
+}
+
 }  // namespace
 
 CrossingCost::CrossingCost(const LabelledPieces& pieces, const JointOptions& options)
@@ -277,9 +296,10 @@ LabelledPieces possible_labels(const Rig& rig, const std::vector<ColorFamily>& f
         visible[f].emplace_back(rig, camera, families[f], ref);
     }
   }
+  const Sphere reach = reach_of_labels(camera, volume, graph, result.graph);
   const double distance = (camera.device_from_world * volume.center).z();
   result.inverse_depth_range = static_cast<float>(
-      1 / std::max(1e-3 * distance, distance - volume.radius) - 1 / (distance + volume.radius));
+      1 / std::max(1e-3 * distance, distance - reach.radius) - 1 / (distance + reach.radius));
   for (const Projector& projector : rig.projectors) {
     const Vec3 light = camera.device_from_world * projector.center();
     result.lights.push_back(light.cast<float>());
@@ -292,8 +312,9 @@ LabelledPieces possible_labels(const Rig& rig, const std::vector<ColorFamily>& f
     labels.clear();
     const Curve& curve = graph.curves[static_cast<std::size_t>(piece.curve)];
     const auto middle = static_cast<std::size_t>((piece.begin + piece.end) / 2);
-    const auto range = depth_range(camera, volume, curve.points[middle].position.cast<double>());
-    if (!range) continue;
+    const Vec2 pixel = curve.points[middle].position.cast<double>();
+    if (!depth_range(camera, volume, pixel)) continue;
+    const auto range = depth_range(camera, reach, pixel);
     const auto w_low = static_cast<float>(1 / range->far);
     const auto w_high = static_cast<float>(1 / range->near);
     const ColorFamily& family = families[static_cast<std::size_t>(curve.family)];

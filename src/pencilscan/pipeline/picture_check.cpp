@@ -104,8 +104,8 @@ std::size_t curve_points_of(const GridGraph& graph) {
   return count;
 }
 
-/// Share of a camera's curve points that have a name, of those that a right picture could have named:
-/// what nothing crosses, or lies outside the volume (walls, people), says nothing.
+/// Share of a camera's curve points that have a name, of those that a right picture could have
+/// named: what nothing crosses, or lies outside the volume (walls, people), says nothing.
 double named_share(const Labeling& labeling, std::size_t c) {
   const std::size_t named = labelled_points(labeling.runs[c]);
   const auto undecided = undecided_points(labeling.undecided[c], labeling.runs[c]);
@@ -223,8 +223,8 @@ std::vector<PictureFinding> misplaced_pictures(const Rig& rig, const Frame& fram
   // Right pictures have .58 and more named (an object on a lit floor between walls), wrong ones .21
   // and less.
   constexpr double kFew = 0.4;
-  constexpr double kFarLess = 0.5;      // of what the other cameras have
-  constexpr double kFarMore = 2;        // of what the picture as it is has, alone
+  constexpr double kFarLess = 0.5;  // of what the other cameras have
+  constexpr double kFarMore = 2;    // of what the picture as it is has, alone
   constexpr std::size_t kLeastPoints = 500;
   std::vector<double> shares(rig.cameras.size(), 0);
   std::vector<double> of_others;
