@@ -7,6 +7,7 @@
 
 #include "pencilscan/core/random.h"
 #include "pencilscan/detection/detect.h"
+#include "pencilscan/detection/mosaic_trace.h"
 
 namespace pencilscan {
 namespace {
@@ -159,6 +160,21 @@ TEST(DetectCurves, LinesAtTheEdgeOfADenseFieldAreFoundHoweverSharpTheyAre) {
     }
     EXPECT_GT(on_line, 2 * 110U) << "of 120 rows of each line, blur " << blur;
   }
+}
+
+TEST(LooksInterpolated, TellsFilledInColoursFromThreeChannels) {
+  Random random(3);
+  cv::Mat rgb(240, 320, CV_32FC3);
+  for (int y = 0; y < rgb.rows; ++y) {
+    for (int x = 0; x < rgb.cols; ++x) {
+      const float light = x % 12 < 4 ? 0.5F : 0.02F;
+      for (int k = 0; k < 3; ++k)
+        rgb.at<cv::Vec3f>(y, x)[k] = light + static_cast<float>(random.normal(0, 0.01));
+    }
+  }
+  EXPECT_FALSE(looks_interpolated(rgb));
+  const Mosaic mosaic = *Mosaic::from_name("GRBG");
+  EXPECT_TRUE(looks_interpolated(demosaiced(sampled(rgb, mosaic), mosaic)));
 }
 
 TEST(DetectCurves, CodeTellsBlueFromCyanUnderCrossingLines) {

@@ -9,6 +9,7 @@
 #include "pencilscan/core/median.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/core/stopwatch.h"
+#include "pencilscan/detection/mosaic_trace.h"
 #include "pencilscan/pipeline/line_naming.h"
 #include "pencilscan/pipeline/picture_check.h"
 #include "pencilscan/points/surface_check.h"
@@ -54,6 +55,23 @@ std::vector<std::string> detection_warnings(const Rig& rig, const Frame& frame,
     }
   }
   return warnings;
+}
+
+/// Says which cameras' colours were filled in; empty: none.
+std::string interpolation_warning(const Rig& rig, const Frame& frame) {
+  std::vector<char> filled(rig.cameras.size(), 0);
+  parallel_for(rig.cameras.size(), [&](std::size_t c) {
+    filled[c] = !frame.images[c].empty() && !rig.cameras[c].mosaic &&
+                !rig.cameras[c].sees_texture_only && looks_interpolated(frame.images[c]);
+  });
+  std::string names;
+  for (std::size_t c = 0; c < filled.size(); ++c) {
+    if (filled[c] != 0) names += (names.empty() ? "" : ", ") + rig.cameras[c].name;
+  }
+  if (names.empty()) return {};
+  return "the colours of " + names +
+         " were filled in behind a mosaic: raw pictures, with \"mosaic\" in the rig, are more "
+         "accurate";
 }
 
 /// Forgets what the cameras of the findings saw.
@@ -217,6 +235,8 @@ PointResult detect_frame(const Rig& rig, const Frame& frame, const PointOptions&
         detect_curves(rig.cameras[c], rig, result.families, frame.images[c], options.detection);
   });
   result.warnings = detection_warnings(rig, frame, result.families, result.detections);
+  if (std::string warning = interpolation_warning(rig, frame); !warning.empty())
+    result.warnings.push_back(std::move(warning));
   result.times.push_back({"detection", detection_watch.seconds()});
 
   announce(options.progress, "grid");
