@@ -8,8 +8,35 @@
 
 namespace pencilscan {
 
-void set_priors(const GivenCalibration& known, bool is_camera, const Device& device,
-                BundleDevice& bundle) {
+namespace {
+
+/// Square of the distance of the farthest corner of the image from the principal point, over the
+/// focal length.
+double corner_radius2(const Device& device) {
+  const double x = std::max(device.K(0, 2), device.width - 1 - device.K(0, 2)) / device.K(0, 0);
+  const double y = std::max(device.K(1, 2), device.height - 1 - device.K(1, 2)) / device.K(1, 1);
+  return x * x + y * y;
+}
+
+/// Deviations of a K that is known, and of the distortion that came with it.
+void set_tolerance(const GivenCalibration& known, const GivenTolerance& tolerance,
+                   const Device& device, BundleDevice& bundle) {
+  auto& sigma = bundle.prior_sigma;
+  sigma[kFx] = tolerance.focal * bundle.inner[kFx];
+  sigma[kFy] = std::min(sigma[kFy], tolerance.focal);
+  sigma[kCx] = sigma[kCy] = tolerance.center_px;
+  if (!known.distortion) return;
+  // A corner at r moves by k1 r^2, k2 r^4 and up to 3 p r of its distance.
+  const double r2 = corner_radius2(device);
+  sigma[kK1] = std::min(sigma[kK1], tolerance.focal / r2);
+  sigma[kK2] = std::min(sigma[kK2], tolerance.focal / (r2 * r2));
+  sigma[kP1] = sigma[kP2] = std::min(sigma[kP1], tolerance.focal / (3 * std::sqrt(r2)));
+}
+
+}  // namespace
+
+void set_priors(const GivenCalibration& known, const std::optional<GivenTolerance>& tolerance,
+                bool is_camera, const Device& device, BundleDevice& bundle) {
   const double width = device.width;
   const double height = device.height;
   auto& value = bundle.prior;
@@ -28,6 +55,7 @@ void set_priors(const GivenCalibration& known, bool is_camera, const Device& dev
   sigma[kK2] = 0.5;
   sigma[kP1] = sigma[kP2] = 0.002;
   sigma[kK3] = 0;
+  if (known.K && tolerance) set_tolerance(known, *tolerance, device, bundle);
 }
 
 void hold_given(const GivenCalibration& known, BundleDevice& bundle) {
@@ -39,9 +67,7 @@ void hold_given(const GivenCalibration& known, BundleDevice& bundle) {
 
 double unmodelled_k3(const Device& device) {
   constexpr double kShare = 5e-4;
-  const double x = std::max(device.K(0, 2), device.width - 1 - device.K(0, 2)) / device.K(0, 0);
-  const double y = std::max(device.K(1, 2), device.height - 1 - device.K(1, 2)) / device.K(1, 1);
-  return kShare / std::pow(x * x + y * y, 3);
+  return kShare / std::pow(corner_radius2(device), 3);
 }
 
 void expect_unmodelled(const Rig& sizes, BundleProblem& problem) {

@@ -1,15 +1,26 @@
 #pragma once
 
+#include <optional>
+
 #include "pencilscan/bundle/bundle.h"
 #include "pencilscan/rig/rig.h"
 
 namespace pencilscan {
 
+/// How far off given values may be, one standard deviation; 0: they are exact.
+struct GivenTolerance {
+  double focal = 0.005;  ///< of fx and fy over themselves, >= 0
+  double center_px = 5;  ///< of cx and cy, >= 0
+};
+
 /// What is plausible of a device of which nothing was given: lenses have their principal point near
 /// the centre and square pixels; projectors shift the lens upwards by up to the image's height, and
-/// panels may be stretched. Given values are taken as rough. Values in, standard deviations out.
-void set_priors(const GivenCalibration& known, bool is_camera, const Device& device,
-                BundleDevice& bundle);
+/// panels may be stretched. A given K is off by the tolerance; given distortion displaces the
+/// farthest corner of the image by that share of its distance from the principal point. Without a
+/// tolerance given values are rough: a start that any data overrule. Values in, standard deviations
+/// out.
+void set_priors(const GivenCalibration& known, const std::optional<GivenTolerance>& tolerance,
+                bool is_camera, const Device& device, BundleDevice& bundle);
 /// Holds what was given at its value.
 void hold_given(const GivenCalibration& known, BundleDevice& bundle);
 

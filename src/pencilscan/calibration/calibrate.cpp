@@ -10,11 +10,12 @@
 #include "pencilscan/bundle/triangulation.h"
 #include "pencilscan/bundle/uncertainty.h"
 #include "pencilscan/calibration/board_start.h"
+#include "pencilscan/calibration/given_values.h"
+#include "pencilscan/calibration/pair_fit.h"
 #include "pencilscan/calibration/rig_frame.h"
-#include "pencilscan/calibration/structure.h"
+#include "pencilscan/calibration/start_up.h"
 #include "pencilscan/calibration/suspects.h"
 #include "pencilscan/core/median.h"
-#include "pencilscan/core/parallel.h"
 
 namespace pencilscan {
 namespace {
@@ -74,21 +75,22 @@ class Calibration {
               const Progress& progress)
       : input_(input), options_(options), progress_(progress), rig_(input.rig) {
     known_ = focal_lengths_from_boards(input, rig_);
+    result_.tolerance = options.tolerance;
+    for (const GivenCalibration& k : input.known)
+      result_.given.push_back(k.K ? GivenUse::kTolerance : GivenUse::kNone);
   }
 
   CalibrationResult run() {
     split_tracks();
     say("finding the geometry of pairs", 0);
     result_.pairs = pair_geometries(input_.rig, result_.problem.tracks);
-    const std::size_t before = views();
+    all_tracks_ = result_.problem.tracks;
     drop_epipolar_outliers(input_.rig, result_.pairs, options_.least_inlier_share,
                            result_.problem.tracks);
-    epipolar_outliers_ = before - views();
     candidates_ = result_.problem.tracks;
-    if (!find_structure()) return finish(false);
-    add_projected_corners(input_, result_.problem);
-    refine();
+    if (!solve_with_given()) return finish(false);
     keep_given_values();
+    take_back_views();
     last_stage();
     return finish(true);
   }
@@ -98,9 +100,9 @@ class Calibration {
     if (progress_) progress_(what, fraction);
   }
 
-  [[nodiscard]] std::size_t views() const {
+  [[nodiscard]] static std::size_t views(const std::vector<Track>& tracks) {
     std::size_t sum = 0;
-    for (const Track& track : result_.problem.tracks) sum += track.views.size() - 1;
+    for (const Track& track : tracks) sum += track.views.size() - 1;
     return sum;
   }
 
@@ -114,80 +116,86 @@ class Calibration {
     }
   }
 
-  /// Devices with inner parameters as guessed or given, no poses unless given for all.
-  [[nodiscard]] std::vector<BundleDevice> start(const FocalGuess& guess) const {
-    const Rig rig = rig_with_guess(rig_, guess, known_);
-    const bool posed = std::all_of(input_.known.begin(), input_.known.end(),
-                                   [](const GivenCalibration& k) { return k.pose; });
-    std::vector<BundleDevice> devices;
-    for (std::size_t d = 0; d < device_count(rig); ++d) {
-      devices.push_back(bundle_device(device_at(rig, d)));
-      set_priors(input_.known[d], d < rig.cameras.size(), device_at(rig, d), devices.back());
-      devices.back().present = posed;
-    }
-    return devices;
+  [[nodiscard]] bool is_any_given() const {
+    return std::any_of(input_.known.begin(), input_.known.end(),
+                       [](const GivenCalibration& k) { return k.K; });
   }
 
-  [[nodiscard]] std::vector<FocalGuess> guesses() const {
-    auto all = guess_focal_lengths(rig_, result_.pairs, known_);
-    // Neighbours on the grid lead to the same place: each guess differs from the better ones.
-    std::vector<FocalGuess> chosen;
-    for (const FocalGuess& guess : all) {
-      const bool is_near = std::any_of(chosen.begin(), chosen.end(), [&](const FocalGuess& other) {
-        return std::abs(std::log(guess.camera_scale / other.camera_scale)) < 0.45 &&
-               std::abs(std::log(guess.projector_scale / other.projector_scale)) < 0.45 &&
-               std::abs(guess.lens_shift - other.lens_shift) < 0.4;
-      });
-      if (!is_near) chosen.push_back(guess);
-      if (chosen.size() == options_.hypotheses) break;
-    }
-    return chosen;
-  }
-
-  /// The best of several structures: most devices, then least cost.
-  bool find_structure() {
-    const auto tried = guesses();
-    std::vector<BundleProblem> problems(tried.size(), result_.problem);
-    std::vector<double> costs(tried.size());
+  /// A structure and its adjustment; given values are off by the tolerance, or rough.
+  bool solve(const std::optional<GivenTolerance>& tolerance) {
     say("finding a first structure", 0);
-    parallel_for(tried.size(), [&](std::size_t i) {
-      problems[i].devices = start(tried[i]);
-      costs[i] = build_structure(problems[i], kFocal | bit(kCy));
-    });
-    std::size_t best = tried.size();
-    std::size_t most = 1;
-    for (std::size_t i = 0; i < tried.size(); ++i) {
-      const std::size_t placed = present_devices(problems[i]);
-      if (placed < most || !std::isfinite(costs[i])) continue;
-      if (placed == most && best < tried.size() && costs[i] >= costs[best]) continue;
-      best = i;
-      most = placed;
-    }
-    if (!input_.board_views.empty()) {
-      auto [problem, cost] = structure_on_boards();
-      // On planes correspondences alone fit many rigs equally well: the boards' counts.
-      const bool is_alone = best == tried.size();
-      if (std::isfinite(cost) && present_devices(problem) >= most &&
-          (is_alone || cost <= 1.5 * costs[best] + 0.5)) {
-        result_.problem = std::move(problem);
-        return true;
-      }
-    }
-    if (best == tried.size()) return false;
-    result_.problem = std::move(problems[best]);
-    attach_boards(input_, result_.problem);
+    const StartUp start{input_, rig_, known_, result_.pairs, tolerance, options_.hypotheses};
+    if (!find_structure(start, result_.problem)) return false;
+    add_projected_corners(input_, result_.problem);
+    refine();
     return true;
   }
 
-  /// A structure that boards place, and its cost; infinite where they do not join two devices.
-  [[nodiscard]] std::pair<BundleProblem, double> structure_on_boards() const {
-    constexpr FocalGuess kUsual{1.5, 1.5, 0, 0};
-    BundleProblem problem = result_.problem;
-    problem.devices = start(kUsual);
-    place_by_boards(input_, known_, problem);
-    if (present_devices(problem) < 2) return {problem, std::numeric_limits<double>::infinity()};
-    const double cost = build_structure(problem, kFocal | bit(kCy));
-    return {std::move(problem), cost};
+  /// Given values within their tolerance; where that fails or strains them, also as mere starts,
+  /// which count where the data know better.
+  bool solve_with_given() {
+    if (!is_any_given()) return solve(std::nullopt);
+    const CalibrationResult fresh = result_;
+    const bool is_solved = solve(options_.tolerance);
+    if (is_solved && present_devices(result_.problem) == result_.problem.devices.size() &&
+        !is_any_pulled(input_, options_.tolerance, result_.problem))
+      return true;
+    CalibrationResult within = std::move(result_);
+    result_ = fresh;
+    const bool is_freed = solve(std::nullopt) && let_contradicted_go();
+    const bool places_more = is_freed && (!is_solved || present_devices(result_.problem) >
+                                                            present_devices(within.problem));
+    const bool fits_better = is_freed && !places_more && is_any_contradicted() &&
+                             present_devices(result_.problem) == present_devices(within.problem) &&
+                             misfit(result_.problem) < misfit(within.problem);
+    if (places_more || fits_better) return true;
+    result_ = std::move(within);
+    return is_solved;
+  }
+
+  [[nodiscard]] bool is_any_contradicted() const {
+    return std::count(result_.given.begin(), result_.given.end(), GivenUse::kContradicted) > 0;
+  }
+
+  /// Three quarters of what fundamental matrices left are explained better than this, px.
+  [[nodiscard]] double misfit(const BundleProblem& problem) const {
+    BundleProblem all;
+    all.devices = problem.devices;
+    all.tracks = candidates_;
+    triangulate_all(all, kLeastAngle);
+    std::vector<double> errors;
+    for_each_residual(all, [&](std::size_t, const TrackView&, const Vec2& error) {
+      errors.push_back(error.norm());
+    });
+    errors.resize(views(candidates_), std::numeric_limits<double>::infinity());
+    return lower_quantile(errors, 0.75);
+  }
+
+  /// After given values were mere starts: those that the data contradict say nothing any more, the
+  /// others are back in their tolerance.
+  bool let_contradicted_go() {
+    triangulate_all(result_.problem, kLeastAngle);
+    const Uncertainty sigma = uncertainty(result_.problem, result_.adjustment);
+    const std::vector<char> agrees =
+        given_agrees(input_, options_.tolerance, kContradictsDeviations, result_.problem, sigma);
+    for (std::size_t d = 0; d < agrees.size(); ++d) {
+      if (!input_.known[d].K) continue;
+      const bool is_camera = d < input_.rig.cameras.size();
+      const Device& given = device_at(input_.rig, d);
+      BundleDevice& device = result_.problem.devices[d];
+      if (agrees[d] == 0) {
+        result_.given[d] = GivenUse::kContradicted;
+        set_priors({}, {}, is_camera, given, device);
+        continue;
+      }
+      const BundleDevice found = device;
+      device.inner = bundle_device(given).inner;
+      set_priors(input_.known[d], options_.tolerance, is_camera, given, device);
+      device.inner = found.inner;
+    }
+    stage(kAll, options_.stage_tracks, 50);
+    triangulate_all(result_.problem, kLeastAngle);
+    return true;
   }
 
   void stage(unsigned free_inner, std::size_t tracks, int iterations, double track_weight = 1) {
@@ -233,73 +241,73 @@ class Calibration {
     }
   }
 
-  /// Per device: its given focal lengths are those that the data find, as far as these know them.
-  /// The scatter alone would not tell: in a ring a common error of all hides in the poses.
-  [[nodiscard]] std::vector<char> given_agrees() const {
-    constexpr double kDeviations = 4;
-    std::vector<char> agrees(input_.known.size(), 0);
-    if (std::none_of(input_.known.begin(), input_.known.end(),
-                     [](const GivenCalibration& k) { return k.K; }))
-      return agrees;
-    const Uncertainty sigma = uncertainty(result_.problem, result_.adjustment);
-    for (std::size_t d = 0; d < agrees.size(); ++d) {
-      const BundleDevice& found = result_.problem.devices[d];
-      if (!input_.known[d].K) continue;
-      const Mat3& K = device_at(input_.rig, d).K;
-      const auto is_near = [&](Intrinsic i, double given) {
-        const double slack = std::max(kDeviations * sigma.devices[d].inner[i],
-                                      options_.given_focal_tolerance * given);
-        return !found.present || std::abs(found.inner[i] - given) <= slack;
-      };
-      agrees[d] = is_near(kFx, K(0, 0)) && is_near(kFy, K(1, 1)) ? 1 : 0;
-    }
-    return agrees;
-  }
-
-  /// Values that were given and explain the data as well as free ones do are a calibration and are
-  /// kept; others were only rough.
+  /// Given values that the data know as well and confirm, and that explain them as well as free
+  /// ones do, are a calibration and are kept exactly.
   void keep_given_values() {
-    result_.inner_held.assign(input_.known.size(), 0);
-    const std::size_t cameras = input_.rig.cameras.size();
+    if (!is_any_given()) return;
     triangulate_all(result_.problem, kLeastAngle);
-    const std::vector<char> agrees = given_agrees();
-    // A guess that the data contradict says nothing any more.
-    for (std::size_t d = 0; d < agrees.size(); ++d)
-      if (input_.known[d].K && agrees[d] == 0)
-        set_priors({}, d < cameras, device_at(input_.rig, d), result_.problem.devices[d]);
+    const Uncertainty sigma = uncertainty(result_.problem, result_.adjustment);
+    const auto agrees = given_agrees(input_, options_.tolerance, 1, result_.problem, sigma);
+    const auto better = known_better(input_, options_.tolerance, result_.problem, sigma);
     const double free_scale = error_scale(result_.problem);
     for (const int attempt : {0, 1, 2}) {  // all given ones, the cameras' alone, the projectors'
-      BundleProblem trial = result_.problem;
       std::vector<char> held(input_.known.size(), 0);
+      bool is_plausible = true;
       for (std::size_t d = 0; d < held.size(); ++d) {
-        const bool in_group = attempt == 0 || (attempt == 1) == (d < cameras);
-        if (!input_.known[d].K || !in_group) continue;
-        held[d] = 1;
-        const Device& given = device_at(input_.rig, d);
-        BundleDevice exact = bundle_device(given);
-        for (std::size_t i = 0; i < kIntrinsics; ++i)
-          if (i < kK1 || input_.known[d].distortion) trial.devices[d].inner[i] = exact.inner[i];
-        hold_given(input_.known[d], trial.devices[d]);
+        const bool in_group = attempt == 0 || (attempt == 1) == (d < input_.rig.cameras.size());
+        if (result_.given[d] == GivenUse::kNone || !in_group) continue;
+        held[d] = better[d];
+        is_plausible = is_plausible && agrees[d] != 0;
       }
-      bool is_plausible = std::any_of(held.begin(), held.end(), [](char h) { return h != 0; });
-      for (std::size_t d = 0; d < held.size(); ++d)
-        is_plausible = is_plausible && (held[d] == 0 || agrees[d] != 0);
-      if (!is_plausible) continue;
-      std::swap(trial, result_.problem);
-      const BundleOptions before = result_.adjustment;
-      // Twice: the weights of the first round are those of errors not yet adapted to.
-      for (int round = 0; round < 2; ++round) {
-        stage(kAll, options_.stage_tracks, 50);
-        triangulate_all(result_.problem, kLeastAngle);
-      }
-      if (error_scale(result_.problem) <=
-          options_.given_tolerance * free_scale + options_.given_slack_px) {
-        result_.inner_held = held;
+      if (is_plausible && std::count(held.begin(), held.end(), 1) > 0 && hold(held, free_scale))
         return;
-      }
-      std::swap(trial, result_.problem);
-      result_.adjustment = before;
     }
+  }
+
+  /// Puts given values back where `held`, if the scatter stays that of free ones.
+  bool hold(const std::vector<char>& held, double free_scale) {
+    BundleProblem before = result_.problem;
+    const BundleOptions adjustment = result_.adjustment;
+    for (std::size_t d = 0; d < held.size(); ++d) {
+      if (held[d] == 0) continue;
+      const BundleDevice exact = bundle_device(device_at(input_.rig, d));
+      BundleDevice& device = result_.problem.devices[d];
+      for (std::size_t i = 0; i < kIntrinsics; ++i)
+        if (i < kK1 || input_.known[d].distortion) device.inner[i] = exact.inner[i];
+      hold_given(input_.known[d], device);
+    }
+    // Twice: the weights of the first round are those of errors not yet adapted to.
+    for (int round = 0; round < 2; ++round) {
+      stage(kAll, options_.stage_tracks, 50);
+      triangulate_all(result_.problem, kLeastAngle);
+    }
+    if (error_scale(result_.problem) <=
+        options_.hold_factor * free_scale + options_.hold_slack_px) {
+      for (std::size_t d = 0; d < held.size(); ++d)
+        if (held[d] != 0) result_.given[d] = GivenUse::kExact;
+      return true;
+    }
+    result_.problem = std::move(before);
+    result_.adjustment = adjustment;
+    return false;
+  }
+
+  /// What fundamental matrices left, and what they dropped although the rig explains it: one that
+  /// rests on a plane knows little of what lies off it. A few views more are corners that lenses
+  /// bend, or chance: these stay out.
+  void take_back_views() {
+    constexpr double kLeastShare = 0.02;
+    const PairFit fit = pair_fit();
+    std::vector<Track> explained = all_tracks_;
+    drop_epipolar_outliers(input_.rig, result_.pairs, options_.least_inlier_share, explained, &fit);
+    const auto all = static_cast<double>(views(all_tracks_));
+    if (static_cast<double>(views(explained) - views(candidates_)) > kLeastShare * all)
+      candidates_ = std::move(explained);
+    epipolar_outliers_ = views(all_tracks_) - views(candidates_);
+  }
+
+  [[nodiscard]] PairFit pair_fit() const {
+    return {result_.problem.devices, std::max(2.0, 8 * error_scale(result_.problem))};
   }
 
   void last_stage() {
@@ -323,7 +331,6 @@ class Calibration {
     result_.rig = input_.rig;
     result_.placed.assign(device_count(input_.rig), 0);
     result_.residuals.resize(device_count(input_.rig));
-    result_.inner_held.resize(device_count(input_.rig), 0);
     if (!solved) return std::move(result_);
     rescale_to_boards(result_.problem);
     result_.rig.unit_known = fix_frame(input_, result_.problem);
@@ -359,8 +366,9 @@ class Calibration {
   }
 
   void measure_held_out() {
-    drop_epipolar_outliers(input_.rig, result_.pairs, options_.least_inlier_share,
-                           result_.held_out);
+    const PairFit fit = pair_fit();
+    drop_epipolar_outliers(input_.rig, result_.pairs, options_.least_inlier_share, result_.held_out,
+                           &fit);
     BundleProblem check;
     check.devices = result_.problem.devices;
     check.tracks = result_.held_out;
@@ -389,7 +397,8 @@ class Calibration {
   const Progress& progress_;
   Rig rig_;                            ///< with focal lengths that boards give
   std::vector<char> known_;            ///< per device: K is given, or from boards
-  std::vector<Track> candidates_;      ///< what fundamental matrices left
+  std::vector<Track> all_tracks_;      ///< but those held out
+  std::vector<Track> candidates_;      ///< what fundamental matrices, or the rig, left of them
   std::size_t epipolar_outliers_ = 0;  ///< views that they dropped
   CalibrationResult result_;
 };

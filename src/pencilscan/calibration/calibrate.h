@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "pencilscan/bundle/bundle.h"
+#include "pencilscan/bundle/priors.h"
 #include "pencilscan/calibration/pair_geometry.h"
 #include "pencilscan/core/progress.h"
 #include "pencilscan/rig/rig.h"
@@ -34,10 +35,19 @@ struct CalibrateOptions {
   double held_out_share = 0.1;       ///< of the tracks, kept to check, in [0, 0.5]
   double outlier_deviations = 4;     ///< views beyond are dropped
   std::size_t stage_tracks = 3000;   ///< of all stages but the last
-  double given_tolerance = 1.1;  ///< given values are kept if the scatter grows by less than this
-  double given_slack_px = 0.01;  ///< factor, and by this much more
-  /// And if given focal lengths are within this share of free ones, or within four deviations.
-  double given_focal_tolerance = 0.005;
+  GivenTolerance tolerance{};        ///< of given inner parameters
+  /// Given values are held exactly where the data know them as well and agree, if the scatter grows
+  /// by less than this factor and by this much more.
+  double hold_factor = 1.1;
+  double hold_slack_px = 0.01;
+};
+
+/// What became of given inner parameters.
+enum class GivenUse {
+  kNone,         ///< none were given
+  kTolerance,    ///< kept within their tolerance
+  kExact,        ///< kept to the last digit: the data agree, and know them as well
+  kContradicted  ///< the data know better: they were a start only
 };
 
 /// Reprojection errors of one device's views, hubs left out, of used tracks.
@@ -54,10 +64,11 @@ struct CalibrationResult {
   BundleProblem problem;     ///< at the solution, in the rig's frame and scale; tracks as used
   std::vector<Track> held_out;
   std::vector<PairGeometry> pairs;
-  std::vector<char> inner_held;  ///< per device: given inner parameters fit the data and were kept
-  BundleOptions adjustment;      ///< of the last stage
-  double board_rms_px = 0;       ///< of the corners of boards; 0 without
-  double rms_px = 0;             ///< over all views of used tracks but the hubs, which are exact
+  std::vector<GivenUse> given;  ///< per device: what became of its given inner parameters
+  GivenTolerance tolerance;     ///< of them
+  BundleOptions adjustment;     ///< of the last stage
+  double board_rms_px = 0;      ///< of the corners of boards; 0 without
+  double rms_px = 0;            ///< over all views of used tracks but the hubs, which are exact
   double held_out_rms_px = 0;
   std::size_t views = 0;
   std::size_t views_dropped = 0;

@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "pencilscan/bundle/bundle_device.h"
+#include "pencilscan/calibration/given_values.h"
 #include "pencilscan/color/color_json.h"
 
 namespace pencilscan {
@@ -61,6 +62,22 @@ Json points_json(const BundleProblem& problem) {
   return points;
 }
 
+/// What became of a given K; deviations are those of its tolerance, null where that is 0.
+Json given_json(const CalibrationReport& report, std::size_t d) {
+  const CalibrationResult& result = report.result;
+  const char* const use = result.given[d] == GivenUse::kExact          ? "exact"
+                          : result.given[d] == GivenUse::kContradicted ? "contradicted"
+                                                                       : "within tolerance";
+  Json json{{"use", use},
+            {"focal_tolerance", result.tolerance.focal},
+            {"center_tolerance_px", result.tolerance.center_px}};
+  const auto moved =
+      moved_deviations(device_at(report.input.rig, d), result.tolerance, result.problem.devices[d]);
+  for (std::size_t i = 0; i < moved.size(); ++i)
+    json["moved_deviations"][kIntrinsicNames[i]] = moved[i];
+  return json;
+}
+
 Json device_json(const CalibrationReport& report, std::size_t d) {
   const CalibrationResult& result = report.result;
   Json json;
@@ -76,7 +93,9 @@ Json device_json(const CalibrationReport& report, std::size_t d) {
   json["rms_px"] = residuals.rms_px;
   json["median_px"] = residuals.median_px;
   json["p95_px"] = residuals.p95_px;
-  json["given_values_kept"] = result.inner_held[d] != 0;
+  json["given_values_kept"] =
+      result.given[d] == GivenUse::kExact || result.given[d] == GivenUse::kTolerance;
+  if (result.given[d] != GivenUse::kNone) json["given"] = given_json(report, d);
   for (std::size_t i = 0; i < kIntrinsics; ++i) {
     Json parameter{{"value", device.inner[i]}, {"sigma", u.inner[i]}};
     if (u.is_prior[i]) parameter["held_at_prior"] = true;

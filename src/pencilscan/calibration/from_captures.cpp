@@ -86,7 +86,9 @@ CapturesCalibration calibrate_captures(const UncalibratedRig& devices,
                           "count its inner corners, and let a camera see all of it lit"});
   }
 
-  all.result = calibrate(input, {}, progress);
+  CalibrateOptions calibrate_options;
+  calibrate_options.tolerance = options.tolerance;
+  all.result = calibrate(input, calibrate_options, progress);
   all.color = colors.result();
   set_colors(all.color, all.result.rig);
   tell("judging", 0.9);

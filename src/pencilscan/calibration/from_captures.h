@@ -16,6 +16,7 @@ struct CapturesOptions {
   std::optional<KnownDistance> distance;
   std::string board;  ///< as board_from_text() reads it; empty: none
   std::size_t max_tracks = GrayTrackOptions{}.max_tracks;
+  GivenTolerance tolerance{};  ///< of K that the devices file gives
   std::uint64_t seed = 1;
 };
 

@@ -10,6 +10,8 @@
 
 #include "pencilscan/calibration/pair_matches.h"
 #include "pencilscan/core/parallel.h"
+#include "pencilscan/core/random.h"
+#include "pencilscan/geometry/cross_matrix.h"
 
 namespace pencilscan {
 namespace {
@@ -23,13 +25,99 @@ double epipolar_distance(const Rig& rig, const PairGeometry& pair, const PairMat
                   error / line_c.head<2>().norm() / device_at(rig, pair.camera).width);
 }
 
+/// What one homography explains.
+struct Plane {
+  Mat3 homography = Mat3::Zero();
+  std::vector<std::uint8_t> mask;  ///< per match; empty where there is none
+  [[nodiscard]] double share() const {
+    return mask.empty()
+               ? 0
+               : static_cast<double>(cv::countNonZero(mask)) / static_cast<double>(mask.size());
+  }
+};
+
+Plane find_plane(const std::vector<cv::Point2d>& a, const std::vector<cv::Point2d>& b,
+                 double tolerance) {
+  Plane plane;
+  const cv::Mat H = cv::findHomography(a, b, cv::RANSAC, tolerance, plane.mask, 2000, 0.999);
+  if (H.empty()) return {};
+  cv::cv2eigen(H, plane.homography);
+  return plane;
+}
+
 double planar_share(const std::vector<cv::Point2d>& a, const std::vector<cv::Point2d>& b,
                     double tolerance) {
-  if (a.size() < 8) return 1;
+  return a.size() < 8 ? 1 : find_plane(a, b, tolerance).share();
+}
+
+Vec3 homogeneous(const cv::Point2d& p) { return {p.x, p.y, 1}; }
+
+/// Whether a match lies near its epipolar lines in both images, in their common scale.
+bool is_epipolar(const Mat3& F, const cv::Point2d& a, const cv::Point2d& b, double tolerance) {
+  const Vec3 line_b = F * homogeneous(a);
+  const Vec3 line_a = F.transpose() * homogeneous(b);
+  const double error = std::abs(homogeneous(b).dot(line_b));
+  return error < tolerance * std::min(line_a.head<2>().norm(), line_b.head<2>().norm());
+}
+
+/// F = [e]x H: the lines from where the plane would show two matches to where they are meet in the
+/// epipole. The one that most matches off the plane agree with.
+Mat3 fundamental_by_plane(const std::vector<cv::Point2d>& a, const std::vector<cv::Point2d>& b,
+                          const Plane& plane, double tolerance) {
+  constexpr int kTries = 500;
+  constexpr std::size_t kJudges = 500;
+  std::vector<std::size_t> off;
+  for (std::size_t i = 0; i < a.size(); ++i)
+    if (plane.mask[i] == 0) off.push_back(i);
+  Mat3 best = Mat3::Zero();
+  if (off.size() < 2) return best;
+  const std::size_t judges = std::min(off.size(), kJudges);
+  const auto line = [&](std::size_t i) -> Vec3 {
+    return (plane.homography * homogeneous(a[i])).cross(homogeneous(b[i])).normalized();
+  };
+  std::size_t most = 0;
+  Random random(1);
+  for (int k = 0; k < kTries; ++k) {
+    const auto n = static_cast<std::uint32_t>(off.size());
+    const Vec3 epipole = line(off[random.below(n)]).cross(line(off[random.below(n)]));
+    if (epipole.norm() < 1e-12) continue;
+    const Mat3 F = cross_matrix(epipole.normalized()) * plane.homography;
+    std::size_t agreeing = 0;
+    for (std::size_t j = 0; j < judges; ++j) {
+      const std::size_t i = off[j * off.size() / judges];
+      agreeing += is_epipolar(F, a[i], b[i], tolerance) ? 1U : 0U;
+    }
+    if (agreeing <= most) continue;
+    most = agreeing;
+    best = F;
+  }
+  return best;
+}
+
+std::size_t agreeing_matches(const Mat3& F, const std::vector<cv::Point2d>& a,
+                             const std::vector<cv::Point2d>& b, double tolerance) {
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < a.size(); ++i)
+    count += is_epipolar(F, a[i], b[i], tolerance) ? 1U : 0U;
+  return count;
+}
+
+/// By RANSAC, widths of both images taken as 1000; zero where there is none.
+Mat3 find_fundamental(const std::vector<cv::Point2d>& a, const std::vector<cv::Point2d>& b,
+                      const PairGeometryOptions& options) {
+  constexpr double kDominant = 0.5;  // of the matches
   std::vector<std::uint8_t> mask;
-  const cv::Mat H = cv::findHomography(a, b, cv::RANSAC, tolerance, mask, 2000, 0.999);
-  if (H.empty()) return 0;
-  return static_cast<double>(cv::countNonZero(mask)) / static_cast<double>(a.size());
+  const double tolerance = 1000 * options.tolerance;
+  const cv::Mat found = cv::findFundamentalMat(a, b, cv::FM_RANSAC, tolerance, 0.9999, 2000, mask);
+  if (found.rows != 3 || found.cols != 3) return Mat3::Zero();
+  Mat3 F;
+  cv::cv2eigen(found, F);
+  const Plane plane = find_plane(a, b, 1000 * options.planar_tolerance);
+  if (plane.share() < kDominant) return F;
+  const Mat3 by_plane = fundamental_by_plane(a, b, plane, tolerance);
+  return agreeing_matches(by_plane, a, b, tolerance) > agreeing_matches(F, a, b, tolerance)
+             ? by_plane
+             : F;
 }
 
 void solve_pair(const Rig& rig, const std::vector<PairMatch>& matches, PairGeometry& pair,
@@ -45,12 +133,8 @@ void solve_pair(const Rig& rig, const std::vector<PairMatch>& matches, PairGeome
     a.emplace_back(m.in_camera.x() * 1000 / width_c, m.in_camera.y() * 1000 / width_c);
     b.emplace_back(m.in_projector.x() * 1000 / width_p, m.in_projector.y() * 1000 / width_p);
   }
-  std::vector<std::uint8_t> mask;
-  const cv::Mat found =
-      cv::findFundamentalMat(a, b, cv::FM_RANSAC, 1000 * options.tolerance, 0.9999, 2000, mask);
-  if (found.rows != 3 || found.cols != 3) return;
-  Mat3 F;
-  cv::cv2eigen(found, F);
+  const Mat3 F = find_fundamental(a, b, options);
+  if (F.isZero()) return;
   const Vec3 to_c(1000 / width_c, 1000 / width_c, 1);
   const Vec3 to_p(1000 / width_p, 1000 / width_p, 1);
   pair.fundamental = to_p.asDiagonal() * F * to_c.asDiagonal();
@@ -105,7 +189,8 @@ std::vector<PairGeometry> pair_geometries(const Rig& rig, std::span<const Track>
 }
 
 void drop_epipolar_outliers(const Rig& rig, std::span<const PairGeometry> pairs, double least_share,
-                            std::vector<Track>& tracks, const PairGeometryOptions& options) {
+                            std::vector<Track>& tracks, const PairFit* fit,
+                            const PairGeometryOptions& options) {
   std::map<DevicePair, const PairGeometry*> by_key;
   for (const PairGeometry& pair : pairs) by_key[{pair.camera, pair.projector}] = &pair;
   std::vector<Track> kept;
@@ -116,7 +201,9 @@ void drop_epipolar_outliers(const Rig& rig, std::span<const PairGeometry> pairs,
       if (found == by_key.end()) continue;
       const PairGeometry& pair = *found->second;
       if (pair.inliers < options.least_matches || pair.inlier_share() < least_share) continue;
-      if (epipolar_distance(rig, pair, match_of(track, track.views[i])) > options.tolerance)
+      const PairMatch match = match_of(track, track.views[i]);
+      if (epipolar_distance(rig, pair, match) > options.tolerance &&
+          (fit == nullptr || !fit->explains(found->first, match)))
         continue;
       cleaned.views.push_back(track.views[i]);
     }

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "pencilscan/calibration/pair_fit.h"
 #include "pencilscan/calibration/tracks.h"
 
 namespace pencilscan {
@@ -32,15 +33,19 @@ struct PairGeometryOptions {
 };
 
 /// RANSAC of the fundamental matrix (seven points; Hartley and Zisserman, "Multiple View Geometry",
-/// alg. 11.4) for every pair.
+/// alg. 11.4) for every pair. Where a plane explains most matches, any epipole suits these: then
+/// also that of the plane's homography and of two matches off it (Chum, Werner and Matas, "Two-view
+/// geometry estimation unaffected by a dominant plane", 2005), if more matches agree with it.
 [[nodiscard]] std::vector<PairGeometry> pair_geometries(const Rig& rig,
                                                         std::span<const Track> tracks,
                                                         const PairGeometryOptions& options = {});
 
-/// Drops the views that disagree with their pair's fundamental matrix, and tracks left with one
-/// view. Pairs without a trusted matrix (fewer inliers than least_share) lose all views.
+/// Drops the views that disagree with their pair's fundamental matrix, and with the rig where there
+/// is one already, and tracks left with one view. Pairs without a trusted matrix (fewer inliers
+/// than least_share) lose all views.
 void drop_epipolar_outliers(const Rig& rig, std::span<const PairGeometry> pairs, double least_share,
-                            std::vector<Track>& tracks, const PairGeometryOptions& options = {});
+                            std::vector<Track>& tracks, const PairFit* fit = nullptr,
+                            const PairGeometryOptions& options = {});
 
 /// Inner parameters guessed from the fundamental matrices alone.
 struct FocalGuess {

@@ -1,6 +1,7 @@
 #include "pencilscan/calibration/structure.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -85,7 +86,11 @@ std::vector<std::size_t> chosen_tracks(const BundleProblem& problem, std::size_t
 }
 
 /// Pairs to start from, the best first.
-std::vector<Seed> seeds_of(const BundleProblem& problem, const std::vector<std::size_t>& tracks) {
+std::vector<Seed> seeds_of(const BundleProblem& problem, const std::vector<std::size_t>& tracks,
+                           const StructureOptions& options) {
+  const auto is_trusted = [&](std::size_t a, std::size_t b) {
+    return options.resects && options.trusted[a] != 0 && options.trusted[b] != 0;
+  };
   std::map<std::pair<std::size_t, std::size_t>, std::size_t> shared;
   for (const std::size_t t : tracks) {
     const auto& views = problem.tracks[t].views;
@@ -97,6 +102,9 @@ std::vector<Seed> seeds_of(const BundleProblem& problem, const std::vector<std::
   for (const auto& [pair, count] : shared) ranked.push_back({count, pair});
   std::stable_sort(ranked.begin(), ranked.end(),
                    [](const auto& x, const auto& y) { return x.first > y.first; });
+  std::stable_partition(ranked.begin(), ranked.end(), [&](const auto& pair) {
+    return is_trusted(pair.second.first, pair.second.second);
+  });
   std::vector<Seed> seeds;
   for (std::size_t i = 0; i < std::min<std::size_t>(ranked.size(), 8); ++i) {
     const Seed seed = solve_seed(problem, ranked[i].second.first, ranked[i].second.second, tracks);
@@ -104,33 +112,43 @@ std::vector<Seed> seeds_of(const BundleProblem& problem, const std::vector<std::
   }
   std::stable_sort(seeds.begin(), seeds.end(),
                    [](const Seed& a, const Seed& b) { return a.score > b.score; });
+  std::stable_partition(seeds.begin(), seeds.end(),
+                        [&](const Seed& seed) { return is_trusted(seed.a, seed.b); });
   return seeds;
 }
 
-/// Pose of an absent device against the points of `tracks`; false when too few agree.
-bool join_device(BundleProblem& problem, std::size_t d, const std::vector<std::size_t>& tracks,
-                 const StructureOptions& options) {
+/// Points in the world and where an absent device sees them.
+struct PointViews {
   std::vector<cv::Point3d> points;
   std::vector<Vec2> pixels;
+};
+
+PointViews point_views_of(const BundleProblem& problem, std::size_t d,
+                          const std::vector<std::size_t>& tracks) {
+  PointViews seen;
   for (const std::size_t t : tracks) {
     const TrackView* view = view_in(problem.tracks[t], d);
     if (view == nullptr || problem.used[t] == 0) continue;
     const Vec3& x = problem.points[t];
-    points.emplace_back(x.x(), x.y(), x.z());
-    pixels.push_back(view->pixel);
+    seen.points.emplace_back(x.x(), x.y(), x.z());
+    seen.pixels.push_back(view->pixel);
   }
-  if (points.size() < options.least_matches) return false;
-  BundleDevice& device = problem.devices[d];
-  const auto rays = normalized(device, pixels);
+  return seen;
+}
+
+/// Puts the device where most views agree; false when too few do.
+bool pose_device(const PointViews& seen, const StructureOptions& options, int tries,
+                 BundleDevice& device) {
+  const auto rays = normalized(device, seen.pixels);
   const double width = 2 * device.prior[kCx] + 1;
   const auto tolerance = static_cast<float>(options.pose_tolerance * width / device.inner[kFx]);
   cv::Mat rotation_vector;
   cv::Mat translation;
   std::vector<int> inliers;
-  const bool found =
-      cv::solvePnPRansac(points, rays, cv::Mat::eye(3, 3, CV_64F), cv::noArray(), rotation_vector,
-                         translation, false, 500, tolerance, 0.999, inliers, cv::SOLVEPNP_EPNP);
-  if (!found || inliers.size() < std::max(options.least_matches / 2, points.size() / 4))
+  const bool found = cv::solvePnPRansac(seen.points, rays, cv::Mat::eye(3, 3, CV_64F),
+                                        cv::noArray(), rotation_vector, translation, false, tries,
+                                        tolerance, 0.999, inliers, cv::SOLVEPNP_EPNP);
+  if (!found || inliers.size() < std::max(options.least_matches / 2, seen.points.size() / 4))
     return false;
   cv::Mat R;
   cv::Rodrigues(rotation_vector, R);
@@ -140,8 +158,65 @@ bool join_device(BundleProblem& problem, std::size_t d, const std::vector<std::s
   cv::cv2eigen(translation, t);
   if (!rotation.allFinite() || !t.allFinite()) return false;
   set_pose(device, rotation, t);
-  device.present = true;
   return true;
+}
+
+/// Mean of the squared errors of all views, each counted up to that of an outlier, px^2.
+double truncated_error(const PointViews& seen, const BundleDevice& device) {
+  constexpr double kOutlierPx = 4 * kEarlySigmaPx;
+  double sum = 0;
+  for (std::size_t i = 0; i < seen.pixels.size(); ++i) {
+    const cv::Point3d& x = seen.points[i];
+    const auto error = view_error(device, Vec3(x.x, x.y, x.z), {0, seen.pixels[i], 1});
+    sum +=
+        std::min(error ? error->squaredNorm() : kOutlierPx * kOutlierPx, kOutlierPx * kOutlierPx);
+  }
+  return sum / static_cast<double>(seen.pixels.size());
+}
+
+/// Pose, focal length and, where lenses may be shifted, the principal point of a device of which
+/// nothing is known, on a grid.
+bool resect_device(const PointViews& seen, const StructureOptions& options, BundleDevice& device) {
+  constexpr int kTries = 60;
+  constexpr std::array<double, 9> kScales{0.6, 0.8, 1.0, 1.3, 1.6, 2.0, 2.5, 3.2, 4.0};
+  constexpr std::array<double, 5> kShifts{0, 0.3, 0.6, -0.3, -0.6};
+  const double width = 2 * device.prior[kCx] + 1;
+  const double height = 2 * device.prior[kCy] + 1;
+  const bool may_shift = device.prior_sigma[kCy] > 0.2 * height;
+  BundleDevice best = device;
+  double least = std::numeric_limits<double>::infinity();
+  for (const double scale : kScales) {
+    for (const double shift : kShifts) {
+      if (shift != 0 && !may_shift) continue;
+      BundleDevice trial = device;
+      trial.inner[kFx] = trial.inner[kFy] = scale * width;
+      trial.inner[kCy] = trial.prior[kCy] + shift * height;
+      if (!pose_device(seen, options, kTries, trial)) continue;
+      const double error = truncated_error(seen, trial);
+      if (error >= least) continue;
+      least = error;
+      best = trial;
+    }
+  }
+  if (!std::isfinite(least)) return false;
+  device = best;
+  device.prior_sigma[kFx] *= device.inner[kFx] / device.prior[kFx];
+  device.prior[kFx] = device.inner[kFx];
+  return true;
+}
+
+/// Pose of an absent device against the points of `tracks`; false when too few agree.
+bool join_device(BundleProblem& problem, std::size_t d, const std::vector<std::size_t>& tracks,
+                 const StructureOptions& options) {
+  constexpr int kTries = 500;
+  const PointViews seen = point_views_of(problem, d, tracks);
+  if (seen.points.size() < options.least_matches) return false;
+  BundleDevice& device = problem.devices[d];
+  const bool found = options.resects && options.trusted[d] == 0
+                         ? resect_device(seen, options, device)
+                         : pose_device(seen, options, kTries, device);
+  device.present = found;
+  return found;
 }
 
 void triangulate_tracks(BundleProblem& problem, const std::vector<std::size_t>& tracks,
@@ -231,7 +306,7 @@ double build_structure(BundleProblem& problem, unsigned free_inner,
     // A pair whose captures were exchanged looks sound by itself; what joins it contradicts it.
     constexpr std::size_t kMostSeeds = 4;
     constexpr double kSoundCost = 0.1;  // per view, of kEarlySigmaPx: few contradict the rest
-    std::vector<Seed> seeds = seeds_of(problem, tracks);
+    std::vector<Seed> seeds = seeds_of(problem, tracks, options);
     if (seeds.empty()) return std::numeric_limits<double>::infinity();
     seeds.resize(std::min(seeds.size(), kMostSeeds));
     const Placement nothing = placement_of(problem);

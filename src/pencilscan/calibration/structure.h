@@ -9,6 +9,10 @@ struct StructureOptions {
   double pose_tolerance = 0.01;   ///< RANSAC for a pose: reprojection error over the image width
   double least_angle_rad = 0.05;  ///< between the rays of a triangulated point
   std::size_t least_matches = 20;
+  std::vector<char> trusted;  ///< per device: inner parameters are known well; empty: of none
+  /// Starts with two trusted devices where some pair of them shares enough, and finds focal length
+  /// and lens shift of the others with their poses, on a grid.
+  bool resects = false;
 };
 
 /// First guess of poses and points from devices with roughly known inner parameters: an essential

@@ -6,6 +6,7 @@
 #include <set>
 
 #include "pencilscan/bundle/bundle_device.h"
+#include "pencilscan/calibration/pair_fit.h"
 
 namespace pencilscan {
 namespace {
@@ -15,42 +16,6 @@ constexpr double kContradictsShare = 0.4;  ///< of one that does not
 constexpr std::size_t kLeastMatches = 24;
 
 using Matches = std::map<DevicePair, std::vector<PairMatch>>;
-
-/// The devices of the solution, and how well correspondences agree with them.
-class PairFit {
- public:
-  explicit PairFit(const CalibrationResult& result)
-      : devices_(result.problem.devices), tolerance_px_(std::max(2.0, 8 * result.rms_px)) {}
-
-  [[nodiscard]] bool placed(std::size_t d) const { return devices_[d].present; }
-
-  /// Share of matches near their epipolar planes, if taken as those of the given devices.
-  [[nodiscard]] double share(const std::vector<PairMatch>& matches, std::size_t camera,
-                             std::size_t projector, std::size_t* count = nullptr,
-                             std::size_t capture = SIZE_MAX) const {
-    const BundleDevice& c = devices_[camera];
-    const BundleDevice& p = devices_[projector];
-    const Mat3 world_from_c = rotation_of(c).transpose();
-    const Mat3 world_from_p = rotation_of(p).transpose();
-    const Vec3 baseline = (center_of(p) - center_of(c)).normalized();
-    std::size_t all = 0;
-    std::size_t near = 0;
-    for (const PairMatch& m : matches) {
-      if (capture != SIZE_MAX && m.capture != capture) continue;
-      ++all;
-      const Vec3 a = (world_from_c * device_ray(c, m.in_camera)).normalized();
-      const Vec3 b = (world_from_p * device_ray(p, m.in_projector)).normalized();
-      const Vec3 plane = baseline.cross(a).normalized();
-      near += std::abs(plane.dot(b)) * p.inner[kFx] < tolerance_px_ ? 1U : 0U;
-    }
-    if (count != nullptr) *count = all;
-    return all == 0 ? 1 : static_cast<double>(near) / static_cast<double>(all);
-  }
-
- private:
-  const std::vector<BundleDevice>& devices_;
-  double tolerance_px_;
-};
 
 std::string folder(const Rig& rig, const DevicePair& pair) {
   return device_at(rig, pair.second).name + "/" + device_at(rig, pair.first).name;
@@ -130,7 +95,7 @@ Finding name_mover(const CalibrationInput& input, const Matches& matches, const 
 Contradictions find_contradictions(const CalibrationInput& input, const CalibrationResult& result) {
   if (!result.solved) return {};
   const Matches matches = matches_by_pair(input.tracks);
-  const PairFit fit(result);
+  const PairFit fit(result.problem.devices, std::max(2.0, 8 * result.rms_px));
   std::set<DevicePair> bad;
   Captures captures;  // where only some contradict
   for (const auto& [pair, list] : matches) {

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "pencilscan/bundle/bundle_device.h"
+#include "pencilscan/calibration/given_values.h"
 #include "pencilscan/calibration/suspects.h"
 #include "pencilscan/core/formatted.h"
 
@@ -11,6 +12,9 @@ namespace pencilscan {
 namespace {
 
 constexpr int kCells = 4;
+const std::string kOffThePlane =
+    "capture an object with depth, or the plane in several poses that differ in tilt (one "
+    "--captures each)";
 
 std::string percent(double share) { return formatted(100 * share, "%.3g") + " %"; }
 
@@ -18,13 +22,22 @@ class Judge {
  public:
   Judge(const CalibrationInput& input, const CalibrationResult& result,
         const Uncertainty& uncertainty, const VerdictOptions& options)
-      : input_(input), result_(result), uncertainty_(uncertainty), options_(options) {}
+      : input_(input), result_(result), uncertainty_(uncertainty), options_(options) {
+    double planar = 0;
+    double all = 0;
+    for (const PairGeometry& pair : result.pairs) {
+      planar += pair.planar_share * static_cast<double>(pair.inliers);
+      all += static_cast<double>(pair.inliers);
+    }
+    if (all > 0) planar_share_ = planar / all;
+  }
 
   std::vector<Finding> findings() {
     judge_scene();
     if (!result_.solved) {
-      add(Grade::kUnusable, "no structure could be found that explains the correspondences",
-          "give rough K of the devices, or captures that overlap more");
+      add(Grade::kUnusable,
+          "no structure could be found that explains the correspondences" + reason(),
+          advice("give rough K of the devices, or captures that overlap more"));
       return std::move(findings_);
     }
     judge_knowledge();
@@ -34,6 +47,7 @@ class Judge {
     judge_devices();
     judge_volume();
     judge_scale();
+    judge_given();
     return std::move(findings_);
   }
 
@@ -51,23 +65,22 @@ class Judge {
           "only " + std::to_string(input_.tracks.size()) + " correspondences were found",
           "check exposure and focus: see the decoding table");
     }
-    double planar = 0;
-    double all = 0;
-    for (const PairGeometry& pair : result_.pairs) {
-      planar += pair.planar_share * static_cast<double>(pair.inliers);
-      all += static_cast<double>(pair.inliers);
-    }
-    // One camera and one projector have a single fundamental matrix, and its epipole hangs on what
-    // lies off the dominant plane.
-    const double limit =
-        result_.pairs.size() == 1 ? options_.planar_share_one_pair : options_.planar_share;
-    if (all == 0 || planar / all < limit) return;
     const bool helped = !result_.problem.board_views.empty();
-    add(helped ? Grade::kDoubtful : Grade::kUnusable,
-        "planar scene: one plane explains " + percent(planar / all) +
-            " of the correspondences, and every rig sees a plane alike",
-        "capture an object with depth, or the plane in several poses that differ in tilt "
-        "(one --captures each)");
+    if (planar_share_ < options_.planar_share) return;
+    add(helped ? Grade::kDoubtful : Grade::kUnusable, "planar scene: " + plane_text(),
+        kOffThePlane);
+  }
+
+  [[nodiscard]] std::string plane_text() const {
+    return "one plane explains " + percent(planar_share_) +
+           " of the correspondences, and every rig sees a plane alike";
+  }
+  /// Why a rig is known weakly, and what helps.
+  [[nodiscard]] std::string reason() const {
+    return planar_share_ < options_.mostly_planar_share ? "" : ": " + plane_text();
+  }
+  [[nodiscard]] std::string advice(const std::string& usual) const {
+    return planar_share_ < options_.mostly_planar_share ? usual : kOffThePlane + ", or give K";
   }
 
   /// One fundamental matrix has seven degrees of freedom: the pose takes five.
@@ -142,7 +155,7 @@ class Judge {
         worst_device = d;
       }
       for (const std::size_t i : {kFx, kCx, kCy})
-        if (u.is_prior[i]) at_prior.push_back(name(d) + " " + kIntrinsicNames[i]);
+        if (u.is_prior[i] && !is_given(d)) at_prior.push_back(name(d) + " " + kIntrinsicNames[i]);
       judge_lens(d);
       const Device& placed = device_at(result_.rig, d);
       const double scale = device.inner[kFx] / placed.width;
@@ -155,8 +168,9 @@ class Judge {
     if (worst > options_.good_focal_sigma) {
       add(worst > options_.usable_focal_sigma ? Grade::kUnusable : Grade::kDoubtful,
           "focal lengths are known weakly: that of " + name(worst_device) + " to " +
-              percent(worst) + " (one standard deviation)",
-          "add captures with the object moved through the whole volume, or give K of the cameras");
+              percent(worst) + " (one standard deviation)" + reason(),
+          advice("add captures with the object moved through the whole volume, or give K of the "
+                 "cameras"));
     }
     if (!at_prior.empty()) {
       std::string list;
@@ -175,6 +189,7 @@ class Judge {
     double worst = 0;
     const char* which = "";
     for (const std::size_t i : {kFy, kP1, kP2, kCx, kK1, kK2}) {
+      if (is_given(d) && i <= kCy) continue;
       const double sigma = device.prior_sigma[i];
       if (sigma == 0 || !std::isfinite(sigma)) continue;
       const double value = i == kFy ? device.inner[kFy] / device.inner[kFx] : device.inner[i];
@@ -198,8 +213,8 @@ class Judge {
     add(share > options_.usable_volume_sigma ? Grade::kUnusable : Grade::kDoubtful,
         "a measured point is off by " + formatted(uncertainty_.volume_median) + unit +
             " (one standard deviation) from the rig's errors alone, in a volume of radius " +
-            formatted(uncertainty_.volume_radius, "%.3g") + unit,
-        "add captures that fill the volume");
+            formatted(uncertainty_.volume_radius, "%.3g") + unit + reason(),
+        advice("add captures that fill the volume"));
   }
 
   void judge_scale() {
@@ -209,17 +224,48 @@ class Judge {
     if (!result_.rig.unit_known)
       add(Grade::kGood, "the scale is not known: the rig's unit is \"unknown\"",
           "give --known-distance, or a --board");
+  }
+
+  /// A given K within its tolerance.
+  [[nodiscard]] bool is_given(std::size_t d) const {
+    return result_.given[d] == GivenUse::kTolerance || result_.given[d] == GivenUse::kExact;
+  }
+
+  void judge_given() {
+    const std::string unit =
+        percent(result_.tolerance.focal) + ", " + formatted(result_.tolerance.center_px) + " px";
+    const std::string advice =
+        "check that K is of this lens, focus and image size, or say how rough it is "
+        "(--focal-tolerance, --center-tolerance)";
+    std::string moved_within;
     for (std::size_t d = 0; d < result_.placed.size(); ++d) {
-      if (!input_.known[d].K || result_.inner_held[d] != 0 || result_.placed[d] == 0) continue;
-      add(Grade::kGood, "the given K of " + name(d) +
-                            " explains the data worse than a free one: it was only a start");
+      if (result_.given[d] == GivenUse::kNone || result_.placed[d] == 0) continue;
+      const BundleDevice& found = result_.problem.devices[d];
+      const auto moved = moved_deviations(device_at(input_.rig, d), result_.tolerance, found);
+      const auto most =
+          static_cast<std::size_t>(std::max_element(moved.begin(), moved.end()) - moved.begin());
+      const std::string by = kIntrinsicNames[most] + std::string(" ") + formatted(moved[most]);
+      if (is_given(d) && moved[most] <= kContradictsDeviations) {
+        moved_within += (moved_within.empty() ? "" : ", ") + name(d) + " by " + by;
+        continue;
+      }
+      const bool is_free = result_.given[d] == GivenUse::kContradicted;
+      add(Grade::kDoubtful,
+          "the data contradict the given K of " + name(d) + ": " + by + " of its tolerances (" +
+              unit + ") off" +
+              (is_free ? ", so it was only a start" : ", though it was held near it"),
+          advice);
     }
+    if (!moved_within.empty())
+      add(Grade::kGood,
+          "given K were kept; they moved, in their tolerances (" + unit + "): " + moved_within);
   }
 
   const CalibrationInput& input_;
   const CalibrationResult& result_;
   const Uncertainty& uncertainty_;
   const VerdictOptions& options_;
+  double planar_share_ = 0;  ///< of the correspondences of all pairs
   std::vector<Finding> findings_;
 };
 

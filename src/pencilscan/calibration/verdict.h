@@ -24,9 +24,11 @@ struct Verdict {
 };
 
 struct VerdictOptions {
-  double planar_share = 0.85;          ///< a scene with more on one plane per pair fixes no rig
-  double planar_share_one_pair = 0.5;  ///< the same where there is one pair only
-  double good_rms_px = 0.4;            ///< of all views
+  /// A scene with more on one plane per pair fixes no rig: what is left of it are as many wrong
+  /// codes.
+  double planar_share = 0.97;
+  double mostly_planar_share = 0.7;  ///< is told as the reason where a rig is known weakly
+  double good_rms_px = 0.4;          ///< of all views
   double usable_rms_px = 1.5;
   double good_focal_sigma = 0.005;  ///< over the focal length
   double usable_focal_sigma = 0.05;

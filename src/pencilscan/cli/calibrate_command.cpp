@@ -25,6 +25,9 @@ struct CalibrateCommand {
   std::vector<std::string> known_distance;
   std::string board;
   std::size_t max_tracks = GrayTrackOptions{}.max_tracks;
+  double focal_tolerance_percent = 100 * GivenTolerance{}.focal;
+  double center_tolerance_px = GivenTolerance{}.center_px;
+  bool keep_unusable = false;
   bool overwrite = false;
 };
 
@@ -41,13 +44,44 @@ std::optional<KnownDistance> known_distance(const CalibrateCommand& command, con
   return distance;
 }
 
+/// rig.json becomes rig.unusable.json.
+fs::path unusable_path(const CalibrateCommand& command) {
+  const fs::path out = command.out;
+  return out.parent_path() / (out.stem().string() + ".unusable" + out.extension().string());
+}
+
+/// The rig without the devices that have no place.
+Rig placed_rig(const CalibrationResult& result) {
+  Rig rig = result.rig;
+  std::size_t device = 0;
+  const auto is_absent = [&](const Device&) { return result.placed[device++] == 0; };
+  std::erase_if(rig.cameras, is_absent);
+  std::erase_if(rig.projectors, is_absent);
+  return rig;
+}
+
+/// The rig under its name; one that is unusable only where it was asked for, under a name that says
+/// so.
+void write_result(const CalibrateCommand& command, const CapturesCalibration& calibration) {
+  if (calibration.is_usable()) return write_rig(calibration.result.rig, command.out);
+  if (!command.keep_unusable || !calibration.result.solved) return;
+  write_rig(placed_rig(calibration.result), unusable_path(command));
+  std::cerr << "the unusable rig is " << unusable_path(command).string() << "\n";
+}
+
+void check_new(const CalibrateCommand& command, const fs::path& file) {
+  std::error_code ignored;
+  if (!command.overwrite && fs::exists(file, ignored))
+    throw InputError("command line", "--out", file.string(),
+                     "must be a new file (or give --overwrite)");
+}
+
 void check_command(const CalibrateCommand& command) {
   std::error_code ignored;
   if (fs::equivalent(command.out, command.devices, ignored))
     throw InputError("command line", "--out", command.out, "must not be the devices file");
-  if (!command.overwrite && fs::exists(command.out, ignored))
-    throw InputError("command line", "--out", command.out,
-                     "must be a new file (or give --overwrite)");
+  check_new(command, command.out);
+  if (command.keep_unusable) check_new(command, unusable_path(command));
 }
 
 void print_remarks(const ColorCalibration& color) {
@@ -70,6 +104,7 @@ void run_calibrate(const CalibrateCommand& command) {
   options.distance = known_distance(command, devices.rig);
   options.board = command.board;
   options.max_tracks = command.max_tracks;
+  options.tolerance = {command.focal_tolerance_percent / 100, command.center_tolerance_px};
   options.seed = command.common.seed;
   const CapturesCalibration calibration = calibrate_captures(
       devices, {command.captures.begin(), command.captures.end()}, options, stderr_progress());
@@ -79,7 +114,7 @@ void run_calibrate(const CalibrateCommand& command) {
   write_json(folder / "calibration.json", report_json);
   write_text(folder / "calibration.html",
              calibration_page(report_json, "Calibration", "pencilscan " PENCILSCAN_VERSION));
-  if (calibration.is_usable()) write_rig(calibration.result.rig, command.out);
+  write_result(command, calibration);
   print_verdict(verdict);
   print_remarks(calibration.color);
   nlohmann::ordered_json figures = calibration_figures(calibration);
@@ -120,6 +155,19 @@ void add_calibrate_command(CLI::App& app) {
   command->add_option("--max-tracks", options->max_tracks, "Surface points to use at most")
       ->check(CLI::Range(std::size_t{200}, std::size_t{1000000}))
       ->capture_default_str();
+  command
+      ->add_option("--focal-tolerance", options->focal_tolerance_percent,
+                   "How far off given focal lengths may be, one standard deviation in per cent; 0: "
+                   "they are exact")
+      ->check(CLI::Range(0.0, 100.0))
+      ->capture_default_str();
+  command
+      ->add_option("--center-tolerance", options->center_tolerance_px,
+                   "The same of given principal points, px")
+      ->check(CLI::Range(0.0, 10000.0))
+      ->capture_default_str();
+  command->add_flag("--keep-unusable", options->keep_unusable,
+                    "Write an unusable rig, too: rig.unusable.json for --out rig.json");
   command->add_flag("--overwrite", options->overwrite, "Replace an earlier rig");
   add_common_options(*command, options->common,
                      "pencilscan calibrate --captures pose1 --captures pose2 --devices "

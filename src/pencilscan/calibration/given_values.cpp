@@ -1,0 +1,66 @@
+#include "pencilscan/calibration/given_values.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "pencilscan/bundle/bundle_device.h"
+
+namespace pencilscan {
+
+std::array<double, 4> moved_deviations(const Device& given, const GivenTolerance& tolerance,
+                                       const BundleDevice& found) {
+  const BundleDevice before = bundle_device(given);
+  std::array<double, 4> moved{};
+  for (std::size_t i = kFx; i <= kCy; ++i) {
+    const double by = std::abs(found.inner[i] - before.inner[i]);
+    const double sigma = i <= kFy ? tolerance.focal * before.inner[i] : tolerance.center_px;
+    if (by > 0) moved[i] = sigma > 0 ? by / sigma : std::numeric_limits<double>::infinity();
+  }
+  return moved;
+}
+
+bool is_any_pulled(const CalibrationInput& input, const GivenTolerance& tolerance,
+                   const BundleProblem& problem) {
+  for (std::size_t d = 0; d < input.known.size(); ++d) {
+    if (!input.known[d].K || !problem.devices[d].present) continue;
+    const auto moved = moved_deviations(device_at(input.rig, d), tolerance, problem.devices[d]);
+    if (*std::max_element(moved.begin(), moved.end()) > kContradictsDeviations) return true;
+  }
+  return false;
+}
+
+std::vector<char> given_agrees(const CalibrationInput& input, const GivenTolerance& tolerance,
+                               double tolerances, const BundleProblem& problem,
+                               const Uncertainty& sigma) {
+  constexpr double kDeviations = 4;
+  std::vector<char> agrees(input.known.size(), 0);
+  for (std::size_t d = 0; d < agrees.size(); ++d) {
+    if (!input.known[d].K) continue;
+    const BundleDevice& found = problem.devices[d];
+    const Mat3& K = device_at(input.rig, d).K;
+    const auto is_near = [&](Intrinsic i, double given) {
+      const double slack =
+          std::max(kDeviations * sigma.devices[d].inner[i], tolerances * tolerance.focal * given);
+      return !found.present || std::abs(found.inner[i] - given) <= slack;
+    };
+    agrees[d] = is_near(kFx, K(0, 0)) && is_near(kFy, K(1, 1)) ? 1 : 0;
+  }
+  return agrees;
+}
+
+std::vector<char> known_better(const CalibrationInput& input, const GivenTolerance& tolerance,
+                               const BundleProblem& problem, const Uncertainty& sigma) {
+  // With the tolerance as a prior half of it is left where the data know as much and a bit more.
+  constexpr double kShare = 0.5;
+  std::vector<char> better(input.known.size(), 0);
+  for (std::size_t d = 0; d < better.size(); ++d)
+    better[d] = input.known[d].K && problem.devices[d].present &&
+                        sigma.devices[d].inner[kFx] <=
+                            kShare * tolerance.focal * problem.devices[d].inner[kFx]
+                    ? 1
+                    : 0;
+  return better;
+}
+
+}  // namespace pencilscan

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "pencilscan/bundle/uncertainty.h"
+#include "pencilscan/calibration/calibrate.h"
+
+namespace pencilscan {
+
+/// How far fx, fy, cx, cy are from given ones, in deviations of the tolerance; infinite for values
+/// that were to be exact and moved.
+[[nodiscard]] std::array<double, 4> moved_deviations(const Device& given,
+                                                     const GivenTolerance& tolerance,
+                                                     const BundleDevice& found);
+/// A K that the data pull this far is contradicted, deviations of its tolerance.
+inline constexpr double kContradictsDeviations = 3;
+
+/// Whether any given K moved by more than that.
+[[nodiscard]] bool is_any_pulled(const CalibrationInput& input, const GivenTolerance& tolerance,
+                                 const BundleProblem& problem);
+
+/// Per device: its given focal lengths are those that the data find, as far as these know them (to
+/// four deviations) and as far as the tolerance goes (to `tolerances` of it). The scatter alone
+/// would not tell: in a ring a common error of all hides in the poses.
+[[nodiscard]] std::vector<char> given_agrees(const CalibrationInput& input,
+                                             const GivenTolerance& tolerance, double tolerances,
+                                             const BundleProblem& problem,
+                                             const Uncertainty& sigma);
+
+/// Per device: a K is given, and the data know its focal length better than the tolerance says.
+[[nodiscard]] std::vector<char> known_better(const CalibrationInput& input,
+                                             const GivenTolerance& tolerance,
+                                             const BundleProblem& problem,
+                                             const Uncertainty& sigma);
+
+}  // namespace pencilscan
