@@ -26,7 +26,7 @@ INNER = ["fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2"]
 
 def lensed_ring(program, path):
     """The ring of `rig ring` with lenses as they are."""
-    program("rig", "ring", "--out", path, json_output=False)
+    program("rig", "ring", "--overwrite", "--out", path, json_output=False)
     rig = json.loads(path.read_text())
     random = np.random.default_rng(7)
     for group, is_camera in (("cameras", True), ("projectors", False)):

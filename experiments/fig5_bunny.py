@@ -21,7 +21,7 @@ FIGURES = {"label_error": ("label error", 4), "line_recall": ("line recall", 3),
 def render(args, program):
     scene = args.out / "scene"
     rig = args.out / "rig.json"
-    program("rig", "ring", "--out", rig, *(common.SMALL_RING if args.small else []))
+    program("rig", "ring", "--overwrite", "--out", rig, *(common.SMALL_RING if args.small else []))
     program("simulate", "--rig", rig, "--mesh", common.BUNNY, "--fit", "--up", "y", "--out", scene,
             "--overwrite", "--seed", 1, *(["--export-povray"] if args.povray else ["--noise", "medium"]),
             "--samples", 2 if args.small else 3)

@@ -58,7 +58,7 @@ def run(args):
     rig = args.out / "rig.json"
     ring = ["--camera-width", 640, "--camera-height", 480, "--camera-focal-px", 1150, "--pitch-px", 18,
             "--line-width-px", 6] if args.half else []
-    program("rig", "ring", "--out", rig, *(common.SMALL_RING if args.small else ring))
+    program("rig", "ring", "--overwrite", "--out", rig, *(common.SMALL_RING if args.small else ring))
     rows = common.Rows(args.out / "results.csv", ["frame"], [*FIGURES, "flicker_mm"], args.resume)
     pictures = args.out / "pictures"
     pictures.mkdir(exist_ok=True)

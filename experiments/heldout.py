@@ -167,7 +167,7 @@ def rendered(program, folder, scene, seed):
     draft = folder.with_name(folder.name + ".draft")
     shutil.rmtree(draft, ignore_errors=True)
     draft.mkdir(parents=True)
-    program("rig", "ring", "--out", draft / "ring.json", *rig_options(scene))
+    program("rig", "ring", "--overwrite", "--out", draft / "ring.json", *rig_options(scene))
     volume = json.loads((draft / "ring.json").read_text())["volume"]
     common.write_ply(draft / "mesh.ply", *placed(scene, seed, volume))
     program("simulate", "--rig", draft / "ring.json", "--mesh", draft / "mesh.ply", "--noise",

@@ -60,7 +60,7 @@ def main():
     args = common.arguments("lateral_color", __doc__, shift=(0.5, 0.5), noise=("medium", "low"))
     program = common.Program(args)
     ring = common.SMALL_RING if args.small else []
-    program("rig", "ring", "--out", args.out / "plain.json", *ring, json_output=False)
+    program("rig", "ring", "--overwrite", "--out", args.out / "plain.json", *ring, json_output=False)
     plain = json.loads((args.out / "plain.json").read_text())
     truth = displaced(plain, args.shift)
     common.write_rig(args.out / "truth.json", truth)

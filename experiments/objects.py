@@ -70,7 +70,7 @@ def measure(args, program, name):
     work.mkdir(parents=True, exist_ok=True)
     rig, mesh = work / "rig.json", work / "mesh.ply"
     common.write_ply(mesh, *make())
-    program("rig", "ring", "--out", rig, *(common.SMALL_RING if args.small else []))
+    program("rig", "ring", "--overwrite", "--out", rig, *(common.SMALL_RING if args.small else []))
     program("simulate", "--rig", rig, "--mesh", mesh, "--noise", "medium", "--seed", 1, "--fit",
             "--out", work / "scene", "--overwrite", *options)
     program("reconstruct", "--rig", rig, "--frames", work / "scene/frames", "--out", work / "result",

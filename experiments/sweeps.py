@@ -51,9 +51,9 @@ def measure(args, program, rows, name, value):
     base = {**BASE, **change}
     rig_path, scene, out = args.out / "work/rig.json", args.out / "work/scene", args.out / "work/out"
     if args.small:
-        program("rig", "ring", "--out", rig_path, *common.SMALL_RING)
+        program("rig", "ring", "--overwrite", "--out", rig_path, *common.SMALL_RING)
     else:
-        program("rig", "ring", "--out", rig_path, "--cameras", base["cameras"], "--projectors",
+        program("rig", "ring", "--overwrite", "--out", rig_path, "--cameras", base["cameras"], "--projectors",
                 base["projectors"], "--arc-deg", base["arc"], "--pitch-px", base["pitch"],
                 "--line-width-px", base["pitch"] / 3, "--offset-px", base["pitch"] / 2)
     mesh = args.out / "work/bunny.ply"

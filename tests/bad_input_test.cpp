@@ -2,56 +2,15 @@
 // value and rule, and no output touched. The exit codes of success and of a full disk stand beside
 // it.
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-#include <sys/wait.h>
-
-#include <algorithm>
-#include <cstdlib>
-#include <filesystem>
-#include <fstream>
-#include <iterator>
-#include <string>
+#include "program.h"
 
 namespace {
 
 namespace fs = std::filesystem;
-using ::testing::EndsWith;
 using ::testing::HasSubstr;
-using ::testing::StartsWith;
 
-std::string slurp(const fs::path& path) {
-  std::ifstream stream(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(stream), {}};
-}
-
-struct Outcome {
-  int code = -1;
-  std::string error;  ///< stderr
-};
-
-class Program : public ::testing::Test {
+class Program : public ProgramTest {
  protected:
-  void SetUp() override {
-    folder_ =
-        fs::path(::testing::TempDir()) /
-        (std::string("program_") + ::testing::UnitTest::GetInstance()->current_test_info()->name());
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-
-  /// Runs the program in the test's folder, after `setup` in the same shell.
-  Outcome run(const std::string& arguments, const std::string& setup = "true") {
-    const std::string command = "cd '" + folder_.string() + "' && " + setup + " && '" +
-                                PENCILSCAN_PROGRAM + "' " + arguments + " >stdout 2>stderr";
-    const int status = std::system(command.c_str());
-    Outcome outcome{WIFEXITED(status) ? WEXITSTATUS(status) : -1, slurp(folder_ / "stderr")};
-    fs::remove(folder_ / "stdout");
-    fs::remove(folder_ / "stderr");
-    return outcome;
-  }
-
   /// The default ring with the first `from` replaced by `to`, as rig.json.
   void make_rig(const std::string& from = "", const std::string& to = "") {
     static std::string good;
@@ -67,22 +26,6 @@ class Program : public ::testing::Test {
     std::ofstream(folder_ / "rig.json") << text;
   }
 
-  std::size_t file_count() {
-    return static_cast<std::size_t>(std::distance(fs::recursive_directory_iterator(folder_), {}));
-  }
-
-  /// Exit code 2 and one line with these parts; nothing written.
-  void expect_bad(const std::string& arguments, const std::string& part) {
-    const std::size_t before = file_count();
-    const Outcome outcome = run(arguments);
-    EXPECT_EQ(outcome.code, 2) << arguments;
-    EXPECT_THAT(outcome.error, StartsWith("pencilscan: "));
-    EXPECT_THAT(outcome.error, HasSubstr(part));
-    EXPECT_THAT(outcome.error, EndsWith("\n"));
-    EXPECT_EQ(std::count(outcome.error.begin(), outcome.error.end(), '\n'), 1) << outcome.error;
-    EXPECT_EQ(file_count(), before) << arguments;
-  }
-
   /// The same complaint from every command that needs the rig and nothing else.
   void expect_bad_rig(const std::string& from, const std::string& to, const std::string& part) {
     make_rig(from, to);
@@ -90,8 +33,6 @@ class Program : public ::testing::Test {
       expect_bad(arguments, "rig.json: " + part);
     }
   }
-
-  fs::path folder_;
 };
 
 TEST_F(Program, RingPatternAndCheckWorkTogether) {
@@ -113,11 +54,12 @@ TEST_F(Program, HelpAndVersionSucceed) {
 }
 
 TEST_F(Program, CommandLineErrorsAreBadInput) {
-  expect_bad("", "subcommand");
+  expect_bad("", "a command is missing: simulate, ");
   expect_bad("dance", "unknown command dance");
   expect_bad("pattern --out out", "--rig");
   expect_bad("pattern --rig rig.json --out out --colour red", "--colour");
-  expect_bad("rig ring --out rig.json --cameras 0", "--cameras: Value 0 not in range");
+  expect_bad("rig ring --out rig.json --cameras 0",
+             "--cameras = 0: must be a whole number from 1 to 256");
   expect_bad("rig ring --out rig.json --pitch-px nan", "--pitch-px");
   expect_bad("rig ring --out rig.json --threads -1", "--threads");
   expect_bad("rig ring --out rig.json --line-width-px 13", "--line-width-px = 13.0: must be");
@@ -179,7 +121,7 @@ TEST_F(Program, AFullDiskIsAFailedStageAndLeavesNothing) {
   make_rig();
   const std::size_t before = file_count();
   // Patterns compress well: one block of 512 bytes is too little for any of them.
-  const Outcome outcome = run("pattern --rig rig.json --out .", "ulimit -f 1");
+  const Outcome outcome = run("pattern --rig rig.json --out .", "ulimit -f 1 &&");
   EXPECT_EQ(outcome.code, 1);
   EXPECT_THAT(outcome.error, HasSubstr("cannot be written"));
   EXPECT_EQ(file_count(), before);

@@ -301,16 +301,18 @@ test('headings, landmarks and names are those of a document', async () => {
   await page.context().close();
 });
 
-test('a folder without anything opens with a reason', async () => {
+test('a folder without anything has no report, and its view says why', async () => {
   const empty = mkdtempSync(join(tmpdir(), 'pencilscan_empty_'));
   mkdirSync(join(empty, '000000', 'pictures'), {recursive: true});
-  run('report', empty);
+  assert.throws(() => run('report', empty), (error) => error.status === 2);
+  const {address, stop} = await startView(empty);
   const context = await browser.newContext();
   context.setDefaultTimeout(patience);
   const page = await context.newPage();
-  await page.goto(pathToFileURL(join(empty, 'report.html')).href);
+  await page.goto(address);
   assert.match(await page.locator('#nothing').innerText(), /holds no result/);
   await context.close();
+  await stop();
   rmSync(empty, {recursive: true});
 });
 

@@ -21,7 +21,7 @@ export async function startView(folder) {
     let text = '';
     server.stdout.on('data', (data) => {
       text += data;
-      const found = text.match(/http:\/\/127\.0\.0\.1:\d+\//);
+      const found = text.match(/http:\/\/127\.0\.0\.1:\d+\/[0-9a-f]{32}\//);
       if (found) done(found[0]);
     });
   });

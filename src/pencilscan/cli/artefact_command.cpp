@@ -151,8 +151,8 @@ void run_artefact(ArtefactCommand command) {
     }
     test.options.stem = {direction.normalized(), command.stem[3] * std::numbers::pi / 180};
   }
-  if (!command.report_path.empty() && !command.overwrite && fs::exists(command.report_path))
-    throw InputError("--report", "", command.report_path, "exists already (or give --overwrite)");
+  if (!command.report_path.empty())
+    refuse_existing("--report", command.report_path, command.overwrite);
   const FrameSurface surface =
       command.surface == "mesh" ? FrameSurface::kMesh : FrameSurface::kPoints;
   for (const std::string& argument : command.files)
@@ -169,7 +169,7 @@ void run_artefact(ArtefactCommand command) {
 
 void add_positive(CLI::App& command, const char* flag, std::optional<double>& value,
                   const char* text) {
-  command.add_option(flag, value, text)->check(CLI::PositiveNumber);
+  command.add_option(flag, value, text)->check(above_zero());
 }
 
 std::shared_ptr<ArtefactCommand> add_artefact(CLI::App& group, Artefact artefact, const char* name,
@@ -187,7 +187,7 @@ std::shared_ptr<ArtefactCommand> add_artefact(CLI::App& group, Artefact artefact
     CLI::Option* diameter =
         command
             ->add_option("--diameter", sizes.diameter_mm, "Calibrated diameter of the ball(s), mm")
-            ->check(CLI::PositiveNumber);
+            ->check(above_zero());
     if (artefact == Artefact::kBallBar) diameter->required();
   }
   if (artefact == Artefact::kSphere) {
@@ -195,7 +195,8 @@ std::shared_ptr<ArtefactCommand> add_artefact(CLI::App& group, Artefact artefact
         ->add_option("--stem", options->stem,
                      "Leaves a stem or stand out: x y z of its direction from the ball's centre, "
                      "and half the angle of the cone around it in degrees, as 0 0 -1 30")
-        ->expected(4);
+        ->expected(4)
+        ->check(any_number<double>());
   }
   if (artefact == Artefact::kBallBar) {
     add_positive(*command, "--length", sizes.length_mm,
@@ -203,7 +204,7 @@ std::shared_ptr<ArtefactCommand> add_artefact(CLI::App& group, Artefact artefact
     command
         ->add_option("--bar-diameter", sizes.bar_diameter_mm,
                      "Of the bar between the balls, mm: points around it are left out")
-        ->check(CLI::PositiveNumber);
+        ->check(above_zero());
   }
   if (artefact == Artefact::kPlate) {
     add_positive(*command, "--length", sizes.plate_length_mm, "Of the plate, mm: for the coverage");
@@ -214,23 +215,24 @@ std::shared_ptr<ArtefactCommand> add_artefact(CLI::App& group, Artefact artefact
     command
         ->add_option("--border", sizes.border_mm,
                      "With --thickness: points closer than this to the rim are left out, mm")
-        ->check(CLI::NonNegativeNumber)
+        ->check(zero_or_more())
         ->capture_default_str();
   }
   command
       ->add_option("--region", options->region,
                    "x y z radius, mm: only what lies in this sphere is the artefact")
-      ->expected(4);
+      ->expected(4)
+      ->check(any_number<double>());
   command
       ->add_option("--surface", options->surface,
                    "Of a result folder: points (points.ply) or mesh (mesh_measured.ply)")
-      ->check(CLI::IsMember({"points", "mesh"}))
+      ->check(one_of({"points", "mesh"}))
       ->capture_default_str();
   command->add_option("--rig", options->rig_path,
                       "Where the cameras are, for errors against their sigma; default: the "
                       "devices.json of a result folder");
   command->add_option("--report", options->report_path, "Also write this HTML page");
-  command->add_flag("--overwrite", options->overwrite, "Replace an earlier report");
+  add_overwrite(*command, options->overwrite, "Replace a report that is there");
   add_common_options(*command, options->common, example);
   command->callback([options] { run_artefact(*options); });
   return options;

@@ -153,7 +153,7 @@ void add_calibrate_command(CLI::App& app) {
       "A board in the captures: chessboard:9x7:75, inner corners and mm of a square, "
       "or charuco:10x8:75:56:DICT_5X5_100, squares, mm of a square and of a marker");
   command->add_option("--max-tracks", options->max_tracks, "Surface points to use at most")
-      ->check(CLI::Range(std::size_t{200}, std::size_t{1000000}))
+      ->check(between<std::size_t>(200, 1000000))
       ->capture_default_str();
   command
       ->add_option("--focal-tolerance", options->focal_tolerance_percent,

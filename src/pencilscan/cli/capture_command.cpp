@@ -36,6 +36,7 @@ struct CaptureCommand {
   bool solids = false;
   std::string test_to;
   bool list = false;
+  bool overwrite = false;
 };
 
 void list_all(const CaptureCommand& command) {
@@ -196,6 +197,7 @@ void capture_gray(const CaptureCommand& command, Interruption& interruption) {
 }
 
 void test_lab(const CaptureCommand& command, Interruption& interruption) {
+  refuse_existing("--test", command.test_to, command.overwrite);
   Running running = start(command);
   const auto screen = open_lab_screen(running.rig, running.lab, command.rig_path);
   const Progress progress = stderr_progress();
@@ -249,12 +251,13 @@ void add_capture_command(CLI::App& app) {
   command->add_option("--out", options->out,
                       "New: recording.zarr, or a folder for frames; for captures a folder, which "
                       "is gone on with");
-  command->add_option("--trigger", options->trigger, "free, software, wire or ptp")
-      ->check(CLI::IsMember({"free", "software", "wire", "ptp"}));
-  command->add_option("--rate", options->rate_hz, "Frames per second")->check(CLI::PositiveNumber);
+  command->add_option("--trigger", options->trigger, "What starts the exposures")
+      ->check(one_of({"free", "software", "wire", "ptp"}));
+  command->add_option("--rate", options->rate_hz, "Frames per second")->check(above_zero());
   command->add_option("--seconds", options->seconds, "Record so long (default: until Ctrl-C)")
-      ->check(CLI::PositiveNumber);
-  command->add_option("--frames", options->frames, "Record so many frames");
+      ->check(above_zero());
+  command->add_option("--frames", options->frames, "Record so many frames")
+      ->check(any_number<std::size_t>());
   command->add_flag("--still", options->still,
                     "The object does not move: pictures of a frame may be far apart");
   command->add_flag("--whole-only", options->whole_only, "Leave out frames with a picture missing");
@@ -265,6 +268,7 @@ void add_capture_command(CLI::App& app) {
   command->add_option("--test", options->test_to,
                       "Flash the projectors instead: who sees whom, delays, flicker; writes "
                       "lab.json with them");
+  add_overwrite(*command, options->overwrite, "With --test: replace a file that is there");
   command->add_flag("--list", options->list, "List the cameras that answer instead");
   add_common_options(*command, options->common,
                      "pencilscan capture --rig rig.json --lab lab.json --seconds 60 --show "

@@ -1,14 +1,11 @@
 #include "pencilscan/cli/command.h"
 
-#include <unistd.h>
-
 #include <algorithm>
-#include <chrono>
 #include <cstdio>
+#include <filesystem>
+#include <fstream>
 #include <iomanip>
 #include <iostream>
-#include <memory>
-#include <mutex>
 #include <nlohmann/json.hpp>
 #include <utility>
 #include <vector>
@@ -19,25 +16,15 @@ namespace pencilscan::cli {
 namespace {
 
 using Json = nlohmann::ordered_json;
-using Clock = std::chrono::steady_clock;
-
-constexpr auto kBarInterval = std::chrono::milliseconds(100);
-constexpr auto kLineInterval = std::chrono::seconds(5);
-constexpr int kBarWidth = 30;
-
-/// What stderr_progress() remembers between calls.
-struct ProgressState {
-  std::mutex mutex;
-  bool terminal = ::isatty(STDERR_FILENO) == 1;
-  Clock::time_point last = Clock::now();
-  std::string stage;
-};
-
-void show_bar(std::string_view what, double fraction) {
-  const int full = static_cast<int>(fraction * kBarWidth);
-  std::cerr << "\r\033[K[" << std::string(static_cast<std::size_t>(full), '#')
-            << std::string(static_cast<std::size_t>(kBarWidth - full), '.') << "] " << what
-            << (fraction >= 1 ? "\n" : "") << std::flush;
+/// True for what --json may replace: nothing, or the figures of an earlier run. Every other JSON
+/// file of ours says its format.
+bool may_hold_figures(const std::filesystem::path& path) {
+  std::error_code ignored;
+  if (!std::filesystem::exists(path, ignored)) return true;
+  if (!std::filesystem::is_regular_file(path, ignored)) return false;
+  std::ifstream stream(path);
+  const Json json = Json::parse(stream, nullptr, false);
+  return json.is_object() && !json.contains("format");
 }
 
 /// "a.b" for nested objects, so that every figure is one line.
@@ -62,32 +49,29 @@ void flatten(const Json& value, const std::string& prefix,
 
 void add_common_options(CLI::App& command, CommonOptions& options, const std::string& example) {
   command.add_option("--threads", options.threads, "Threads to use; 0: all cores")
-      ->check(CLI::Range(0, 1024))
+      ->check(between(0, 1024))
       ->capture_default_str();
-  command.add_option("--seed", options.seed, "Seed of everything random")->capture_default_str();
+  command.add_option("--seed", options.seed, "Seed of everything random")
+      ->check(any_number<std::uint64_t>())
+      ->capture_default_str();
   command.add_option("--json", options.json_path, "Also write the figures to this file")
-      ->type_name("FILE");
+      ->type_name("FILE")
+      ->check([](const std::string& path) {
+        return may_hold_figures(path)
+                   ? std::string()
+                   : refusal(
+                         path,
+                         "a new file or figures of an earlier run, and it holds something else");
+      });
   command.footer("Example:\n  " + example);
 }
 
-Progress stderr_progress() {
-  auto state = std::make_shared<ProgressState>();
-  return [state](std::string_view what, double fraction) {
-    const std::lock_guard lock(state->mutex);
-    const bool new_stage = state->stage != what;
-    const auto now = Clock::now();
-    const bool due = now - state->last >= (state->terminal ? Clock::duration(kBarInterval)
-                                                           : Clock::duration(kLineInterval));
-    if (!new_stage && !due && !(state->terminal && fraction >= 1)) return;
-    state->stage = what;
-    state->last = now;
-    const double shown = std::clamp(fraction, 0.0, 1.0);
-    if (state->terminal) {
-      show_bar(what, shown);
-    } else {
-      std::cerr << what << " " << static_cast<int>(100 * shown) << " %" << std::endl;
-    }
-  };
+void add_overwrite(CLI::App& command, bool& overwrite, const std::string& text) {
+  command.add_flag("--overwrite", overwrite, text);
+}
+
+void warn_of(const std::optional<std::string>& warning) {
+  if (warning) std::cerr << "pencilscan: warning: " << *warning << "\n";
 }
 
 void print_figures(const CommonOptions& options, const nlohmann::ordered_json& figures) {

@@ -3,8 +3,10 @@
 #include <CLI/CLI.hpp>
 #include <cstdint>
 #include <nlohmann/json_fwd.hpp>
+#include <optional>
 #include <string>
 
+#include "pencilscan/cli/arguments.h"
 #include "pencilscan/core/progress.h"
 
 namespace pencilscan::cli {
@@ -18,9 +20,16 @@ struct CommonOptions {
 
 /// Adds --threads, --seed, --json to a command, and an example to its help.
 void add_common_options(CLI::App& command, CommonOptions& options, const std::string& example);
+/// Adds --overwrite, without which no file is replaced: see refuse_existing().
+void add_overwrite(CLI::App& command, bool& overwrite, const std::string& text);
 
-/// Progress on stderr: a bar on a terminal, a line every few seconds elsewhere.
-[[nodiscard]] Progress stderr_progress();
+/// Progress on stderr, with the time that is probably left: a bar on a terminal, a line every few
+/// seconds elsewhere. Ctrl-C prints a last line: how far it was, and `if_interrupted`, what that
+/// means for the output.
+[[nodiscard]] Progress stderr_progress(const std::string& if_interrupted = "");
+
+/// Prints a warning to stderr, where there is one.
+void warn_of(const std::optional<std::string>& warning);
 
 /// Prints figures to stdout as aligned "key value" lines and writes --json when asked for.
 void print_figures(const CommonOptions& options, const nlohmann::ordered_json& figures);

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "pencilscan/cli/command.h"
+#include "pencilscan/cli/evaluation_table.h"
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/evaluation/evaluate.h"
@@ -86,10 +87,12 @@ void run_evaluate(const EvaluateOptions& options) {
   EvaluationOptions evaluation_options;
   evaluation_options.align = kind_of(options.align);
   evaluation_options.completeness.seed = options.common.seed;
-  evaluation_options.progress = stderr_progress();
+  evaluation_options.progress = stderr_progress("nothing was written");
   try {
     const Evaluation evaluation = evaluate(truth, rig, result.input, evaluation_options);
-    print_figures(options.common, figures_json(evaluation, rig));
+    const nlohmann::ordered_json figures = figures_json(evaluation, rig);
+    print_evaluation(figures, std::cout);
+    write_figures(options.common, figures);
   } catch (const InputError& error) {
     if (error.path != "points.ply") throw;
     throw InputError(result.points_path.string(), error.field, error.value, error.rule);
@@ -111,7 +114,7 @@ void add_evaluate_command(CLI::App& app) {
                    "A frame's output folder, or one file: points.ply or a mesh")
       ->required();
   command->add_option("--align", options->align, "Move the result onto the truth first")
-      ->check(CLI::IsMember({"none", "rigid", "similarity"}))
+      ->check(one_of({"none", "rigid", "similarity"}))
       ->capture_default_str();
   add_common_options(*command, options->common,
                      "pencilscan evaluate --truth truth/mesh.ply --rig rig.json --result "

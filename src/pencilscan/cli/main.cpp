@@ -1,10 +1,14 @@
-#include <algorithm>
 #include <csignal>
 #include <exception>
 #include <iostream>
+#include <memory>
+#include <new>
 #include <string>
+#include <string_view>
 
 #include "pencilscan/cli/command.h"
+#include "pencilscan/cli/complaint.h"
+#include "pencilscan/cli/help_format.h"
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/memory.h"
 
@@ -15,28 +19,31 @@ enum ExitCode { kDone = 0, kStageFailed = 1, kBadInput = 2 };
 
 void complain(const std::string& message) { std::cerr << "pencilscan: " << message << std::endl; }
 
-/// CLI11's complaints may have several lines; the first one says it all.
-std::string first_line(const std::string& text) { return text.substr(0, text.find('\n')); }
+/// Also OpenCV's own way to say it.
+bool is_of_memory(const std::exception& error) {
+  return dynamic_cast<const std::bad_alloc*>(&error) != nullptr ||
+         std::string_view(error.what()).find("Insufficient memory") != std::string_view::npos;
+}
 
 int run(int argc, char** argv) {
   CLI::App app("One frame of a ring of cameras and projectors in, an entire 3-D shape out.",
                "pencilscan");
-  app.set_version_flag("--version", "pencilscan " PENCILSCAN_VERSION);
+  app.formatter(std::make_shared<HelpFormat>());
+  app.set_version_flag("-V,--version", "pencilscan " PENCILSCAN_VERSION, "Print the version");
+  app.footer("Of one command: pencilscan rig ring --help");
   app.require_subcommand(1);
   app.fallthrough(false);
 #include "registered_commands.inc"
+  name_commands(app);
+  if (const auto missing = missing_value(app, {argv + 1, argv + argc})) {
+    complain(*missing);
+    return kBadInput;
+  }
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return app.exit(error);  // --help, --version
-    // CLI11 says of an unknown command only that it misses a known one.
-    const auto commands = app.get_subcommands([](const CLI::App*) { return true; });
-    const bool unknown =
-        argc > 1 && argv[1][0] != '-' &&
-        std::none_of(commands.begin(), commands.end(),
-                     [&](const CLI::App* command) { return command->get_name() == argv[1]; });
-    complain((unknown ? std::string("unknown command ") + argv[1] : first_line(error.what())) +
-             " (see pencilscan --help)");
+    complain(complaint(app, error));
     return kBadInput;
   }
   std::cout.flush();
@@ -58,7 +65,9 @@ int main(int argc, char** argv) {
     cli::complain(error.what());
     return cli::kBadInput;
   } catch (const std::exception& error) {
-    cli::complain(error.what());
+    cli::complain(cli::is_of_memory(error)
+                      ? "there is not enough memory for images or results of this size"
+                      : error.what());
     return cli::kStageFailed;
   }
 }

@@ -23,6 +23,7 @@ struct PatternOptions {
   bool gray_code = false;
   bool no_inverses = false;
   bool solids = false;
+  bool overwrite = false;
 };
 
 std::string file_name(std::size_t number) {
@@ -30,11 +31,30 @@ std::string file_name(std::size_t number) {
   return std::string(digits.size() < 3 ? 3 - digits.size() : 0, '0') + digits + ".png";
 }
 
+/// The files of write_gray_codes().
+std::vector<std::filesystem::path> gray_code_files(const PatternOptions& options, const Rig& rig) {
+  std::vector<std::filesystem::path> files;
+  for (const Projector& projector : rig.projectors) {
+    const std::filesystem::path folder = std::filesystem::path(options.out) / projector.name;
+    const auto sequence =
+        gray_code_sequence(projector.width, projector.height, !options.no_inverses);
+    for (std::size_t i = 0; i < sequence.size(); ++i) files.push_back(folder / file_name(i));
+    if (options.solids)
+      for (const SolidImage& image : solid_images())
+        files.push_back(folder / (image.name + ".png"));
+    files.push_back(folder / "index.json");
+  }
+  return files;
+}
+
 /// <projector>/NNN.png in the order of docs/formats.md, and index.json that says what each shows.
 void write_gray_codes(const PatternOptions& options) {
   const std::filesystem::path out(options.out);
   nlohmann::ordered_json figures;
-  for (const Projector& projector : read_devices(options.rig_path).rig.projectors) {
+  const Rig rig = read_devices(options.rig_path).rig;
+  for (const auto& file : gray_code_files(options, rig))
+    refuse_existing("--out", file, options.overwrite);
+  for (const Projector& projector : rig.projectors) {
     const auto sequence =
         gray_code_sequence(projector.width, projector.height, !options.no_inverses);
     nlohmann::ordered_json index = nlohmann::ordered_json::array();
@@ -77,9 +97,12 @@ void run_pattern(const PatternOptions& options) {
                        "this key is missing: there is nothing to show");
     }
   }
+  const std::filesystem::path out(options.out);
+  for (const Projector& projector : rig.projectors)
+    refuse_existing("--out", out / (projector.name + ".png"), options.overwrite);
   nlohmann::ordered_json figures;
   for (const Projector& projector : rig.projectors) {
-    const auto path = std::filesystem::path(options.out) / (projector.name + ".png");
+    const auto path = out / (projector.name + ".png");
     write_image(path, render_patterns(projector.patterns, projector.width, projector.height));
     nlohmann::ordered_json lines = nlohmann::ordered_json::array();
     for (const LinePattern& pattern : projector.patterns) {
@@ -103,6 +126,7 @@ void add_pattern_command(CLI::App& app) {
   command->add_flag("--no-inverses", options->no_inverses, "Gray codes without inverse images");
   command->add_flag("--solids", options->solids,
                     "With --gray-code: even colours as well, for crosstalk and gamma");
+  add_overwrite(*command, options->overwrite, "Replace pictures that are there");
   add_common_options(*command, options->common, "pencilscan pattern --rig rig.json --out patterns");
   command->callback([options] { run_pattern(*options); });
 }

@@ -1,3 +1,4 @@
+#include <filesystem>
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -5,7 +6,9 @@
 #include "pencilscan/cli/command.h"
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/parallel.h"
+#include "pencilscan/io/file.h"
 #include "pencilscan/pipeline/sequence.h"
+#include "pencilscan/planning/units.h"
 
 namespace pencilscan::cli {
 namespace {
@@ -41,6 +44,13 @@ void print_refinement(const RefinementOutcome& refinement, nlohmann::ordered_jso
   figures["crossing_disagreement_after_px"] = refinement.after_px;
 }
 
+/// Of a frame that an earlier run made, its report knows the number.
+std::size_t points_of(const FrameOutcome& outcome, const std::string& out) {
+  if (!outcome.resumed) return outcome.points;
+  const auto report = read_json(std::filesystem::path(out) / outcome.name / "report.json");
+  return report.value("points", std::size_t{0});
+}
+
 void reconstruct(const ReconstructOptions& options) {
   const ThreadLimit limit(options.common.threads);
   SequenceOptions sequence;
@@ -66,8 +76,11 @@ void reconstruct(const ReconstructOptions& options) {
   if (options.no_mesh) sequence.description += " mesh=no";
   if (!options.plain_frames.empty()) sequence.description += " plain=yes";
   for (const std::string& format : options.mesh_formats) sequence.description += " " + format;
+  warn_of(volume_unit_warning(read_rig(options.rig)));
   const auto [outcomes, refinement] =
-      reconstruct_sequence(options.rig, options.frames, options.out, sequence, stderr_progress());
+      reconstruct_sequence(options.rig, options.frames, options.out, sequence,
+                           stderr_progress("frames that are done are kept, and the same command "
+                                           "goes on with the others"));
   nlohmann::ordered_json figures;
   if (refinement) print_refinement(*refinement, figures);
   std::size_t failed = 0;
@@ -84,10 +97,10 @@ void reconstruct(const ReconstructOptions& options) {
   figures["frames_failed"] = failed;
   figures["frames_resumed"] =
       std::count_if(outcomes.begin(), outcomes.end(), [](const auto& o) { return o.resumed; });
-  if (outcomes.size() == 1 && !outcomes[0].resumed) {
-    figures["points"] = outcomes[0].points;
-    figures["seconds"] = outcomes[0].seconds;
-  }
+  std::size_t points = 0;
+  for (const FrameOutcome& outcome : outcomes) points += points_of(outcome, options.out);
+  figures["points"] = points;
+  if (outcomes.size() == 1 && !outcomes[0].resumed) figures["seconds"] = outcomes[0].seconds;
   figures["out"] = options.out;
   print_figures(options.common, figures);
   if (failed > 0) {
@@ -119,14 +132,14 @@ void add_reconstruct_command(CLI::App& app) {
       ->add_option("--method", options->method,
                    "how lines are told apart: joint, the paper's two, or the grid of one projector "
                    "that it compares itself with")
-      ->check(CLI::IsMember({"linear", "multiview", "joint", "single-projector"}))
+      ->check(one_of({"linear", "multiview", "joint", "single-projector"}))
       ->capture_default_str();
   command
       ->add_option(
           "--multiview-cost", options->cost,
           "of the sweep: published (a sum over the reprojected points) or normalized (a mean "
           "in which points outside the other images count too)")
-      ->check(CLI::IsMember({"published", "normalized"}))
+      ->check(one_of({"published", "normalized"}))
       ->capture_default_str();
   command->add_flag("--no-depth", options->no_depth,
                     "surface from the labelled curves alone, without depth between them");
@@ -137,7 +150,7 @@ void add_reconstruct_command(CLI::App& app) {
       ->add_option("--mesh-formats", options->mesh_formats,
                    "the closed mesh also as obj, stl or glb (several with commas)")
       ->delimiter(',')
-      ->check(CLI::IsMember({"obj", "stl", "glb"}));
+      ->check(one_of({"obj", "stl", "glb"}));
   command->add_flag("--refine-rig", options->refine_rig,
                     "correct the poses of the devices from the lines that cross in the frames");
   command->add_flag("--no-pictures", options->no_pictures, "leave overlays and views out");

@@ -17,6 +17,7 @@ struct ReportOptions {
   std::string folder;
   std::string out;
   double max_megabytes = 15;
+  bool overwrite = false;
   PageOptions page;
 };
 
@@ -27,7 +28,9 @@ void run_report(const ReportOptions& options) {
   page.max_bytes = static_cast<std::size_t>(options.max_megabytes * 1e6);
   const fs::path file =
       options.out.empty() ? fs::path(options.folder) / "report.html" : fs::path(options.out);
-  const PageReport report = write_report(options.folder, file, page, stderr_progress());
+  refuse_existing("--out", file, options.overwrite);
+  const PageReport report =
+      write_report(options.folder, file, page, stderr_progress("nothing was written"));
   constexpr std::size_t kShown = 12;
   for (std::size_t i = 0; i < std::min(report.missing.size(), kShown); ++i)
     std::cerr << "pencilscan: warning: " << report.missing[i] << "\n";
@@ -55,6 +58,7 @@ void add_report_command(CLI::App& app) {
                    "several runs")
       ->required();
   command->add_option("--out", options->out, "the file; default: <folder>/report.html");
+  add_overwrite(*command, options->overwrite, "Replace a report that is there");
   command->add_option("--title", options->page.title, "default: the folder's name");
   command->add_option("--truth", options->page.sources.truth,
                       "true mesh, or a folder with <frame>/mesh.ply: shows distances to it");
@@ -66,7 +70,7 @@ void add_report_command(CLI::App& app) {
       ->add_option("--max-size", options->max_megabytes,
                    "megabytes to aim at; of long sequences, some frames get points and images and "
                    "the others their shape")
-      ->check(CLI::Range(1.0, 2000.0))
+      ->check(between(1.0, 2000.0))
       ->capture_default_str();
   add_common_options(*command, options->common, "pencilscan report result");
   command->callback([options] { run_report(*options); });

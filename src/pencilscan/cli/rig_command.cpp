@@ -28,6 +28,7 @@ struct RingCommand {
   CommonOptions common;
   RingOptions ring;
   std::string out;
+  bool overwrite = false;
   double arc_deg = 360;
   double camera_elevation_deg = 15;
   double vertical_elevation_deg = 8;
@@ -81,6 +82,7 @@ void run_ring(RingCommand command) {
           "must be <= --pitch-px");
   require(ring.offset_px <= std::min(ring.projector_width, ring.projector_height) - 0.5,
           "--offset-px", ring.offset_px, "the first line must lie on the panel");
+  refuse_existing("--out", command.out, command.overwrite);
   ring.arc_rad = std::min(command.arc_deg * kDegree, 2 * std::numbers::pi);
   ring.camera_elevation_rad = command.camera_elevation_deg * kDegree;
   ring.vertical_elevation_rad = command.vertical_elevation_deg * kDegree;
@@ -100,9 +102,13 @@ void add_ring(CLI::App& group) {
   RingOptions& ring = options->ring;
   const auto number = [&](const char* flag, auto& value, double low, double high,
                           const char* text) {
-    command->add_option(flag, value, text)->check(CLI::Range(low, high))->capture_default_str();
+    using Number = std::remove_reference_t<decltype(value)>;
+    command->add_option(flag, value, text)
+        ->check(between(static_cast<Number>(low), static_cast<Number>(high)))
+        ->capture_default_str();
   };
   command->add_option("--out", options->out, "The rig file to write (rig.json)")->required();
+  add_overwrite(*command, options->overwrite, "Replace a rig file that is there");
   number("--cameras", ring.cameras, 1, 256, "Number of cameras");
   number("--projectors", ring.projectors, 1, 256, "Number of projectors");
   number("--distance-mm", ring.distance_mm, 1, 1e6, "Distance of the devices to the centre");
@@ -123,16 +129,15 @@ void add_ring(CLI::App& group) {
   number("--line-width-px", ring.line_width_px, 0.1, 1e4, "Width of a line");
   number("--offset-px", ring.offset_px, -0.5, 1e5, "Centre of the first line");
   number("--order", ring.order, 1, 20, "Lines in a row whose colours tell where they are");
-  command
-      ->add_option("--lines", options->lines,
-                   "Lines of the projectors in turn: vertical, horizontal")
-      ->check(CLI::IsMember({"vertical", "horizontal"}))
+  command->add_option("--lines", options->lines, "Lines of the projectors in turn")
+      ->check(one_of({"vertical", "horizontal"}))
       ->capture_default_str();
   command->add_option("--colors", options->colors, "Colours of the projectors in turn, with commas")
       ->capture_default_str();
   command
       ->add_option("--roll-deg", options->rolls_deg,
                    "Rolls of the projectors in turn: tilted lines")
+      ->check(any_number<double>())
       ->capture_default_str();
   add_common_options(*command, options->common, "pencilscan rig ring --out rig.json");
   command->callback([options] { run_ring(*options); });
@@ -201,7 +206,20 @@ Json to_json(const Rig& rig, const RigCheck& check) {
   return json;
 }
 
+constexpr const char* kPairLegend =
+    "  shared    places of the volume that the camera sees and the projector lights\n"
+    "  usable    of these, with depth s and lines px large enough to be measured\n"
+    "  depth s   sensitivity: how far a line moves with depth; 0 tells nothing of depth\n"
+    "  px/mm     projector pixels that a mm of depth moves the line\n"
+    "  lines px  distance of neighbouring lines in the camera's image\n";
+constexpr const char* kAxesLegend =
+    "  axis      where all planes of a projector's lines meet, a line through the projector\n"
+    "  skewness  0: the axes lie in one plane, and crossings tell little\n"
+    "  crossing  of what shows both: usable, and crossing at a wide angle\n"
+    "  parallel  of what shows both: nearly parallel in the image\n";
+
 void print_tables(const Rig& rig, const RigCheck& check) {
+  std::printf("What each camera sees of each projector's lines\n");
   std::printf("%-10s %-12s %7s %7s %8s %8s %8s\n", "camera", "projector", "shared", "usable",
               "depth s", "px/mm", "lines px");
   for (const PairCheck& pair : check.pairs) {
@@ -211,8 +229,10 @@ void print_tables(const Rig& rig, const RigCheck& check) {
                 pair.shared, 100 * pair.usable_share, pair.sensitivity_median,
                 pair.px_per_mm_median, pair.spacing_median_px);
   }
-  std::printf("\n%-12s %-12s %8s %8s %8s %9s %9s\n", "axis", "axis", "angle", "mm apart",
-              "skewness", "crossing", "parallel");
+  std::printf("%s", kPairLegend);
+  std::printf("\nHow the lines of two projectors meet in the images\n");
+  std::printf("%-12s %-12s %8s %8s %8s %9s %9s\n", "axis", "axis", "angle", "mm apart", "skewness",
+              "crossing", "parallel");
   for (const AxesCheck& axes : check.axes) {
     if (axes.shared == 0) continue;
     std::printf("%-12s %-12s %7.1f\u00b0 %8.0f %8.3f %8.0f%% %8.0f%%%s\n",
@@ -221,6 +241,23 @@ void print_tables(const Rig& rig, const RigCheck& check) {
                 100 * axes.crossing_share, 100 * axes.parallel_share,
                 axes.same_color ? "  same colour" : "");
   }
+  std::printf("%s\n", kAxesLegend);
+  std::fflush(stdout);
+}
+
+/// Shares of the volume, each with what it means.
+void print_coverage(const CoverageCheck& coverage) {
+  const auto row = [](const char* name, double share, const char* meaning) {
+    std::printf("  %-12s %6.1f %%  %s\n", name, 100 * share, meaning);
+  };
+  std::printf("How much of the volume (places and directions in it, evenly picked) is\n");
+  row("seen", coverage.seen, "by a camera");
+  row("lit", coverage.lit, "by a projector");
+  row("seen_and_lit", coverage.seen_and_lit, "by some camera and projector");
+  row("usable", coverage.usable, "by some pair, with depth and lines far enough apart");
+  row("grid", coverage.grid, "where a camera sees usable lines of two projectors cross");
+  row("skew_grid", coverage.skew_grid, "the same, of projectors whose lines have skew axes");
+  row("ambiguous", coverage.ambiguous, "lit by lines of one colour that can be taken for others");
   std::printf("\n");
   std::fflush(stdout);
 }
@@ -231,10 +268,7 @@ void run_check(const CheckCommand& command) {
   const RigCheck check = check_rig(rig);
   const Json json = to_json(rig, check);
   print_tables(rig, check);
-  CommonOptions coverage_only = command.common;
-  coverage_only.json_path.clear();
-  print_figures(coverage_only, {{"coverage", json["coverage"]}});
-  std::cout << "\n";
+  print_coverage(check.coverage);
   for (const RigWarning& warning : check.warnings) {
     std::cout << (warning.severe ? "SEVERE: " : "warning: ") << warning.text << "\n";
   }

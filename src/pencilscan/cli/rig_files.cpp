@@ -42,6 +42,7 @@ struct ImportCommand {
   std::vector<std::string> projectors;
   std::vector<std::string> sizes;
   std::vector<std::string> known_distance;
+  bool overwrite = false;
 };
 
 /// [NAME[,NAME]=]FILE.
@@ -124,6 +125,7 @@ std::string missing_values(const UncalibratedRig& rig) {
 void run_import(const ImportCommand& command) {
   if (command.opencv.empty() == command.colmap.empty())
     throw InputError("command line", "--opencv, --colmap", "", "exactly one of them is needed");
+  refuse_existing("--out", command.out, command.overwrite);
   ExchangedRig files;
   for (const std::string& file : command.opencv) read_opencv_argument(file, files);
   if (!command.colmap.empty()) files = read_colmap(command.colmap);
@@ -157,6 +159,7 @@ void add_import(CLI::App& group) {
                       "(two names); repeat it for more files");
   command->add_option("--colmap", options->colmap, "Folder of a COLMAP text model");
   command->add_option("--out", options->out, "The rig file to write (rig.json)")->required();
+  add_overwrite(*command, options->overwrite, "Replace a rig file that is there");
   command->add_option(
       "--base", options->base,
       "A rig.json whose devices of the same name take the calibration over and keep "
@@ -167,7 +170,7 @@ void add_import(CLI::App& group) {
                       "NAME=WIDTHxHEIGHT where the file lacks it, as cam0=1280x960");
   command
       ->add_option("--unit", options->unit, "Of the files' lengths; default mm, for COLMAP unknown")
-      ->check(CLI::IsMember({"mm", "cm", "m", "unknown"}));
+      ->check(one_of({"mm", "cm", "m", "unknown"}));
   command
       ->add_option("--known-distance", options->known_distance,
                    "Two devices and the distance of their centres in mm: cam0 cam1 850")
@@ -188,6 +191,7 @@ struct ExportCommand {
   std::string points;
   std::vector<std::string> stereo;
   bool is_xml = false;
+  bool overwrite = false;
 };
 
 void export_opencv(const ExportCommand& command, const Rig& rig) {
@@ -204,7 +208,10 @@ void export_opencv(const ExportCommand& command, const Rig& rig) {
     files.emplace_back(command.stereo[0] + "-" + command.stereo[1] + ending,
                        opencv_stereo_text(stereo_device(0), stereo_device(1), syntax));
   }
-  for (const auto& [name, text] : files) write_text(fs::path(command.opencv) / name, text);
+  const fs::path folder(command.opencv);
+  for (const auto& [name, text] : files)
+    refuse_existing("--opencv", folder / name, command.overwrite);
+  for (const auto& [name, text] : files) write_text(folder / name, text);
 }
 
 void run_export(const ExportCommand& command) {
@@ -214,6 +221,8 @@ void run_export(const ExportCommand& command) {
   if (!command.opencv.empty()) {
     export_opencv(command, rig);
   } else {
+    for (const char* name : {"cameras.txt", "images.txt", "points3D.txt"})
+      refuse_existing("--colmap", fs::path(command.colmap) / name, command.overwrite);
     std::vector<MeasuredPoint> points;
     if (!command.points.empty()) points = read_points(command.points);
     write_colmap(rig, points, command.colmap);
@@ -240,6 +249,7 @@ void add_export(CLI::App& group) {
       command->add_option("--colmap", options->colmap, "Folder for a COLMAP text model");
   command->add_option("--points", options->points, "points.ply measured with this rig, for COLMAP")
       ->needs(colmap);
+  add_overwrite(*command, options->overwrite, "Replace files that are there");
   add_common_options(*command, options->common,
                      "pencilscan rig export --rig rig.json --colmap model");
   command->callback([options] { run_export(*options); });
@@ -252,9 +262,11 @@ struct PictureCommand {
   std::string rig_path;
   std::string out;
   int side_px = 900;
+  bool overwrite = false;
 };
 
 void run_picture(const PictureCommand& command) {
+  refuse_existing("--out", command.out, command.overwrite);
   write_image(command.out, draw_rig(read_rig(command.rig_path), command.side_px));
   print_figures(command.common, {{"picture", command.out}});
 }
@@ -265,8 +277,9 @@ void add_picture(CLI::App& group) {
       group.add_subcommand("picture", "Draw the rig to scale, from above and from the side");
   command->add_option("--rig", options->rig_path, "The rig (rig.json)")->required();
   command->add_option("--out", options->out, "The picture to write (rig.png)")->required();
+  add_overwrite(*command, options->overwrite, "Replace a picture that is there");
   command->add_option("--side-px", options->side_px, "Side of each of the two views")
-      ->check(CLI::Range(300, 5000))
+      ->check(between(300, 5000))
       ->capture_default_str();
   add_common_options(*command, options->common,
                      "pencilscan rig picture --rig rig.json --out rig.png");

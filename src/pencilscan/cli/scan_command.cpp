@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "pencilscan/cli/command.h"
+#include "pencilscan/core/counted_progress.h"
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/core/stopwatch.h"
@@ -37,17 +38,16 @@ void run_scan(const ScanCommand& command) {
   const ThreadLimit threads(command.common.threads);
   const Stopwatch watch;
   const fs::path out(command.out);
-  std::error_code ignored;
-  if (!command.overwrite && fs::exists(out / "points.ply", ignored))
-    throw InputError("--out", "", command.out, "must be a new folder (or give --overwrite)");
+  refuse_existing("--out", out / "points.ply", command.overwrite);
+  if (!command.no_mesh) refuse_existing("--out", out / "mesh.ply", command.overwrite);
   const Rig rig = read_rig(command.rig);
   const auto pairs = list_captures(command.captures, rig);
-  const Progress progress = stderr_progress();
+  const Progress progress = stderr_progress("nothing was written");
   std::vector<MeasuredPoint> points;
   std::vector<SurfaceSample> samples;
   std::size_t missed = 0;
   for (std::size_t i = 0; i < pairs.size(); ++i) {
-    progress("decoding", static_cast<double>(i) / static_cast<double>(pairs.size()));
+    tell_steps(progress, "decoding", i, pairs.size());
     const DecodedView decoded = decode_gray_stack(read_gray_stack(pairs[i], rig));
     const GrayScan scan =
         gray_scan(rig, pairs[i].camera, pairs[i].projector, decoded, command.scan);
@@ -55,7 +55,7 @@ void run_scan(const ScanCommand& command) {
     samples.insert(samples.end(), scan.samples.begin(), scan.samples.end());
     missed += scan.missed;
   }
-  progress("decoding", 1);
+  tell_steps(progress, "decoding", pairs.size(), pairs.size());
   if (points.empty()) throw StageError("no pixel could be measured: see pencilscan calibrate");
   write_points(out / "points.ply", points);
   nlohmann::ordered_json figures{
@@ -83,13 +83,13 @@ void add_scan_command(CLI::App& app) {
   command->add_option("--rig", options->rig, "The rig (rig.json)")->required();
   command->add_option("--out", options->out, "Folder for points.ply and mesh.ply")->required();
   command->add_option("--step", options->scan.step_px, "Measure every n-th pixel and row")
-      ->check(CLI::Range(1, 64))
+      ->check(between(1, 64))
       ->capture_default_str();
   command->add_option("--cell-mm", options->cell_mm, "Size of the mesh's cells; 0: from the points")
-      ->check(CLI::NonNegativeNumber)
+      ->check(zero_or_more())
       ->capture_default_str();
   command->add_flag("--no-mesh", options->no_mesh, "Write points.ply only");
-  command->add_flag("--overwrite", options->overwrite, "Replace an earlier result in --out");
+  add_overwrite(*command, options->overwrite, "Replace an earlier result in --out");
   add_common_options(*command, options->common,
                      "pencilscan scan --captures captures --rig rig.json --out surface");
   command->callback([options] { run_scan(*options); });

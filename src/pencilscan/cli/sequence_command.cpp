@@ -56,7 +56,7 @@ void add_pack(CLI::App& group) {
   command
       ->add_option("--compression", options->compression,
                    "zstd: smallest; lz4: seven times as fast; none")
-      ->check(CLI::IsMember({"zstd", "lz4", "none"}))
+      ->check(one_of({"zstd", "lz4", "none"}))
       ->capture_default_str();
   command->add_option("--times", options->pack.times,
                       "Time stamps in ns: frame,<camera>,<camera>,... (default: timestamps.csv "
@@ -64,7 +64,7 @@ void add_pack(CLI::App& group) {
   command
       ->add_option("--exposure-us", options->pack.exposure_us,
                    "How long the shutters were open; 0: unknown")
-      ->check(CLI::NonNegativeNumber)
+      ->check(zero_or_more())
       ->capture_default_str();
   command->add_flag("--overwrite", options->pack.overwrite, "Replace an earlier recording");
   add_common_options(*command, options->common,

@@ -29,6 +29,7 @@ struct ShowOptions {
   std::string assign_to;
   double seconds = 0;  ///< 0: until stopped
   bool list = false;
+  bool overwrite = false;
 };
 
 Json describe(const DisplayOutput& output) {
@@ -74,6 +75,7 @@ std::map<std::string, std::string> named_outputs(const ShowOptions& options) {
 
 /// Every lit output shows its number; the terminal asks which projector that is.
 void assign(const ShowOptions& options) {
+  refuse_existing("--assign", options.assign_to, options.overwrite);
   UncalibratedRig devices = read_devices(options.rig_path);
   const auto outputs = XScreen().outputs();
   std::vector<Projector> labels;
@@ -197,12 +199,12 @@ void add_show_command(CLI::App& app) {
                       "PROJECTOR=OUTPUT instead of the rig's: proj0=HDMI-1");
   command->add_option("--projector", options->projectors,
                       "Only this projector shows it, the others are black; repeat for more");
-  command->add_option("--seconds", options->seconds, "Stop after this time")
-      ->check(CLI::PositiveNumber);
+  command->add_option("--seconds", options->seconds, "Stop after this time")->check(above_zero());
   command->add_flag("--list", options->list, "List the outputs of this computer instead");
   command->add_option("--assign", options->assign_to,
                       "Ask which projector shows which number, and write the rig with its outputs "
                       "to this file");
+  add_overwrite(*command, options->overwrite, "With --assign: replace a file that is there");
   add_common_options(*command, options->common, "pencilscan show --rig rig.json --what identify");
   command->callback([options] { run_show(*options); });
 }

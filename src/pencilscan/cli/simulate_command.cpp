@@ -6,12 +6,14 @@
 #include <vector>
 
 #include "pencilscan/cli/command.h"
+#include "pencilscan/core/counted_progress.h"
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/core/stopwatch.h"
 #include "pencilscan/io/file.h"
 #include "pencilscan/io/image.h"
 #include "pencilscan/io/mesh_file.h"
+#include "pencilscan/planning/units.h"
 #include "pencilscan/recording/pack.h"
 #include "pencilscan/simulation/photography.h"
 #include "pencilscan/simulation/povray.h"
@@ -30,6 +32,7 @@ struct SimulateOptions {
   bool overwrite = false;
 
   bool fit = false;
+  double scale = 1;
   UpAxis up = UpAxis::kZ;
   int frame_count = 1;
   double rotate_deg = 0;
@@ -56,7 +59,12 @@ constexpr std::uint32_t kFirstCaptureImage = 0x40000000;
 /// The mesh where frame 0 has it; InputError when no camera would see any of it.
 TriangleMesh placed_mesh(const SimulateOptions& options, const Rig& rig) {
   TriangleMesh mesh = turned_upright(read_mesh(options.mesh_path), options.up);
-  if (options.fit) mesh = fitted(std::move(mesh), working_volume(rig));
+  for (Vec3& v : mesh.vertices) v *= options.scale;
+  if (options.fit) {
+    mesh = fitted(std::move(mesh), working_volume(rig));
+  } else {
+    warn_of(object_unit_warning(mesh, rig));
+  }
   check_scene(rig, mesh, options.mesh_path, options.rig_path);
   return mesh;
 }
@@ -71,7 +79,9 @@ void prepare_output(const SimulateOptions& options) {
   }
   if (fs::is_empty(out, ignored)) return;
   if (!options.overwrite) {
-    throw InputError("--out", "", options.out, "must be new or empty (or give --overwrite)");
+    throw InputError("--out", "", options.out,
+                     "must be new or empty: choose another folder, or give --overwrite to replace "
+                     "the scene in it");
   }
   for (const char* name : {"frames", "truth", "captures", "povray"}) fs::remove_all(out / name);
 }
@@ -116,7 +126,7 @@ void write_frames(const SimulateOptions& options, const Rig& rig, const Triangle
       const Camera& camera = rig.cameras[c];
       const auto image =
           static_cast<std::uint32_t>(static_cast<std::size_t>(frame) * rig.cameras.size() + c);
-      progress("rendering frames", static_cast<double>(image) / static_cast<double>(total));
+      tell_steps(progress, "rendering frames: image", image, total);
       const cv::Mat picture = photograph(rig, c, object, options.photo, image);
       const fs::path stem = out / "frames" / name / camera.name;
       if (options.jpeg) {
@@ -130,7 +140,7 @@ void write_frames(const SimulateOptions& options, const Rig& rig, const Triangle
       write_povray_scene(out / "povray" / name, rig, object, scene_light(options.photo));
     }
   }
-  progress("rendering frames", 1);
+  tell_steps(progress, "rendering frames: image", total, total);
 }
 
 /// Returns the number of camera-projector pairs with captures.
@@ -143,7 +153,7 @@ int write_captures(const SimulateOptions& options, const Rig& rig, const Triangl
   const std::size_t pairs = rig.projectors.size() * rig.cameras.size();
   int written = 0;
   for (std::size_t pair = 0; pair < pairs; ++pair) {
-    progress("rendering captures", static_cast<double>(pair) / static_cast<double>(pairs));
+    tell_steps(progress, "rendering captures: pair", pair, pairs);
     const Projector& projector = rig.projectors[pair / rig.cameras.size()];
     const std::size_t c = pair % rig.cameras.size();
     std::vector<PanelLight> sequence;
@@ -171,7 +181,7 @@ int write_captures(const SimulateOptions& options, const Rig& rig, const Triangl
                   apply_sensor(images[i], sensor, options.common.seed, number), options.photo.bits);
     });
   }
-  progress("rendering captures", 1);
+  tell_steps(progress, "rendering captures: pair", pairs, pairs);
   return written;
 }
 
@@ -183,12 +193,13 @@ void run_simulate(SimulateOptions options) {
   options.photo.seed = options.common.seed;
   options.photo.interpolated = Mosaic::from_name(options.interpolated);
   const Rig rig = read_rig(options.rig_path);
+  warn_of(volume_unit_warning(rig));
   const TriangleMesh mesh = placed_mesh(options, rig);
   if (options.export_povray) check_povray_can_show(rig, options.surface, options.rig_path);
   const std::string rig_text = read_file(options.rig_path);  // before an --overwrite may touch it
   prepare_output(options);
   write_text(fs::path(options.out) / "rig.json", rig_text);
-  const Progress progress = stderr_progress();
+  const Progress progress = stderr_progress("the scene is not whole: start again with --overwrite");
   write_frames(options, rig, mesh, progress);
   nlohmann::ordered_json figures;
   figures["frames"] = options.frame_count;
@@ -207,87 +218,97 @@ void add_scene_options(CLI::App& command, SimulateOptions& options) {
                                                     {"stripes", TextureKind::kStripes},
                                                     {"checker", TextureKind::kChecker}};
   command.add_flag("--fit", options.fit, "Centre and scale the mesh into the rig's volume");
-  command.add_option("--up", options.up, "Axis of the mesh that points up: x, y, z")
-      ->transform(CLI::CheckedTransformer(axes))
+  command
+      .add_option("--scale", options.scale,
+                  "Multiply the mesh: 1000 for one in metres, 25.4 for one in inches")
+      ->check(above_zero())
+      ->capture_default_str();
+  command.add_option("--up", options.up, "Axis of the mesh that points up")
+      ->check(choice(axes))
       ->default_str("z");
   command.add_option("--frame-count", options.frame_count, "Frames of a moving object")
-      ->check(CLI::Range(1, 999999))
+      ->check(between(1, 999999))
       ->capture_default_str();
-  command.add_option("--rotate-deg", options.rotate_deg, "Turn about the vertical per frame");
-  command.add_option("--translate-mm", options.translate_mm, "Shift x y z per frame")->expected(3);
-  command.add_option("--albedo", options.surface.albedo)
-      ->check(CLI::Range(0.0, 1.0))
+  command.add_option("--rotate-deg", options.rotate_deg, "Turn about the vertical per frame")
+      ->check(any_number<double>());
+  command.add_option("--translate-mm", options.translate_mm, "Shift x y z per frame")
+      ->expected(3)
+      ->check(any_number<double>());
+  command
+      .add_option("--albedo", options.surface.albedo,
+                  "Share of the light that the surface gives back")
+      ->check(between(0.0, 1.0))
       ->capture_default_str();
-  command.add_option("--texture", options.surface.texture.kind, "none, noise, stripes, checker")
-      ->transform(CLI::CheckedTransformer(textures))
+  command.add_option("--texture", options.surface.texture.kind, "What varies the albedo")
+      ->check(choice(textures))
       ->default_str("none");
   command.add_option("--contrast", options.surface.texture.contrast, "Contrast of the texture")
-      ->check(CLI::Range(0.0, 1.0))
+      ->check(between(0.0, 1.0))
       ->capture_default_str();
   command
       .add_option("--texture-mm", options.surface.texture.period_mm, "Period of the texture, mm")
-      ->check(CLI::PositiveNumber)
+      ->check(above_zero())
       ->capture_default_str();
   command.add_option("--specular", options.surface.specular, "Weight of the Blinn-Phong lobe")
-      ->check(CLI::NonNegativeNumber)
+      ->check(zero_or_more())
       ->capture_default_str();
   command.add_option("--roughness", options.surface.roughness, "1 / exponent of that lobe")
-      ->check(CLI::Range(1e-4, 1.0))
+      ->check(between(1e-4, 1.0))
       ->capture_default_str();
   command.add_flag("--flat", options.flat, "One normal per face (cubes); else smooth shading");
 }
 
 void add_device_options(CLI::App& command, SimulateOptions& options) {
   command.add_option("--samples", options.photo.render.samples, "Rays per pixel and axis")
-      ->check(CLI::Range(1, 16))
+      ->check(between(1, 16))
       ->capture_default_str();
   command
       .add_option("--exposure", options.photo.render.exposure,
                   "Image value of a white surface that faces a projector at the centre")
-      ->check(CLI::PositiveNumber)
+      ->check(above_zero())
       ->capture_default_str();
   command.add_flag("--no-falloff", options.no_falloff, "Light does not weaken with distance");
   command.add_flag("--pixelated", options.photo.film.pixelated,
                    "Projector pixels, no continuous film");
   command
       .add_option("--projector-blur", options.photo.film.blur_px, "Standard deviation, panel px")
-      ->check(CLI::Range(0.0, 50.0));
+      ->check(between(0.0, 50.0));
   command
       .add_option("--black-level", options.photo.black_level,
                   "Light of a black panel pixel (default 0; 0.004 in captures)")
-      ->check(CLI::Range(0.0, 0.9));
+      ->check(between(0.0, 0.9));
   command
       .add_option("--noise", options.photo.noise,
                   "Sensor preset: crosstalk, ambient light, blur and noise together")
-      ->check(CLI::IsMember({"none", "low", "medium", "high"}))
+      ->check(one_of({"none", "low", "medium", "high"}))
       ->capture_default_str();
   command.add_option("--crosstalk", options.photo.crosstalk, "Share that colour filters leak")
-      ->check(CLI::Range(0.0, 0.5));
+      ->check(between(0.0, 0.5));
   command
       .add_option("--ambient", options.photo.ambient,
                   "Even light on all surfaces, image value of a white one")
-      ->check(CLI::Range(0.0, 1.0));
+      ->check(between(0.0, 1.0));
   command.add_option("--blur", options.photo.blur_px, "Camera blur, standard deviation, px")
-      ->check(CLI::Range(0.0, 50.0));
+      ->check(between(0.0, 50.0));
   command
       .add_option("--full-well", options.photo.full_well, "Electrons at value 1; 0: no shot noise")
-      ->check(CLI::NonNegativeNumber);
+      ->check(zero_or_more());
   command
       .add_option("--read-noise", options.photo.read_noise,
                   "Standard deviation, 1/255 of the range")
-      ->check(CLI::NonNegativeNumber);
-  command.add_option("--gain", options.photo.gain)
-      ->check(CLI::PositiveNumber)
+      ->check(zero_or_more());
+  command.add_option("--gain", options.photo.gain, "Of the sensor, after its noise")
+      ->check(above_zero())
       ->capture_default_str();
-  command.add_option("--bits", options.photo.bits, "8 or 16")
-      ->check(CLI::IsMember({8, 16}))
+  command.add_option("--bits", options.photo.bits, "Of the images, per channel")
+      ->check(one_of({"8", "16"}))
       ->capture_default_str();
   command
       .add_option("--interpolated", options.interpolated,
                   "Colours as a camera fills them in behind this mosaic, where the rig states none")
-      ->check(CLI::IsMember({"RGGB", "BGGR", "GRBG", "GBRG"}));
+      ->check(one_of({"RGGB", "BGGR", "GRBG", "GBRG"}));
   command.add_option("--jpeg", options.jpeg, "Frames as JPEG of this quality; 8 bits")
-      ->check(CLI::Range(1, 100));
+      ->check(between(1, 100));
 }
 
 }  // namespace
@@ -297,10 +318,11 @@ void add_simulate_command(CLI::App& app) {
   CLI::App* command =
       app.add_subcommand("simulate", "Render what the cameras of a rig would see of a mesh");
   command->add_option("--rig", options->rig_path, "The rig (rig.json)")->required();
-  command->add_option("--mesh", options->mesh_path, "PLY, OBJ, STL or OFF, in mm")->required();
+  command->add_option("--mesh", options->mesh_path, "PLY, OBJ, STL or OFF, in the rig's unit (mm)")
+      ->required();
   command->add_option("--out", options->out, "New folder: rig.json, frames/, truth/, captures/")
       ->required();
-  command->add_flag("--overwrite", options->overwrite, "Replace an earlier result in --out");
+  add_overwrite(*command, options->overwrite, "Replace an earlier result in --out");
   command->add_flag("--gray-code", options->gray_code, "Also write Gray-code captures");
   command->add_flag("--color-captures", options->color_captures,
                     "Gray-code captures in colour, with solid colours");

@@ -30,13 +30,16 @@ void run_view(const ViewCommandOptions& options) {
   ViewOptions view = options.view;
   view.page.program = "pencilscan " PENCILSCAN_VERSION;
   ViewServer server(options.folder, view);
-  const std::string address = "http://127.0.0.1:" + std::to_string(server.port()) + "/";
   nlohmann::ordered_json figures;
   figures["results"] = server.results();
-  figures["address"] = address;
+  figures["address"] = server.link();
   print_figures(options.common, figures);
   std::cout.flush();
-  std::cerr << "pencilscan: open " << address << " in a browser; Ctrl-C stops\n";
+  if (view.address != ViewOptions{}.address) {
+    std::cerr << "pencilscan: warning: other computers reach this page, and what they read is not "
+                 "encrypted; only who knows the link gets an answer\n";
+  }
+  std::cerr << "pencilscan: open " << server.link() << " in a browser; Ctrl-C stops\n";
   std::thread waiting([&] {
     int signal = 0;
     sigwait(&signals, &signal);
@@ -58,8 +61,13 @@ void add_view_command(CLI::App& app) {
                    "output folder of reconstruct, calibrate, scan or an experiment, or a folder of "
                    "several runs")
       ->required();
-  command->add_option("--port", options->view.port, "on 127.0.0.1; 0: any free one")
-      ->check(CLI::Range(0, 65535))
+  command
+      ->add_option("--listen", options->view.address,
+                   "address of this computer to listen on; with another one than the default, "
+                   "other computers reach the page")
+      ->capture_default_str();
+  command->add_option("--port", options->view.port, "0: any free one")
+      ->check(between(0, 65535))
       ->capture_default_str();
   command->add_option("--title", options->view.page.title, "default: the folder's name");
   command->add_option("--truth", options->view.page.sources.truth,

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "pencilscan/core/counted_progress.h"
 #include "pencilscan/core/error.h"
 
 namespace pencilscan {
@@ -53,9 +54,7 @@ std::vector<TrueLinePixel> all_true_lines(const TruthScene& truth, const Progres
   std::vector<TrueLinePixel> all;
   const std::size_t count = truth.rig().cameras.size();
   for (std::size_t c = 0; c < count; ++c) {
-    if (progress) {
-      progress("tracing true lines", static_cast<double>(c) / static_cast<double>(count));
-    }
+    tell_steps(progress, "tracing true lines: camera", c, count);
     const auto lines = true_line_pixels(truth, static_cast<int>(c));
     all.insert(all.end(), lines.begin(), lines.end());
   }

@@ -6,6 +6,7 @@
 #include "pencilscan/core/check.h"
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/parallel.h"
+#include "pencilscan/io/found_files.h"
 #include "pencilscan/io/image.h"
 #include "pencilscan/io/linear_light.h"
 #include "pencilscan/pattern/solid_color.h"
@@ -46,6 +47,20 @@ std::size_t index_of(const std::vector<DeviceT>& devices, const std::string& nam
   return static_cast<std::size_t>(found - devices.begin());
 }
 
+/// The first number that is missing and, where nothing is named so, what there is instead.
+std::string what_is_missing(const fs::path& folder, const std::vector<fs::path>& files) {
+  const std::string missing = three_digits(files.size()) + ".png is missing";
+  return files.empty() ? missing + ", " + holdings(folder) : missing;
+}
+
+/// "cam0, cam1".
+template <typename DeviceT>
+std::string names_of(const std::vector<DeviceT>& devices) {
+  std::string names;
+  for (const DeviceT& device : devices) names += (names.empty() ? "" : ", ") + device.name;
+  return names;
+}
+
 CapturePair capture_pair(const fs::path& folder, const Projector& projector) {
   CapturePair pair;
   pair.folder = folder;
@@ -60,7 +75,7 @@ CapturePair capture_pair(const fs::path& folder, const Projector& projector) {
         folder.string(), "images 000, 001, ... without a gap", std::to_string(pair.files.size()),
         "must be " + std::to_string(2 + 2 * bits) + " (or " + std::to_string(2 + bits) +
             " without inverses) for a panel of " + std::to_string(projector.width) + " x " +
-            std::to_string(projector.height) + " px");
+            std::to_string(projector.height) + " px; " + what_is_missing(folder, pair.files));
   }
   return pair;
 }
@@ -114,13 +129,14 @@ std::vector<CapturePair> list_captures(const fs::path& captures, const Rig& rig)
     const std::size_t p = index_of(rig.projectors, projector);
     if (p == rig.projectors.size()) {
       throw InputError((captures / projector).string(), "folder", projector,
-                       "must be the name of a projector");
+                       "must be the name of a projector (" + names_of(rig.projectors) + ")");
     }
     for (const std::string& camera : folders_in(captures / projector)) {
       const std::size_t c = index_of(rig.cameras, camera);
       const fs::path folder = captures / projector / camera;
       if (c == rig.cameras.size()) {
-        throw InputError(folder.string(), "folder", camera, "must be the name of a camera");
+        throw InputError(folder.string(), "folder", camera,
+                         "must be the name of a camera (" + names_of(rig.cameras) + ")");
       }
       CapturePair pair = capture_pair(folder, rig.projectors[p]);
       pair.projector = p;
@@ -130,7 +146,7 @@ std::vector<CapturePair> list_captures(const fs::path& captures, const Rig& rig)
   }
   if (pairs.empty()) {
     throw InputError("--captures", "", captures.string(),
-                     "must hold folders <projector>/<camera> with images");
+                     "must hold folders <projector>/<camera> with images; " + holdings(captures));
   }
   std::sort(pairs.begin(), pairs.end(), [](const CapturePair& a, const CapturePair& b) {
     return std::pair(a.projector, a.camera) < std::pair(b.projector, b.camera);

@@ -143,12 +143,23 @@ cv::Mat read_image(const std::filesystem::path& path) {
 
 std::optional<std::filesystem::path> find_image(const std::filesystem::path& folder,
                                                 const std::string& stem) {
-  for (const char* ending : kEndings) {
+  std::vector<std::string> found;
+  std::error_code error;
+  for (std::filesystem::directory_iterator it(folder, error), end; !error && it != end;
+       it.increment(error)) {
     std::error_code ignored;
-    std::filesystem::path path = folder / (stem + ending);
-    if (std::filesystem::is_regular_file(path, ignored)) return path;
+    const std::filesystem::path name = it->path().filename();
+    if (name.stem() == stem && name.has_extension() &&
+        std::find(kEndings.begin(), kEndings.end(), lower_ending(name)) != kEndings.end() &&
+        it->is_regular_file(ignored))
+      found.push_back(name.string());
   }
-  return std::nullopt;
+  if (found.empty()) return std::nullopt;
+  std::sort(found.begin(), found.end());
+  if (found.size() > 1)
+    throw InputError(folder.string(), stem, found[0] + " and " + found[1],
+                     "must be one file: which of them is the picture?");
+  return folder / found.front();
 }
 
 namespace {

@@ -19,7 +19,8 @@ namespace pencilscan {
 /// CV_32FC3 in [0, 1] of an image as stored; grey is replicated.
 [[nodiscard]] cv::Mat unit_image(const cv::Mat& stored);
 
-/// The file of `stem` in `folder` with one of the known endings (.png .tiff .tif .jpg .jpeg .bmp).
+/// The file of `stem` in `folder` with one of the known endings (.png .tiff .tif .jpg .jpeg .bmp),
+/// in capitals or not. InputError that names both where there are two.
 [[nodiscard]] std::optional<std::filesystem::path> find_image(const std::filesystem::path& folder,
                                                               const std::string& stem);
 

@@ -11,6 +11,7 @@
 #include "pencilscan/core/error.h"
 #include "pencilscan/io/curve_file.h"
 #include "pencilscan/io/file.h"
+#include "pencilscan/io/found_files.h"
 #include "pencilscan/io/image.h"
 #include "pencilscan/io/linear_light.h"
 #include "pencilscan/io/mesh_file.h"
@@ -171,6 +172,34 @@ TEST_F(Io, FindImageTriesAllEndings) {
   EXPECT_FALSE(find_image(folder_, "cam0").has_value());
   put("cam0.jpeg", "x");
   EXPECT_EQ(find_image(folder_, "cam0"), folder_ / "cam0.jpeg");
+}
+
+TEST_F(Io, ImagesAreFoundWithEndingsInCapitals) {
+  put("cam0.PNG", "x");
+  put("CAM1.Jpeg", "x");
+  EXPECT_EQ(find_image(folder_, "cam0"), folder_ / "cam0.PNG");
+  EXPECT_EQ(find_image(folder_, "cam1"), std::nullopt);  // names are names
+  EXPECT_EQ(find_image(folder_ / "none", "cam0"), std::nullopt);
+}
+
+TEST_F(Io, TwoImagesOfOneNameAreRefusedByName) {
+  put("cam0.png", "x");
+  put("cam0.jpg", "x");
+  try {
+    static_cast<void>(find_image(folder_, "cam0"));
+    FAIL();
+  } catch (const InputError& error) {
+    EXPECT_EQ(error.value, "cam0.jpg and cam0.png");
+  }
+}
+
+TEST_F(Io, HoldingsNameFilesBeforeFolders) {
+  EXPECT_EQ(holdings(folder_), "it is empty");
+  std::filesystem::create_directories(folder_ / "b");
+  EXPECT_EQ(holdings(folder_), "it holds only folders: b");
+  for (int i = 0; i < 7; ++i) put("IMG_" + std::to_string(i), "x");
+  put(".hidden", "x");
+  EXPECT_EQ(holdings(folder_), "it holds IMG_0, IMG_1, IMG_2, IMG_3 and 3 more");
 }
 
 TEST_F(Io, MeshRoundTripKeepsVerticesAndSigma) {

@@ -4,6 +4,7 @@
 #include <array>
 #include <utility>
 
+#include "pencilscan/core/counted_progress.h"
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/io/file.h"
@@ -188,7 +189,7 @@ std::vector<Collected> collect_all(const PageData& data, std::size_t max_bytes,
       if (result == sample) return;
       collected[result] = collect(data, result, is_whole[result] != 0 ? full : shape.detail);
     });
-    if (progress) progress("reading results", static_cast<double>(last) / number);
+    tell_steps(progress, "reading results", last, count);
   }
   return collected;
 }
@@ -306,6 +307,12 @@ ordered_json PageData::index(const std::string& mode, std::vector<ordered_json> 
 PageReport write_report(const fs::path& root, const fs::path& file, const PageOptions& options,
                         const Progress& progress) {
   const PageData data(root, options);
+  if (data.is_empty()) {
+    throw InputError(root.string(), "", "",
+                     "there is nothing to report: no result of reconstruct or scan (points.ply, "
+                     "report.json), no calibration.json, no experiment, here or in the folders "
+                     "below");
+  }
   const auto experiment = data.experiment(experiment_detail(data, options.max_bytes));
   const std::size_t taken = experiment ? embedded_bytes(*experiment) : 0;
   const std::vector<Collected> collected =

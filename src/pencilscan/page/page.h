@@ -37,6 +37,12 @@ class PageData {
   PageData(const std::filesystem::path& root, const PageOptions& options);
 
   [[nodiscard]] std::size_t size() const { return folder_.results.size(); }
+  /// True where a page would show nothing: no result, no frame that failed, no calibration, no
+  /// experiment.
+  [[nodiscard]] bool is_empty() const {
+    return folder_.results.empty() && folder_.failed.empty() && folder_.calibrations.empty() &&
+           !experiment_;
+  }
   /// A reader of one result.
   [[nodiscard]] std::unique_ptr<ResultReader> open(std::size_t result, const Detail& detail) const;
   /// The index of the page: devices, per result what `entries` holds, and what is known of the
@@ -62,7 +68,8 @@ class PageData {
 };
 
 /// Writes one self-contained HTML page of all that is in the folder, whole or not at all. With many
-/// results, those that fit are whole and the others have shape and figures only.
+/// results, those that fit are whole and the others have shape and figures only. InputError where
+/// the folder holds nothing to show.
 [[nodiscard]] PageReport write_report(const std::filesystem::path& root,
                                       const std::filesystem::path& file,
                                       const PageOptions& options = {},

@@ -1,14 +1,35 @@
 #include "pencilscan/pipeline/frame_files.h"
 
 #include <algorithm>
+#include <cctype>
 
 #include "pencilscan/core/error.h"
 #include "pencilscan/io/file.h"
+#include "pencilscan/io/found_files.h"
 #include "pencilscan/io/hash.h"
 #include "pencilscan/io/image.h"
 #include "pencilscan/rig/camera_light.h"
 
 namespace pencilscan {
+namespace {
+
+std::string lower_case(std::string text) {
+  for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return text;
+}
+
+/// A file that would be the camera's but for capitals is not passed over in silence.
+void refuse_other_case(const std::filesystem::path& folder, const std::string& camera) {
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    const std::string stem = entry.path().stem().string();
+    if (stem == camera || lower_case(stem) != lower_case(camera)) continue;
+    throw InputError(folder.string(), camera, entry.path().filename().string(),
+                     "must be named like the camera, " + camera + ".png");
+  }
+}
+
+}  // namespace
+
 std::string camera_names(const Rig& rig) {
   std::string names;
   for (const Camera& camera : rig.cameras) names += (names.empty() ? "" : ", ") + camera.name;
@@ -25,7 +46,7 @@ std::vector<FrameFiles> find_frames(const Rig& rig, const std::filesystem::path&
   }
   if (frames.empty()) {
     throw InputError(folder.string(), "frame folders", "none",
-                     "must hold at least one frame folder such as 000000");
+                     "must hold at least one frame folder such as 000000; " + holdings(folder));
   }
   std::sort(frames.begin(), frames.end(),
             [](const FrameFiles& a, const FrameFiles& b) { return a.name < b.name; });
@@ -37,8 +58,12 @@ std::vector<FrameFiles> find_frames(const Rig& rig, const std::filesystem::path&
     }
     if (!any) {
       throw InputError((folder / frame.name).string(), "images", "none",
-                       "must hold an image of a camera of the rig (" + camera_names(rig) + ")");
+                       "must hold an image of a camera of the rig (" + camera_names(rig) +
+                           "), named like it, as " + rig.cameras.front().name + ".png; " +
+                           holdings(folder / frame.name));
     }
+    for (std::size_t c = 0; c < rig.cameras.size(); ++c)
+      if (!frame.images[c]) refuse_other_case(folder / frame.name, rig.cameras[c].name);
   }
   return frames;
 }

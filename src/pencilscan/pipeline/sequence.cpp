@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "pencilscan/core/counted_progress.h"
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/core/stopwatch.h"
@@ -102,10 +103,7 @@ void check_images(const Rig& rig, const FrameSource& frames, const Progress& pro
       const Frame frame = frames.read(rig, first + i);
       static_cast<void>(frame);
     });
-    if (progress) {
-      progress("checking images",
-               static_cast<double>(first + count) / static_cast<double>(frames.size()));
-    }
+    tell_steps(progress, "checking frames", first + count, frames.size());
   }
 }
 
@@ -174,10 +172,7 @@ Rig refined_rig(const Rig& rig, const FrameSource& frames, const fs::path& out,
   std::vector<FrameCurves> curves;
   std::vector<std::string> names;
   for (const std::size_t i : picked) {
-    if (progress) {
-      progress("lines for the rig",
-               static_cast<double>(names.size()) / static_cast<double>(picked.size()));
-    }
+    tell_steps(progress, "lines for the rig: frame", names.size(), picked.size());
     PointOptions joint = options.points;
     joint.method = JointOptions{};
     PointResult detected = detect_frame(rig, frames.read(rig, i), joint);
@@ -224,6 +219,20 @@ FrameOutcome frame_outcome(const Rig& rig, const FrameSource& frames, std::size_
   return outcome;
 }
 
+/// The options of a frame whose stages are told as part of it, the i-th of so many.
+SequenceOptions with_stages(const SequenceOptions& options, const Progress& progress, std::size_t i,
+                            std::size_t frames) {
+  if (!progress) return options;
+  SequenceOptions telling = options;
+  const std::string frame = "frame " + std::to_string(i + 1) + " of " + std::to_string(frames);
+  const double done = static_cast<double>(i) / static_cast<double>(frames);
+  const Progress tell = [=](std::string_view stage, double) {
+    progress(frame + ": " + std::string(stage), done);
+  };
+  telling.points.progress = telling.shape.progress = tell;
+  return telling;
+}
+
 }  // namespace
 
 SequenceOutcome reconstruct_sequence(const fs::path& rig_path, const fs::path& frames_path,
@@ -265,13 +274,10 @@ SequenceOutcome reconstruct_sequence(const fs::path& rig_path, const fs::path& f
       outcome.name = frames.name(own[i]);
       outcome.done = outcome.resumed = true;
     } else {
-      result.frames.push_back(
-          frame_outcome(rig, frames, own[i], out, inputs.settings(), images[i], options));
+      result.frames.push_back(frame_outcome(rig, frames, own[i], out, inputs.settings(), images[i],
+                                            with_stages(options, progress, i, own.size())));
     }
-    if (progress) {
-      progress("frame " + frames.name(own[i]),
-               static_cast<double>(i + 1) / static_cast<double>(own.size()));
-    }
+    tell_steps(progress, "frame " + frames.name(own[i]), i + 1, own.size());
   }
   return result;
 }

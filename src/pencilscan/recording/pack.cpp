@@ -10,6 +10,7 @@
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/io/file.h"
+#include "pencilscan/io/found_files.h"
 #include "pencilscan/io/image.h"
 
 namespace pencilscan {
@@ -42,7 +43,7 @@ std::vector<std::string> folder_names(const fs::path& folder) {
   std::sort(names.begin(), names.end());
   if (names.empty()) {
     throw InputError(folder.string(), "frame folders", "none",
-                     "must hold at least one frame folder such as 000000");
+                     "must hold at least one frame folder such as 000000; " + holdings(folder));
   }
   return names;
 }
@@ -63,7 +64,8 @@ FoundFrames find_pictures(const fs::path& folder) {
   }
   if (found.cameras.empty()) {
     throw InputError(folder.string(), "images", "none",
-                     "must hold images such as " + names.front() + "/cam0.png");
+                     "must hold images such as " + names.front() + "/cam0.png; of " +
+                         names.front() + ", " + holdings(folder / names.front()));
   }
   return found;
 }

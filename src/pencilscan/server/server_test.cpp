@@ -2,9 +2,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <ifaddrs.h>
+#include <sys/socket.h>
 #include <unistd.h>
 
+#include <chrono>
+#include <cstdint>
 #include <thread>
+#include <vector>
 
 // clang-format off
 #include "pencilscan/io/temporary_folder.h"
@@ -21,6 +25,7 @@ namespace pencilscan {
 namespace {
 
 namespace fs = std::filesystem;
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 
 /// A folder with one frame, a secret beside it, and a server on a free port.
@@ -39,17 +44,23 @@ class Served : public ::testing::Test {
     // listen_after_bind() may not have begun yet: ask until it answers once.
     for (int i = 0; i < 100; ++i) {
       httplib::Client client("127.0.0.1", server_->port());
-      if (client.Get("/list/0")) break;
+      if (client.Get("/")) break;
     }
     server_->stop();
     thread_.join();
   }
+  /// "/<token>", before the paths of the page.
+  std::string token() const {
+    const std::string link = server_->link();
+    const auto end = link.size() - 1;
+    return link.substr(link.rfind('/', end - 1), end - link.rfind('/', end - 1));
+  }
   int status(const std::string& path, const httplib::Headers& headers = {}) {
-    const auto answer = client_->Get(path.c_str(), headers);
+    const auto answer = client_->Get((token() + path).c_str(), headers);
     return answer ? answer->status : -1;
   }
   std::string body(const std::string& path) {
-    const auto answer = client_->Get(path.c_str());
+    const auto answer = client_->Get((token() + path).c_str());
     return answer ? answer->body : "";
   }
 
@@ -84,7 +95,7 @@ TEST_F(Served, NoPathLeavesTheFolder) {
         "/files/000000/../../secret.txt", "/files/%2fetc%2fpasswd", "/files//etc/passwd",
         "/files/....//secret.txt", "/files/link.txt", "/files/up/secret.txt", "/files/%00",
         "/../secret.txt", "/files/000000", "/files/."}) {
-    const auto answer = client_->Get(path);
+    const auto answer = client_->Get((token() + path).c_str());
     ASSERT_TRUE(answer) << path;
     EXPECT_NE(answer->status, 200) << path;
     EXPECT_EQ(answer->body.find("secret"), std::string::npos) << path;
@@ -98,9 +109,105 @@ TEST_F(Served, AnswersOnlyThoseWhoAskForThisHost) {
 }
 
 TEST_F(Served, ChangesNothing) {
-  EXPECT_NE(client_->Post("/files/000000/points.ply", "x", "text/plain")->status, 200);
-  EXPECT_NE(client_->Delete("/files/000000/points.ply")->status, 200);
+  const std::string file = token() + "/files/000000/points.ply";
+  EXPECT_NE(client_->Post(file.c_str(), "x", "text/plain")->status, 200);
+  EXPECT_NE(client_->Delete(file.c_str())->status, 200);
   EXPECT_TRUE(fs::exists(root_ / "000000" / "points.ply"));
+}
+
+TEST_F(Served, ForbidsEveryPathWithoutTheToken) {
+  const std::string other(token().size() - 1, '0');
+  for (const std::string& path :
+       {std::string("/"), std::string("/files/000000/points.ply"), std::string("/part/0/mesh"),
+        "/" + other + "/", token().substr(0, 20) + "/", token(), token() + "0/",
+        "/" + other + token() + "/", "/files/.." + token() + "/"}) {
+    const auto answer = client_->Get(path.c_str());
+    ASSERT_TRUE(answer) << path;
+    EXPECT_EQ(answer->status, 403) << path;
+    EXPECT_LT(answer->body.size(), 100U) << path;
+  }
+}
+
+TEST_F(Served, EveryServerHasATokenOfItsOwn) {
+  const ViewServer other(root_, ViewOptions{});
+  EXPECT_EQ(token().size(), 33U);
+  EXPECT_EQ(other.link().find(token()), std::string::npos);
+}
+
+TEST_F(Served, ForbidsFramesForeignScriptsAndReferrers) {
+  for (const std::string& path : {token() + "/", token() + "/none", std::string("/")}) {
+    const auto answer = client_->Get(path.c_str());
+    ASSERT_TRUE(answer) << path;
+    EXPECT_EQ(answer->get_header_value("X-Frame-Options"), "DENY");
+    EXPECT_EQ(answer->get_header_value("X-Content-Type-Options"), "nosniff");
+    EXPECT_EQ(answer->get_header_value("Referrer-Policy"), "no-referrer");
+    EXPECT_THAT(answer->get_header_value("Content-Security-Policy"),
+                AllOf(HasSubstr("default-src 'none'"), HasSubstr("frame-ancestors 'none'")));
+  }
+}
+
+/// Sends bytes over a connection of its own, `pause` seconds after each block, and gives what comes
+/// back until the server closes it.
+std::string exchange(int port, const std::vector<std::string>& blocks, double pause = 0) {
+  const int connection = ::socket(AF_INET, SOCK_STREAM, 0);
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_port = htons(static_cast<std::uint16_t>(port));
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  if (::connect(connection, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0)
+    return "no connection";
+  for (const std::string& block : blocks) {
+    if (::send(connection, block.data(), block.size(), MSG_NOSIGNAL) < 0) break;
+    std::this_thread::sleep_for(std::chrono::duration<double>(pause));
+  }
+  std::string answer;
+  char bytes[4096];
+  for (ssize_t got = 0; (got = ::recv(connection, bytes, sizeof bytes, 0)) > 0;)
+    answer.append(bytes, static_cast<std::size_t>(got));
+  ::close(connection);
+  return answer;
+}
+
+TEST_F(Served, ClosesConnectionsThatAskTooMuchOrTooSlowly) {
+  const int port = server_->port();
+  const std::string host = "Host: 127.0.0.1:" + std::to_string(port) + "\r\n";
+  const std::string line = "GET " + token() + "/list/0 HTTP/1.1\r\n";
+  EXPECT_THAT(exchange(port, {line + host, "\r\n"}), HasSubstr("200 OK"));
+  EXPECT_EQ(exchange(port, {line, host + "X: " + std::string(20'000, 'x') + "\r\n\r\n"}), "");
+  EXPECT_EQ(exchange(port, {std::string(100'000, 'x')}), "");
+  // A byte a second would keep a thread for ever under limits on single bytes.
+  const auto begin = std::chrono::steady_clock::now();
+  EXPECT_EQ(exchange(port, std::vector<std::string>(9, "G"), 1), "");
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(60));
+  EXPECT_EQ(status("/list/0"), 200);
+}
+
+TEST_F(Served, OpenConnectionsThatSayNothingDoNotKeepOthersOut) {
+  std::vector<int> silent;
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_port = htons(static_cast<std::uint16_t>(server_->port()));
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  for (int i = 0; i < 16; ++i) {
+    silent.push_back(::socket(AF_INET, SOCK_STREAM, 0));
+    EXPECT_EQ(::connect(silent.back(), reinterpret_cast<const sockaddr*>(&address), sizeof address),
+              0);
+  }
+  client_->set_read_timeout(60);
+  EXPECT_EQ(status("/list/0"), 200);
+  for (const int connection : silent) ::close(connection);
+}
+
+TEST_F(Served, TheLongestRequestsFitTheStack) {
+  const std::string host = "Host: 127.0.0.1:" + std::to_string(server_->port()) + "\r\n";
+  const std::string path = token() + "/files/" + std::string(8000, 'a');
+  EXPECT_THAT(server_->answer("GET " + path + " HTTP/1.1\r\n" + host + "\r\n"),
+              HasSubstr("404 Not Found"));
+  std::string ranges = "Range: bytes=";
+  while (ranges.size() < 8000) ranges += "0-,";
+  const std::string many = server_->answer(
+      "GET " + token() + "/files/000000/points.ply HTTP/1.1\r\n" + host + ranges + "0-\r\n\r\n");
+  EXPECT_LT(many.size(), 2 * fs::file_size(root_ / "000000" / "points.ply") + 2000);
 }
 
 TEST_F(Served, IsNotReachableOnOtherInterfaces) {
@@ -123,6 +230,18 @@ TEST_F(Served, APortInUseIsAFailureAndNotShared) {
   ViewOptions same;
   same.port = server_->port();
   EXPECT_THROW(ViewServer(root_, same), StageError);
+}
+
+TEST_F(Served, OnlyAnAddressOfThisComputerIsListenedOn) {
+  for (const char* address : {"0.0.0.0", "localhost", "::", "", "192.0.2.1.5"}) {
+    ViewOptions options;
+    options.address = address;
+    EXPECT_THROW(ViewServer(root_, options), InputError) << address;
+  }
+  ViewOptions another;
+  another.address = "127.0.0.2";
+  ViewServer server(root_, another);
+  EXPECT_THAT(server.link(), HasSubstr("http://127.0.0.2:"));
 }
 
 TEST(ServedFiles, AreInsideTheRootOnly) {

@@ -1,8 +1,10 @@
 #include "pencilscan/server/view_server.h"
 
-#include <httplib.h>
+#include <arpa/inet.h>
+#include <sys/random.h>
 #include <sys/socket.h>
 
+#include <array>
 #include <fstream>
 #include <list>
 #include <map>
@@ -10,6 +12,7 @@
 #include <string>
 
 #include "pencilscan/core/error.h"
+#include "pencilscan/server/limited_server.h"
 #include "pencilscan/server/served_files.h"
 
 namespace pencilscan {
@@ -17,12 +20,22 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr const char* kLoopback = "127.0.0.1";
 constexpr const char* kPolicy =
     "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
     "img-src 'self' data: blob:; media-src blob:; connect-src 'self'; base-uri 'none'; "
     "form-action 'none'; frame-ancestors 'none'";
+constexpr int kRequestThreads = 8;
 constexpr std::size_t kOpenReaders = 4;
 constexpr std::size_t kPlayFaces = 20'000;  ///< of a mesh while a sequence plays
+
+/// One address, not all: requests have to name it.
+void check_address(const std::string& address) {
+  in_addr parsed{};
+  if (::inet_pton(AF_INET, address.c_str(), &parsed) != 1 || parsed.s_addr == INADDR_ANY)
+    throw InputError("--listen", "", address,
+                     "must be one IPv4 address of this computer, as 192.168.0.7");
+}
 
 Detail full_detail(std::size_t results) {
   Detail detail;
@@ -37,6 +50,29 @@ Detail full_detail(std::size_t results) {
 void exclusive_port(int socket) {
   const int yes = 1;
   static_cast<void>(::setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes));
+}
+
+/// 128 random bits: nobody guesses them.
+std::string random_token() {
+  std::array<unsigned char, 16> bytes{};
+  if (::getrandom(bytes.data(), bytes.size(), 0) != static_cast<ssize_t>(bytes.size()))
+    throw StageError("the system gives no random numbers");
+  constexpr const char* kDigits = "0123456789abcdef";
+  std::string text;
+  for (const unsigned char byte : bytes) {
+    text.push_back(kDigits[byte >> 4]);
+    text.push_back(kDigits[byte & 15]);
+  }
+  return text;
+}
+
+/// Takes as long for any two texts of equal length, wherever they differ.
+bool equal_in_constant_time(std::string_view a, std::string_view b) {
+  if (a.size() != b.size()) return false;
+  unsigned difference = 0;
+  for (std::size_t i = 0; i < a.size(); ++i)
+    difference |= static_cast<unsigned char>(a[i]) ^ static_cast<unsigned char>(b[i]);
+  return difference == 0;
 }
 
 /// The few readers used last, so that the parts of one result do not read its files again.
@@ -92,6 +128,7 @@ struct ViewServer::State {
   void answer_file(const httplib::Request& request, httplib::Response& response);
   std::string make_page() const;
   bool names_this_host(const httplib::Request& request) const;
+  bool knows_token(const httplib::Request& request) const;
   /// The number in the first group of a route; nothing when there is no such result.
   std::optional<std::size_t> result_of(const httplib::Request& request) const;
 
@@ -99,8 +136,10 @@ struct ViewServer::State {
   PageData data;
   Readers readers;
   std::optional<ExperimentPage> experiment;
-  httplib::Server server;
+  LimitedServer server;
+  std::string address;
   int port = 0;
+  std::string token = random_token();
   std::string page;
 };
 
@@ -116,12 +155,14 @@ std::string ViewServer::State::make_page() const {
 
 bool ViewServer::State::names_this_host(const httplib::Request& request) const {
   const std::string host = request.get_header_value("Host");
-  for (const char* name : {"127.0.0.1", "localhost"}) {
-    std::string own(name);
-    own.append(":").append(std::to_string(port));
-    if (host == own) return true;
-  }
-  return false;
+  const std::string end = ":" + std::to_string(port);
+  return host == address + end || (address == kLoopback && host == "localhost" + end);
+}
+
+bool ViewServer::State::knows_token(const httplib::Request& request) const {
+  const std::string_view path = request.path;
+  const std::size_t length = token.size() + 2;
+  return path.size() >= length && equal_in_constant_time(path.substr(0, length), "/" + token + "/");
 }
 
 std::optional<std::size_t> ViewServer::State::result_of(const httplib::Request& request) const {
@@ -189,41 +230,49 @@ void ViewServer::State::answer_file(const httplib::Request& request, httplib::Re
 void ViewServer::State::add_routes() {
   server.set_default_headers({{"Content-Security-Policy", kPolicy},
                               {"X-Content-Type-Options", "nosniff"},
+                              {"X-Frame-Options", "DENY"},
+                              {"Referrer-Policy", "no-referrer"},
                               {"Cross-Origin-Resource-Policy", "same-origin"},
                               {"Cache-Control", "no-cache"}});
   server.set_pre_routing_handler(
       [this](const httplib::Request& request, httplib::Response& response) {
-        if (names_this_host(request)) return httplib::Server::HandlerResponse::Unhandled;
-        fail(response, 403, "only for this computer");
+        if (names_this_host(request) && knows_token(request))
+          return httplib::Server::HandlerResponse::Unhandled;
+        fail(response, 403, "only by the link that pencilscan view prints");
         return httplib::Server::HandlerResponse::Handled;
       });
-  server.Get("/", [this](const httplib::Request&, httplib::Response& response) {
+  const std::string root_path = "/" + token + "/";
+  server.Get(root_path, [this](const httplib::Request&, httplib::Response& response) {
     response.set_content(page, "text/html; charset=utf-8");
   });
-  server.Get(R"(/part/(\d+)/([a-z]+(?:/\d+)?))",
+  server.Get(root_path + R"(part/(\d+)/([a-z]+(?:/\d+)?))",
              [this](const auto& request, auto& response) { answer_part(request, response); });
-  server.Get(R"(/part/experiment/(\d+))",
+  server.Get(root_path + R"(part/experiment/(\d+))",
              [this](const auto& request, auto& response) { answer_picture(request, response); });
-  server.Get(R"(/list/(\d+))",
+  server.Get(root_path + R"(list/(\d+))",
              [this](const auto& request, auto& response) { answer_list(request, response); });
-  server.Get(R"(/files/(.+))",
+  server.Get(root_path + R"(files/(.+))",
              [this](const auto& request, auto& response) { answer_file(request, response); });
 }
 
 ViewServer::ViewServer(const fs::path& root, const ViewOptions& options)
     : state_(std::make_unique<State>(root, options.page)) {
   State& state = *state_;
+  check_address(options.address);
+  state.address = options.address;
   state.server.set_socket_options(exclusive_port);
-  state.server.set_keep_alive_timeout(1);  // s; stop() waits for it
-  state.server.new_task_queue = [] { return new httplib::ThreadPool(4); };  // NOLINT: takes it
-  constexpr const char* kLoopback = "127.0.0.1";
+  state.server.set_payload_max_length(0);
+  state.server.new_task_queue = [] {
+    return new httplib::ThreadPool(kRequestThreads);  // NOLINT: the server takes it
+  };
   if (options.port == 0) {
-    state.port = state.server.bind_to_any_port(kLoopback);
+    state.port = state.server.bind_to_any_port(state.address);
   } else {
-    state.port = state.server.bind_to_port(kLoopback, options.port) ? options.port : -1;
+    state.port = state.server.bind_to_port(state.address, options.port) ? options.port : -1;
   }
   if (state.port <= 0)
-    throw StageError("port " + std::to_string(options.port) + " on 127.0.0.1 is not free");
+    throw StageError("port " + std::to_string(options.port) + " on " + state.address +
+                     " is not free, or that is no address of this computer");
   state.page = state.make_page();
   state.add_routes();
 }
@@ -231,6 +280,13 @@ ViewServer::ViewServer(const fs::path& root, const ViewOptions& options)
 ViewServer::~ViewServer() = default;
 
 int ViewServer::port() const { return state_->port; }
+std::string ViewServer::link() const {
+  return "http://" + state_->address + ":" + std::to_string(state_->port) + "/" + state_->token +
+         "/";
+}
+std::string ViewServer::answer(const std::string& request) {
+  return state_->server.answer(request);
+}
 std::size_t ViewServer::results() const { return state_->data.size(); }
 void ViewServer::run() { state_->server.listen_after_bind(); }
 void ViewServer::stop() { state_->server.stop(); }

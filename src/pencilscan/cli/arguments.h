@@ -1,0 +1,103 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <charconv>
+#include <cmath>
+#include <filesystem>
+#include <limits>
+#include <map>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+#include "pencilscan/cli/spelling.h"
+
+// What the values of options must be, in words: help shows it, and so does the one line that
+// refuses a value. (The library's own rules speak of types and enumerations.)
+
+namespace pencilscan::cli {
+
+/// "= 7: must be a whole number".
+[[nodiscard]] inline std::string refusal(const std::string& value, const std::string& rule) {
+  return "= " + value + ": must be " + rule;
+}
+
+template <class Number>
+[[nodiscard]] std::optional<Number> number_of(const std::string& text) {
+  Number value{};
+  const char* end = text.data() + text.size();
+  const auto [read, error] = std::from_chars(text.data(), end, value);
+  if (error != std::errc() || read != end) return std::nullopt;
+  if constexpr (std::is_floating_point_v<Number>) {
+    if (!std::isfinite(value)) return std::nullopt;
+  }
+  return value;
+}
+
+/// "12" or "0.5", without the zeros behind; a power of ten only where digits would be many.
+template <class Number>
+[[nodiscard]] std::string number_text(Number value) {
+  char text[40];
+  if constexpr (std::is_floating_point_v<Number>) {
+    if (value == 0 || (std::abs(value) >= 1e-4 && std::abs(value) <= 1e9))
+      return {text, std::to_chars(text, text + sizeof text, value, std::chars_format::fixed).ptr};
+  }
+  return {text, std::to_chars(text, text + sizeof text, value).ptr};
+}
+
+/// `in_words` is what help shows, and with what kind of number it is the rule of refusals.
+template <class Number, class Holds>
+[[nodiscard]] CLI::Validator number_that(Holds holds, const std::string& in_words) {
+  const std::string kind = std::is_integral_v<Number> ? "a whole number" : "a number";
+  const std::string rule = in_words.empty() ? kind : kind + " " + in_words;
+  return {[=](std::string& text) {
+            const auto value = number_of<Number>(text);
+            return value && holds(*value) ? std::string() : refusal(text, rule);
+          },
+          in_words};
+}
+
+template <class Number>
+[[nodiscard]] CLI::Validator any_number() {
+  return number_that<Number>([](Number) { return true; }, "");
+}
+template <class Number>
+[[nodiscard]] CLI::Validator between(Number low, Number high) {
+  return number_that<Number>([=](Number value) { return value >= low && value <= high; },
+                             "from " + number_text(low) + " to " + number_text(high));
+}
+[[nodiscard]] inline CLI::Validator above_zero() {
+  return number_that<double>([](double value) { return value > 0; }, "above 0");
+}
+[[nodiscard]] inline CLI::Validator zero_or_more() {
+  return number_that<double>([](double value) { return value >= 0; }, "0 or above");
+}
+
+/// One of these words.
+[[nodiscard]] inline CLI::Validator one_of(const std::vector<std::string>& words) {
+  return {[=](std::string& text) {
+            for (const std::string& word : words)
+              if (text == word) return std::string();
+            return refusal(text, either(words)) + did_you_mean(text, words);
+          },
+          either(words)};
+}
+/// The same for words that stand for values of an enumeration.
+template <class Enum>
+[[nodiscard]] CLI::Validator choice(const std::map<std::string, Enum>& values) {
+  std::vector<std::string> words;
+  for (const auto& [word, value] : values) words.push_back(word);
+  return {[=](std::string& text) {
+            const auto found = values.find(text);
+            if (found == values.end())
+              return refusal(text, either(words)) + did_you_mean(text, words);
+            text = std::to_string(static_cast<int>(found->second));
+            return std::string();
+          },
+          either(words)};
+}
+
+/// InputError that names the file where `option` would replace one.
+void refuse_existing(const std::string& option, const std::filesystem::path& file, bool overwrite);
+
+}  // namespace pencilscan::cli

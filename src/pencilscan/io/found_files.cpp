@@ -1,0 +1,35 @@
+#include "pencilscan/io/found_files.h"
+
+#include <algorithm>
+#include <vector>
+
+namespace pencilscan {
+namespace {
+
+std::string some_of(std::vector<std::string>& names) {
+  constexpr std::size_t kShown = 4;
+  std::sort(names.begin(), names.end());
+  std::string text;
+  for (std::size_t i = 0; i < std::min(names.size(), kShown); ++i)
+    text += (i == 0 ? "" : ", ") + names[i];
+  if (names.size() > kShown) text += " and " + std::to_string(names.size() - kShown) + " more";
+  return text;
+}
+
+}  // namespace
+
+std::string holdings(const std::filesystem::path& folder) {
+  std::vector<std::string> files;
+  std::vector<std::string> folders;
+  std::error_code error;
+  for (std::filesystem::directory_iterator it(folder, error), end; !error && it != end;
+       it.increment(error)) {
+    const std::string name = it->path().filename().string();
+    std::error_code ignored;
+    if (!name.starts_with('.')) (it->is_directory(ignored) ? folders : files).push_back(name);
+  }
+  if (!files.empty()) return "it holds " + some_of(files);
+  return folders.empty() ? "it is empty" : "it holds only folders: " + some_of(folders);
+}
+
+}  // namespace pencilscan

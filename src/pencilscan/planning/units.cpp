@@ -1,0 +1,151 @@
+#include "pencilscan/planning/units.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "pencilscan/core/median.h"
+
+namespace pencilscan {
+namespace {
+
+/// What turns lengths of a unit into millimetres, and back.
+struct UnitFactor {
+  double factor;
+  const char* words;
+};
+constexpr std::array kUnits = std::to_array<UnitFactor>({
+    {1000, "metres instead of millimetres"},
+    {304.8, "feet instead of millimetres"},
+    {39.37, "metres instead of inches"},
+    {25.4, "inches instead of millimetres"},
+    {10, "centimetres instead of millimetres"},
+    {0.001, "millimetres instead of metres"},
+    {1 / 304.8, "millimetres instead of feet"},
+    {1 / 39.37, "inches instead of metres"},
+    {1 / 25.4, "millimetres instead of inches"},
+    {0.1, "millimetres instead of centimetres"},
+});
+
+// Shares of the volume's radius. An object that reaches a tenth of it is crossed by a tenth of the
+// lines, which is poor but may be meant; the volume "holds the object", so twice of it cannot be.
+constexpr double kSmallestShare = 0.1;
+constexpr double kLargestShare = 2;
+/// What a unit has to make of the object to explain its size: at least a quarter, and no more than
+/// touches the volume's corners.
+constexpr double kExplainedFrom = 0.25;
+constexpr double kExplainedTo = 1.5;
+/// The share that is looked for among several units: what --fit would give.
+constexpr double kUsualShare = 0.95;
+
+// Radius of the volume over the median distance of the devices to its centre. From inside of the
+// volume nothing is seen whole; of a volume a hundredth of the distance in size, a camera of 60
+// degrees has 18 pixels in 1000.
+constexpr double kSmallestVolume = 0.01;
+constexpr double kLargestVolume = 1;
+
+/// "0.24" or "1700": three digits.
+std::string rounded(double value) {
+  std::array<char, 32> text{};
+  const auto end =
+      std::to_chars(text.data(), text.data() + text.size(), value, std::chars_format::general, 3)
+          .ptr;
+  std::string digits(text.data(), end);
+  if (digits.find('e') == std::string::npos || std::abs(value) < 1e-4 || std::abs(value) > 1e9)
+    return digits;
+  return std::to_string(std::llround(value));
+}
+
+/// As an argument of --scale: as exact as the unit.
+std::string factor_text(double factor) {
+  std::array<char, 32> text{};
+  return {text.data(), std::to_chars(text.data(), text.data() + text.size(), factor,
+                                     std::chars_format::general, 6)
+                           .ptr};
+}
+
+std::string unit_name(const Rig& rig) { return rig.unit_known ? " mm" : " units"; }
+
+/// Largest distance of a vertex from the middle of the bounding box.
+double reach_of(const TriangleMesh& object) {
+  const BoundingBox box = bounding_box(object);
+  const Vec3 middle = 0.5 * (box.low + box.high);
+  double reach = 0;
+  for (const Vec3& v : object.vertices) reach = std::max(reach, (v - middle).norm());
+  return reach;
+}
+
+/// The unit that explains a share of the volume; null: none does.
+const UnitFactor* unit_behind(double share) {
+  const UnitFactor* best = nullptr;
+  double least = std::numeric_limits<double>::infinity();
+  for (const UnitFactor& unit : kUnits) {
+    const double explained = share * unit.factor;
+    if (explained < kExplainedFrom || explained > kExplainedTo) continue;
+    const double off = std::abs(std::log(explained / kUsualShare));
+    if (off < least) best = &unit;
+    least = std::min(least, off);
+  }
+  return best;
+}
+
+bool sees(const Device& device, const Vec3& point) {
+  const auto pixel = device.project(point);
+  return pixel && pixel->x() >= 0 && pixel->y() >= 0 && pixel->x() < device.width &&
+         pixel->y() < device.height;
+}
+
+/// A volume that devices may stand around: half of the cameras see its middle, from a distance in
+/// proportion.
+bool is_plausible(const Rig& rig, const Sphere& volume) {
+  std::size_t seeing = 0;
+  std::vector<double> distances;
+  for (const Camera& camera : rig.cameras) {
+    seeing += sees(camera, volume.center) ? 1 : 0;
+    distances.push_back((camera.center() - volume.center).norm());
+  }
+  const double share = volume.radius / upper_median(std::move(distances));
+  return 2 * seeing >= rig.cameras.size() && share >= kSmallestVolume && share <= kLargestVolume;
+}
+
+}  // namespace
+
+std::optional<std::string> object_unit_warning(const TriangleMesh& object, const Rig& rig) {
+  const double reach = reach_of(object);
+  const Sphere volume = working_volume(rig);
+  if (!(reach > 0) || !(volume.radius > 0)) return std::nullopt;
+  const double share = reach / volume.radius;
+  if (share >= kSmallestShare && share <= kLargestShare) return std::nullopt;
+  const UnitFactor* unit = unit_behind(share);
+  std::string text = "the object is " + rounded(2 * reach) + unit_name(rig) +
+                     " large and the rig's volume " + rounded(2 * volume.radius) + unit_name(rig);
+  if (unit != nullptr) {
+    text += ": the mesh is probably in " + std::string(unit->words) + ". --scale " +
+            factor_text(unit->factor) + " makes it right, --fit makes it fit";
+  } else {
+    text += ": --fit makes it fit, --scale multiplies it";
+  }
+  return text;
+}
+
+std::optional<std::string> volume_unit_warning(const Rig& rig) {
+  if (!rig.volume || rig.cameras.empty() || is_plausible(rig, *rig.volume)) return std::nullopt;
+  std::vector<double> distances;
+  for (const Camera& camera : rig.cameras)
+    distances.push_back((camera.center() - rig.volume->center).norm());
+  std::string text = "the rig's volume cannot be what its cameras look at: its radius is " +
+                     rounded(rig.volume->radius) + ", their distance to its centre " +
+                     rounded(upper_median(std::move(distances))) + unit_name(rig);
+  for (const UnitFactor& unit : kUnits) {
+    const Sphere other{unit.factor * rig.volume->center, unit.factor * rig.volume->radius};
+    if (!is_plausible(rig, other)) continue;
+    return text + "; \"volume\" is probably in " + unit.words + ": multiply it by " +
+           factor_text(unit.factor) + ", or t of all devices by " + factor_text(1 / unit.factor);
+  }
+  return text + "; check \"volume\" in rig.json, or leave it out";
+}
+
+}  // namespace pencilscan

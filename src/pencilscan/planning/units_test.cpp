@@ -1,0 +1,91 @@
+#include "pencilscan/planning/units.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "pencilscan/planning/ring.h"
+
+namespace pencilscan {
+namespace {
+
+using ::testing::HasSubstr;
+
+/// A cube of this side around `center`.
+TriangleMesh cube(double side, const Vec3& center) {
+  TriangleMesh mesh;
+  for (int i = 0; i < 8; ++i)
+    mesh.vertices.push_back(
+        center +
+        0.5 * side * Vec3((i & 1) != 0 ? 1 : -1, (i & 2) != 0 ? 1 : -1, (i & 4) != 0 ? 1 : -1));
+  return mesh;
+}
+
+const Rig& ring() {
+  static const Rig rig = make_ring({});
+  return rig;
+}
+
+TEST(ObjectUnit, ObjectsThatFitAreLeftInPeace) {
+  const Sphere volume = working_volume(ring());
+  for (const double share : {0.12, 0.3, 0.9, 1.0, 1.5}) {
+    const double side = share * volume.radius * 2 / std::sqrt(3.0);
+    EXPECT_FALSE(object_unit_warning(cube(side, volume.center), ring())) << share;
+  }
+}
+
+TEST(ObjectUnit, AForeignUnitIsNamedWithItsFactor) {
+  const Sphere volume = working_volume(ring());
+  const double side = volume.radius;
+  struct Case {
+    double factor;
+    const char* unit;
+    const char* remedy;
+  };
+  for (const Case& c : {Case{1e-3, "metres instead of millimetres", "--scale 1000 "},
+                        Case{1 / 25.4, "inches instead of millimetres", "--scale 25.4 "},
+                        Case{1 / 304.8, "feet instead of millimetres", "--scale 304.8 "},
+                        Case{1000, "millimetres instead of metres", "--scale 0.001 "}}) {
+    const auto warning = object_unit_warning(cube(c.factor * side, volume.center), ring());
+    ASSERT_TRUE(warning) << c.unit;
+    EXPECT_THAT(*warning, HasSubstr(c.unit));
+    EXPECT_THAT(*warning, HasSubstr(c.remedy));
+    EXPECT_THAT(*warning, HasSubstr("--fit"));
+  }
+}
+
+TEST(ObjectUnit, WhatNoUnitExplainsIsStillToldToFit) {
+  const auto warning = object_unit_warning(cube(1e7, Vec3::Zero()), ring());
+  ASSERT_TRUE(warning);
+  EXPECT_THAT(*warning, ::testing::Not(HasSubstr("probably")));
+  EXPECT_THAT(*warning, HasSubstr("--fit"));
+}
+
+TEST(VolumeUnit, RingsAndTheirScaledCopiesArePlausible) {
+  EXPECT_FALSE(volume_unit_warning(ring()));
+  for (const double factor : {1e-3, 1 / 25.4, 30.0})
+    EXPECT_FALSE(volume_unit_warning(scaled(ring(), factor))) << factor;
+}
+
+TEST(VolumeUnit, AVolumeInAnotherUnitThanTheDevicesIsNamed) {
+  for (const double factor : {1000.0, 0.001}) {
+    Rig rig = scaled(ring(), factor);
+    rig.volume = ring().volume;
+    const auto warning = volume_unit_warning(rig);
+    ASSERT_TRUE(warning) << factor;
+    EXPECT_THAT(*warning,
+                HasSubstr("multiply it by " + std::string(factor > 1 ? "1000" : "0.001")));
+  }
+}
+
+TEST(VolumeUnit, AVolumeBehindTheCamerasIsNamed) {
+  Rig rig = ring();
+  rig.volume = Sphere{{0, 0, 5000}, 100};
+  const auto warning = volume_unit_warning(rig);
+  ASSERT_TRUE(warning);
+  EXPECT_THAT(*warning, HasSubstr("leave it out"));
+}
+
+}  // namespace
+}  // namespace pencilscan
