@@ -175,7 +175,9 @@ TEST_F(Newcomer, IsToldOfObjectsInAnotherUnit) {
   const Outcome scaled = run(simulate + " --scale 1000 --out right");
   EXPECT_EQ(scaled.code, 0);
   EXPECT_THAT(scaled.error, Not(HasSubstr("warning")));
-  EXPECT_THAT(run(simulate + " --fit --out fitted").error, Not(HasSubstr("warning")));
+  const Outcome fitted = run(simulate + " --fit --up y --texture stripes --out fitted");
+  EXPECT_EQ(fitted.code, 0) << fitted.error;
+  EXPECT_THAT(fitted.error, Not(HasSubstr("warning")));
 }
 
 TEST_F(Newcomer, ReadsHelpInPlainWords) {

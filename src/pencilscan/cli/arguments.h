@@ -82,7 +82,7 @@ template <class Number>
           },
           either(words)};
 }
-/// The same for words that stand for values of an enumeration.
+/// The same for words that stand for values of an enumeration: for transform(), not check().
 template <class Enum>
 [[nodiscard]] CLI::Validator choice(const std::map<std::string, Enum>& values) {
   std::vector<std::string> words;

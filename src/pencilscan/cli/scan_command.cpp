@@ -47,7 +47,7 @@ void run_scan(const ScanCommand& command) {
   std::vector<SurfaceSample> samples;
   std::size_t missed = 0;
   for (std::size_t i = 0; i < pairs.size(); ++i) {
-    tell_steps(progress, "decoding", i, pairs.size());
+    tell_steps(progress, "decoding: pair", i, pairs.size());
     const DecodedView decoded = decode_gray_stack(read_gray_stack(pairs[i], rig));
     const GrayScan scan =
         gray_scan(rig, pairs[i].camera, pairs[i].projector, decoded, command.scan);
@@ -55,7 +55,7 @@ void run_scan(const ScanCommand& command) {
     samples.insert(samples.end(), scan.samples.begin(), scan.samples.end());
     missed += scan.missed;
   }
-  tell_steps(progress, "decoding", pairs.size(), pairs.size());
+  tell_steps(progress, "decoding: pair", pairs.size(), pairs.size());
   if (points.empty()) throw StageError("no pixel could be measured: see pencilscan calibrate");
   write_points(out / "points.ply", points);
   nlohmann::ordered_json figures{

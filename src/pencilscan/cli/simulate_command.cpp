@@ -224,7 +224,7 @@ void add_scene_options(CLI::App& command, SimulateOptions& options) {
       ->check(above_zero())
       ->capture_default_str();
   command.add_option("--up", options.up, "Axis of the mesh that points up")
-      ->check(choice(axes))
+      ->transform(choice(axes))
       ->default_str("z");
   command.add_option("--frame-count", options.frame_count, "Frames of a moving object")
       ->check(between(1, 999999))
@@ -240,7 +240,7 @@ void add_scene_options(CLI::App& command, SimulateOptions& options) {
       ->check(between(0.0, 1.0))
       ->capture_default_str();
   command.add_option("--texture", options.surface.texture.kind, "What varies the albedo")
-      ->check(choice(textures))
+      ->transform(choice(textures))
       ->default_str("none");
   command.add_option("--contrast", options.surface.texture.contrast, "Contrast of the texture")
       ->check(between(0.0, 1.0))

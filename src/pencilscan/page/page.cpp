@@ -189,7 +189,7 @@ std::vector<Collected> collect_all(const PageData& data, std::size_t max_bytes,
       if (result == sample) return;
       collected[result] = collect(data, result, is_whole[result] != 0 ? full : shape.detail);
     });
-    tell_steps(progress, "reading results", last, count);
+    tell_steps(progress, "reading: result", last, count);
   }
   return collected;
 }

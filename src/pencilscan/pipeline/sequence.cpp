@@ -103,7 +103,7 @@ void check_images(const Rig& rig, const FrameSource& frames, const Progress& pro
       const Frame frame = frames.read(rig, first + i);
       static_cast<void>(frame);
     });
-    tell_steps(progress, "checking frames", first + count, frames.size());
+    tell_steps(progress, "checking: frame", first + count, frames.size());
   }
 }
 
@@ -277,7 +277,7 @@ SequenceOutcome reconstruct_sequence(const fs::path& rig_path, const fs::path& f
       result.frames.push_back(frame_outcome(rig, frames, own[i], out, inputs.settings(), images[i],
                                             with_stages(options, progress, i, own.size())));
     }
-    tell_steps(progress, "frame " + frames.name(own[i]), i + 1, own.size());
+    tell_steps(progress, "frame " + frames.name(own[i]) + ",", i + 1, own.size());
   }
   return result;
 }
