@@ -48,7 +48,8 @@ void print_refinement(const RefinementOutcome& refinement, nlohmann::ordered_jso
 std::size_t points_of(const FrameOutcome& outcome, const std::string& out) {
   if (!outcome.resumed) return outcome.points;
   const auto report = read_json(std::filesystem::path(out) / outcome.name / "report.json");
-  return report.value("points", std::size_t{0});
+  const auto points = report.is_object() ? report.find("points") : report.end();
+  return points != report.end() && points->is_number_unsigned() ? points->get<std::size_t>() : 0;
 }
 
 void reconstruct(const ReconstructOptions& options) {

@@ -167,14 +167,23 @@ std::string without_tag(const std::string& message) {
   return text;
 }
 
+/// Levels of arrays and objects in each other. Our files have fewer than ten; what walks a value
+/// level by level must not run out of stack.
+constexpr int kDeepestLevel = 200;
+
 /// The last key of an object that a parser event saw twice; JSON leaves it open, a rig cannot mean
-/// it.
+/// it. And whether it is nested deeper than anything of ours.
 struct DuplicateKeyFinder {
   std::vector<std::vector<std::string>> open;
   std::string duplicate;
+  bool too_deep = false;
 
-  bool operator()(int /*depth*/, nlohmann::json::parse_event_t event, nlohmann::json& parsed) {
+  bool operator()(int depth, nlohmann::json::parse_event_t event, nlohmann::json& parsed) {
     using Event = nlohmann::json::parse_event_t;
+    if (depth > kDeepestLevel) {
+      too_deep = true;
+      return false;  // leaves this value out
+    }
     if (event == Event::object_start) open.emplace_back();
     if (event == Event::object_end) open.pop_back();
     if (event == Event::key) {
@@ -194,6 +203,11 @@ nlohmann::json parse_json(const std::string& text, const std::string& name) {
   DuplicateKeyFinder finder;
   try {
     nlohmann::json value = nlohmann::json::parse(text, std::ref(finder));
+    if (finder.too_deep) {
+      throw InputError(
+          name, "", "",
+          "must not be nested deeper than " + std::to_string(kDeepestLevel) + " levels");
+    }
     if (!finder.duplicate.empty())
       throw InputError(name, finder.duplicate, "", "this key must not stand twice");
     return value;

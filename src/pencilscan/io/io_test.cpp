@@ -18,6 +18,7 @@
 #include "pencilscan/io/mosaic.h"
 #include "pencilscan/io/ply.h"
 #include "pencilscan/io/temporary_folder.h"
+#include "pencilscan/io/zarr_array.h"
 
 namespace pencilscan {
 namespace {
@@ -200,6 +201,58 @@ TEST_F(Io, HoldingsNameFilesBeforeFolders) {
   for (int i = 0; i < 7; ++i) put("IMG_" + std::to_string(i), "x");
   put(".hidden", "x");
   EXPECT_EQ(holdings(folder_), "it holds IMG_0, IMG_1, IMG_2, IMG_3 and 3 more");
+}
+
+TEST_F(Io, JsonThatIsNestedTooDeepIsRefused) {
+  const auto nested = [](int levels) {
+    return std::string(static_cast<std::size_t>(levels), '[') +
+           std::string(static_cast<std::size_t>(levels), ']');
+  };
+  EXPECT_EQ(error_of([&] { return read_json(put("a.json", nested(150))); }), "");
+  for (const int levels : {300, 1'000'000})
+    EXPECT_THAT(error_of([&] { return read_json(put("a.json", nested(levels))); }),
+                ::testing::HasSubstr("must not be nested deeper than 200 levels"));
+}
+
+/// Metadata of a Zarr array that is good but for one value.
+std::string zarr_metadata(const std::string& key, const std::string& value) {
+  nlohmann::ordered_json object = {{"zarr_format", 2},      {"shape", {2, 3}}, {"chunks", {2, 3}},
+                                   {"dtype", "|u1"},        {"order", "C"},    {"filters", nullptr},
+                                   {"compressor", nullptr}, {"fill_value", 0}};
+  object[key] = nlohmann::ordered_json::parse(value);
+  return object.dump();
+}
+
+TEST_F(Io, ZarrTakesNoMemoryThatItsFilesDoNotJustify) {
+  put(".zarray", zarr_metadata("shape", "[2, 3]"));
+  put("0.0", "abcdef");
+  EXPECT_EQ(read_zarr_bytes(folder_, read_zarr_array(folder_)).size(), 6U);
+  // 16 GB by the metadata, 6 bytes in the file, raw or compressed.
+  put(".zarray", zarr_metadata("chunks", "[46340, 46340]"));
+  const std::int64_t first[] = {0, 0};
+  for (const ZarrCompression compression : {ZarrCompression::kNone, ZarrCompression::kZstd}) {
+    ZarrArray array = read_zarr_array(folder_);
+    array.type = ZarrType::kInt64;
+    array.compression = compression;
+    EXPECT_THAT(error_of([&] { return read_zarr_chunk(folder_, array, first).has_value(); }),
+                ::testing::HasSubstr("it is damaged or of another size"));
+  }
+  // A file for each element: looking for them would take minutes.
+  put(".zarray", R"({"zarr_format": 2, "shape": [40000, 40000], "chunks": [1, 1], "dtype": "|u1",
+                     "order": "C", "filters": null, "compressor": null, "fill_value": 0})");
+  EXPECT_THAT(error_of([&] { return read_zarr_bytes(folder_, read_zarr_array(folder_)).size(); }),
+              ::testing::HasSubstr("must be at most 1,000,000 in all"));
+}
+
+TEST_F(Io, ZarrFillsWithValuesOfItsTypeOnly) {
+  for (const char* value : {"256", "-1", "1e300", "\"NaN\""}) {
+    put(".zarray", zarr_metadata("fill_value", value));
+    EXPECT_THAT(error_of([&] { return read_zarr_array(folder_).fill_value; }),
+                ::testing::HasSubstr("must be a value of dtype"))
+        << value;
+  }
+  put(".zarray", zarr_metadata("fill_value", "null"));
+  EXPECT_EQ(read_zarr_array(folder_).fill_value, 0);
 }
 
 TEST_F(Io, MeshRoundTripKeepsVerticesAndSigma) {

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 #include <cstring>
 #include <limits>
 #include <nlohmann/json.hpp>
@@ -24,6 +25,8 @@ static_assert(std::endian::native == std::endian::little, "chunks are copied as 
 constexpr const char* kArrayFile = ".zarray";
 constexpr const char* kGroupFile = ".zgroup";
 constexpr const char* kAttributesFile = ".zattrs";
+/// Chunks of an array that is read whole: each is looked for.
+constexpr std::int64_t kMaxChunks = 1'000'000;
 /// The largest array or chunk that is read at once: beyond, a damaged shape is likelier than a
 /// picture.
 constexpr std::int64_t kMaxElements = std::int64_t{1} << 31;
@@ -91,6 +94,23 @@ double fill_of(const json& value) {
   if (value.is_number()) return value.get<double>();
   if (value.is_boolean()) return value.get<bool>() ? 1 : 0;
   return value == "NaN" ? std::numeric_limits<double>::quiet_NaN() : 0;
+}
+
+/// True for a number that becomes an element without leaving the type's range.
+bool holds(ZarrType type, double value) {
+  switch (type) {
+    case ZarrType::kUint8:
+      return value >= 0 && value <= 255;
+    case ZarrType::kUint16:
+      return value >= 0 && value <= 65535;
+    case ZarrType::kInt32:
+      return std::abs(value) <= 2147483647.0;
+    case ZarrType::kInt64:
+      return std::abs(value) <= 9e18;
+    case ZarrType::kFloat32:
+      return !(std::abs(value) > std::numeric_limits<float>::max());
+  }
+  return false;
 }
 
 /// Whatever Blosc's header says is what a chunk is read with: the name decides only how new ones
@@ -222,6 +242,8 @@ ZarrArray read_zarr_array(const fs::path& folder) {
   if (!object.value("filters", json()).is_null())
     fail(file, "filters", object["filters"], "must be null");
   array.fill_value = fill_of(object.value("fill_value", json()));
+  if (!holds(array.type, array.fill_value))
+    fail(file, "fill_value", object["fill_value"], "must be a value of dtype");
   const json separator = object.value("dimension_separator", json("."));
   if (separator != "." && separator != "/")
     fail(file, "dimension_separator", separator, "must be . or /");
@@ -255,22 +277,25 @@ std::optional<std::vector<std::uint8_t>> read_zarr_chunk(const fs::path& folder,
   std::error_code ignored;
   if (!fs::exists(file, ignored)) return std::nullopt;
   const std::string stored = read_file(file);
-  std::vector<std::uint8_t> bytes(array.chunk_bytes());
+  const std::size_t wanted = array.chunk_bytes();
   if (array.compression == ZarrCompression::kNone) {
-    if (stored.size() != bytes.size()) {
-      throw InputError(file.string(), "bytes", std::to_string(stored.size()),
-                       "a chunk must have " + std::to_string(bytes.size()) +
-                           ": it is damaged or of another size");
+    if (stored.size() != wanted) {
+      throw InputError(
+          file.string(), "bytes", std::to_string(stored.size()),
+          "a chunk must have " + std::to_string(wanted) + ": it is damaged or of another size");
     }
-    std::copy(stored.begin(), stored.end(), bytes.begin());
-    return bytes;
+    return std::vector<std::uint8_t>(stored.begin(), stored.end());
   }
+  // No memory before the chunk itself says that it holds so much.
   std::size_t size = 0;
-  if (blosc_cbuffer_validate(stored.data(), stored.size(), &size) != 0 || size != bytes.size() ||
-      blosc_decompress_ctx(stored.data(), bytes.data(), bytes.size(), 1) !=
-          static_cast<int>(bytes.size())) {
+  std::vector<std::uint8_t> bytes;
+  const bool is_whole =
+      blosc_cbuffer_validate(stored.data(), stored.size(), &size) == 0 && size == wanted;
+  if (is_whole) bytes.resize(wanted);
+  if (!is_whole ||
+      blosc_decompress_ctx(stored.data(), bytes.data(), wanted, 1) != static_cast<int>(wanted)) {
     throw InputError(file.string(), "", "",
-                     "must be a whole Blosc chunk of " + std::to_string(bytes.size()) +
+                     "must be a whole Blosc chunk of " + std::to_string(wanted) +
                          " bytes: it is damaged or of another size");
   }
   return bytes;
@@ -292,15 +317,17 @@ std::vector<std::uint8_t> read_zarr_bytes(const fs::path& folder, const ZarrArra
   const std::vector<std::int64_t> step = steps(array.shape);
   const std::vector<std::int64_t> chunk_step = steps(array.chunks);
   const std::int64_t elements = array.shape.front() * step.front();
+  std::vector<std::int64_t> grid(rank);
+  for (std::size_t k = 0; k < rank; ++k)
+    grid[k] = (array.shape[k] + array.chunks[k] - 1) / array.chunks[k];
+  if (steps(grid).front() * grid.front() > kMaxChunks)
+    fail(folder / kArrayFile, "chunks", array.chunks, "must be at most 1,000,000 in all");
   std::vector<std::uint8_t> bytes;
   bytes.reserve(static_cast<std::size_t>(elements) * size);
   const std::vector<std::uint8_t> fill = fill_bytes(array);
   for (std::int64_t i = 0; i < elements; ++i) bytes.insert(bytes.end(), fill.begin(), fill.end());
   if (elements == 0) return bytes;
 
-  std::vector<std::int64_t> grid(rank);
-  for (std::size_t k = 0; k < rank; ++k)
-    grid[k] = (array.shape[k] + array.chunks[k] - 1) / array.chunks[k];
   std::vector<std::int64_t> at(rank, 0);
   do {
     const auto chunk = read_zarr_chunk(folder, array, at);

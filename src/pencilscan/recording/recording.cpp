@@ -12,6 +12,10 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
+/// Of one recording: days at 30 frames a second. What is known of each takes memory, whether its
+/// pictures are there or not.
+constexpr std::int64_t kMostFrames = 10'000'000;
+
 std::vector<std::string> camera_names(const fs::path& folder, const json& attributes) {
   const std::string file = (folder / ".zattrs").string();
   const json list = attributes.value("cameras", json());
@@ -92,6 +96,15 @@ void read_exposures(const fs::path& folder, const json& attributes,
   }
 }
 
+/// An attribute that is true or false; nothing where it is not there.
+std::optional<bool> flag_of(const fs::path& folder, const json& attributes, const char* key) {
+  if (!attributes.contains(key)) return std::nullopt;
+  const json& value = attributes[key];
+  if (!value.is_boolean())
+    throw InputError((folder / ".zattrs").string(), key, value.dump(), "must be true or false");
+  return value.get<bool>();
+}
+
 }  // namespace
 
 bool Recording::is_one(const fs::path& folder) { return is_zarr_group(folder); }
@@ -113,6 +126,10 @@ Recording Recording::open(const fs::path& folder) {
                        "must have as many frames as the other cameras, " + std::to_string(rows));
     }
     rows = array.shape[0];
+    if (rows > kMostFrames) {
+      throw InputError((folder / name / ".zarray").string(), "shape", json(array.shape).dump(),
+                       "must have at most " + std::to_string(kMostFrames) + " frames");
+    }
     recording.pictures_.push_back(std::move(array));
   }
   const std::size_t cameras = recording.cameras_.size();
@@ -121,14 +138,8 @@ Recording Recording::open(const fs::path& folder) {
       read_table<std::int64_t>(folder, kTimestampArray, recording.rows_, cameras);
   recording.valid_ = read_table<std::uint8_t>(folder, kValidArray, recording.rows_, cameras);
   read_exposures(folder, recording.attributes_, recording.cameras_);
-  if (recording.attributes_.contains(kSharedClockAttribute)) {
-    const json& value = recording.attributes_[kSharedClockAttribute];
-    if (!value.is_boolean())
-      throw InputError((folder / ".zattrs").string(), kSharedClockAttribute, value.dump(),
-                       "must be true or false");
-    recording.shares_clock_ = value.get<bool>();
-  }
-  recording.closed_ = !recording.attributes_.value(kOpenAttribute, false);
+  recording.shares_clock_ = flag_of(folder, recording.attributes_, kSharedClockAttribute);
+  recording.closed_ = !flag_of(folder, recording.attributes_, kOpenAttribute).value_or(false);
   if (!recording.closed_) {
     // The arrays are longer than what was written to them.
     while (recording.rows_ > 0) {

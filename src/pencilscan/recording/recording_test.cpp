@@ -8,6 +8,7 @@
 #include <csignal>
 #include <cstdlib>
 #include <fstream>
+#include <nlohmann/json.hpp>
 #include <thread>
 
 #include "pencilscan/core/error.h"
@@ -64,6 +65,23 @@ std::optional<int> python(const std::string& program, const fs::path& folder) {
   std::ofstream(file) << program;
   return WEXITSTATUS(
       std::system((std::string(kPython) + " " + file.string() + " " + folder.string()).c_str()));
+}
+
+TEST_F(RecordingFolder, MetadataThatCannotBeMeantIsRefused) {
+  RecordingWriter writer(folder_, {{"cam0", 4, 3, 1, 8, 0}}, {});
+  writer.write(0, 0, cv::Mat::zeros(3, 4, CV_8U), 0);
+  writer.close();
+  const auto change = [&](const char* file, const char* key, const nlohmann::json& value) {
+    nlohmann::ordered_json object = read_json(folder_ / file);
+    object[key] = value;
+    write_json(folder_ / file, object);
+    return error_of([&] { static_cast<void>(Recording::open(folder_)); });
+  };
+  EXPECT_THAT(change(".zattrs", "open", "yes"), ::testing::HasSubstr("must be true or false"));
+  EXPECT_EQ(change(".zattrs", "open", false), "");
+  // The tables of so many frames would take a gigabyte that no file justifies.
+  EXPECT_THAT(change("cam0/.zarray", "shape", {100'000'000, 3, 4}),
+              ::testing::HasSubstr("must have at most 10000000 frames"));
 }
 
 TEST_F(RecordingFolder, GivesBackWhatWasWritten) {
