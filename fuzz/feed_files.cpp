@@ -12,8 +12,10 @@
 
 int main(int count, char** words) {
   namespace fs = std::filesystem;
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)  // their shadows count, too
   const rlimit memory{rlim_t{2} << 30, rlim_t{2} << 30};
   ::setrlimit(RLIMIT_DATA, &memory);
+#endif
   std::vector<fs::path> files;
   for (int i = 1; i < count; ++i) {
     if (fs::is_directory(words[i])) {

@@ -77,8 +77,8 @@ TEST_F(RecordingFolder, MetadataThatCannotBeMeantIsRefused) {
     write_json(folder_ / file, object);
     return error_of([&] { static_cast<void>(Recording::open(folder_)); });
   };
-  EXPECT_THAT(change(".zattrs", "open", "yes"), ::testing::HasSubstr("must be true or false"));
-  EXPECT_EQ(change(".zattrs", "open", false), "");
+  EXPECT_THAT(change(".zattrs", "is_open", "yes"), ::testing::HasSubstr("must be true or false"));
+  EXPECT_EQ(change(".zattrs", "is_open", false), "");
   // The tables of so many frames would take a gigabyte that no file justifies.
   EXPECT_THAT(change("cam0/.zarray", "shape", {100'000'000, 3, 4}),
               ::testing::HasSubstr("must have at most 10000000 frames"));
