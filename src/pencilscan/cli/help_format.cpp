@@ -49,7 +49,8 @@ std::string HelpFormat::make_option_desc(const CLI::Option* option) const {
   if (option->get_type_size() != 0) {
     const Value value = value_of(*option);
     if (!value.rule.empty()) add(value.rule);
-    if (const std::string value = default_of(*option); !value.empty()) add("default " + value);
+    if (const std::string fallback = default_of(*option); !fallback.empty())
+      add("default " + fallback);
     if (option->get_required()) add("required");
   }
   for (const CLI::Option* needed : option->get_needs()) add("with " + needed->get_name());
