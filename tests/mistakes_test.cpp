@@ -129,7 +129,7 @@ TEST_F(Newcomer, IsToldWhichPicturesAreThereAndWhichAreMissing) {
   const fs::path pictures = folder_ / "captures" / "proj0" / "cam0";
   fs::create_directories(pictures.parent_path());
   fs::rename(folder_ / "shown" / "proj0", pictures);
-  const std::string scan = "scan --captures captures --rig r.json --out surface";
+  const std::string scan = "scan --captures captures --rig r.json --out surface --overwrite";
   fs::rename(pictures / "005.png", folder_ / "kept.png");
   expect_bad(scan,
              "= 5: must be 18 (or 10 without inverses) for a panel of 16 x 16 px; 005.png is");
@@ -167,7 +167,7 @@ TEST_F(Newcomer, IsToldOfObjectsInAnotherUnit) {
                 .code,
             0);
   write("metres.obj",
-        "v -.06 -.06 -.05\nv .06 -.06 -.05\nv 0 .07 -.05\nv 0 0 .08\n"
+        "v -0.06 -0.06 -0.05\nv 0.06 -0.06 -0.05\nv 0 0.07 -0.05\nv 0 0 0.08\n"
         "f 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n");
   const std::string simulate = "simulate --rig r.json --mesh metres.obj --samples 1";
   EXPECT_THAT(run(simulate + " --out small").error,

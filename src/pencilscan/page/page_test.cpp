@@ -296,10 +296,12 @@ TEST_F(Folder, OfAScanNothingIsMissingButTheDevices) {
   EXPECT_THAT(last_.missing, ::testing::IsEmpty());
 }
 
-TEST_F(Folder, AnEmptyFolderGivesAPage) {
-  const auto index = index_of(report());
-  EXPECT_TRUE(index["results"].empty());
-  EXPECT_EQ(index["title"], root_.filename().string());
+TEST_F(Folder, AnEmptyFolderHasNoReport) {
+  std::filesystem::create_directories(root_ / "000000");
+  EXPECT_THROW(static_cast<void>(report()), InputError);
+  const PageData page(root_, {});  // what `view` shows says why it is empty
+  EXPECT_TRUE(page.is_empty());
+  EXPECT_EQ(page.index("view", {})["title"], root_.filename().string());
   EXPECT_EQ(folder_name(root_ / ""), root_.filename().string());
   EXPECT_THROW(static_cast<void>(find_results(root_ / "none")), InputError);
 }
