@@ -26,7 +26,7 @@ class OpencvReader {
     if (!has_signature) text = "%YAML:1.0\n---\n" + text;
     try {
       storage_.open(text, cv::FileStorage::READ | cv::FileStorage::MEMORY);
-    } catch (const cv::Exception&) {
+    } catch (const std::exception&) {  // OpenCV's own, and what its parser runs into
       storage_.release();
     }
     if (!storage_.isOpened() || !storage_.root().isMap())

@@ -203,6 +203,14 @@ TEST_F(Io, HoldingsNameFilesBeforeFolders) {
   EXPECT_EQ(holdings(folder_), "it holds IMG_0, IMG_1, IMG_2, IMG_3 and 3 more");
 }
 
+TEST_F(Io, PlyElementsWithoutPropertiesHaveNoItems) {
+  const fs::path file = put("a.ply",
+                            "ply\nformat binary_little_endian 1.0\n"
+                            "element vertex 1844674407370955161\nend_header\n");
+  EXPECT_THAT(error_of([&] { return read_mesh(file); }),
+              ::testing::HasSubstr("must have properties"));
+}
+
 TEST_F(Io, JsonThatIsNestedTooDeepIsRefused) {
   const auto nested = [](int levels) {
     return std::string(static_cast<std::size_t>(levels), '[') +

@@ -60,8 +60,7 @@ void append_polygon(const std::string& path, std::span<const double> corners, st
                     TriangleMesh& mesh) {
   for (const double corner : corners) {
     if (!(corner >= 0) || corner >= static_cast<double>(mesh.vertices.size())) {
-      throw InputError(path, "face[" + std::to_string(face) + "]",
-                       std::to_string(static_cast<long long>(corner)),
+      throw InputError(path, "face[" + std::to_string(face) + "]", std::to_string(corner),
                        "vertex indices must lie below the number of vertices");
     }
   }

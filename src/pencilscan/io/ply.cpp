@@ -258,6 +258,11 @@ PlyFile read_ply(const std::filesystem::path& path) {
   Header header = HeaderParser(path.string(), bytes).parse();
   Body body(path.string(), std::string_view(bytes).substr(header.end), header.encoding);
   for (std::size_t e = 0; e < header.file.elements.size(); ++e) {
+    const PlyElement& element = header.file.elements[e];
+    // Nothing in the file would justify the number.
+    if (element.columns.empty() && element.count > 0)
+      throw InputError(path.string(), "element " + element.name, std::to_string(element.count),
+                       "must have properties");
     read_element(body, header.types[e], header.file.elements[e]);
   }
   return std::move(header.file);
