@@ -3,7 +3,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "pencilscan/cli/command.h"
+#include "pencilscan/cli/reconstruct_options.h"
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/io/file.h"
@@ -12,24 +12,6 @@
 
 namespace pencilscan::cli {
 namespace {
-
-struct ReconstructOptions {
-  CommonOptions common;
-  std::string rig;
-  std::string frames;
-  std::string plain_frames;
-  std::string out;
-  std::string method = "joint";
-  std::string cost = "normalized";
-  bool no_pictures = false;
-  bool no_depth = false;
-  bool no_mesh = false;
-  bool depth_maps = false;
-  std::vector<std::string> mesh_formats;
-  bool refine_rig = false;
-  std::string shard;
-  bool overwrite = false;
-};
 
 void print_refinement(const RefinementOutcome& refinement, nlohmann::ordered_json& figures) {
   for (const std::string& move : refinement.moves) std::cerr << "pencilscan: " << move << "\n";
@@ -115,50 +97,53 @@ void reconstruct(const ReconstructOptions& options) {
 
 }  // namespace
 
-void add_reconstruct_command(CLI::App& app) {
-  CLI::App* command = app.add_subcommand(
-      "reconstruct", "The shape in every frame: labelled points, closed mesh, report, pictures.");
-  auto options = std::make_shared<ReconstructOptions>();
-  command->add_option("--rig", options->rig, "rig.json of the calibrated devices")->required();
+void add_reconstruct_options(CLI::App& command, ReconstructOptions& options) {
+  command.add_option("--rig", options.rig, "rig.json of the calibrated devices")->required();
   command
-      ->add_option("--frames", options->frames,
-                   "folder that holds the frame folders, or a recording")
+      .add_option("--frames", options.frames, "folder that holds the frame folders, or a recording")
       ->required();
-  command->add_option("--out", options->out, "output folder, one folder per frame")->required();
-  command->add_option(
-      "--plain-frames", options->plain_frames,
+  command.add_option("--out", options.out, "output folder, one folder per frame")->required();
+  command.add_option(
+      "--plain-frames", options.plain_frames,
       "folder of frame folders of the same names (or of one) with images of the same "
       "moments in plain light: the colour is theirs");
   command
-      ->add_option("--method", options->method,
-                   "how lines are told apart: joint, the paper's two, or the grid of one projector "
-                   "that it compares itself with")
+      .add_option("--method", options.method,
+                  "how lines are told apart: joint, the paper's two, or the grid of one projector "
+                  "that it compares itself with")
       ->check(one_of({"linear", "multiview", "joint", "single-projector"}))
       ->capture_default_str();
   command
-      ->add_option(
-          "--multiview-cost", options->cost,
+      .add_option(
+          "--multiview-cost", options.cost,
           "of the sweep: published (a sum over the reprojected points) or normalized (a mean "
           "in which points outside the other images count too)")
       ->check(one_of({"published", "normalized"}))
       ->capture_default_str();
-  command->add_flag("--no-depth", options->no_depth,
-                    "surface from the labelled curves alone, without depth between them");
-  command->add_flag("--no-mesh", options->no_mesh, "labelled points alone, without a surface");
-  command->add_flag("--depth-maps", options->depth_maps,
-                    "depth and its deviation per camera: float TIFF and 16-bit PNG");
+  command.add_flag("--no-depth", options.no_depth,
+                   "surface from the labelled curves alone, without depth between them");
+  command.add_flag("--no-mesh", options.no_mesh, "labelled points alone, without a surface");
+  command.add_flag("--depth-maps", options.depth_maps,
+                   "depth and its deviation per camera: float TIFF and 16-bit PNG");
   command
-      ->add_option("--mesh-formats", options->mesh_formats,
-                   "the closed mesh also as obj, stl or glb (several with commas)")
+      .add_option("--mesh-formats", options.mesh_formats,
+                  "the closed mesh also as obj, stl or glb (several with commas)")
       ->delimiter(',')
       ->check(one_of({"obj", "stl", "glb"}));
-  command->add_flag("--refine-rig", options->refine_rig,
-                    "correct the poses of the devices from the lines that cross in the frames");
-  command->add_flag("--no-pictures", options->no_pictures, "leave overlays and views out");
+  command.add_flag("--refine-rig", options.refine_rig,
+                   "correct the poses of the devices from the lines that cross in the frames");
+  command.add_flag("--no-pictures", options.no_pictures, "leave overlays and views out");
+  command.add_flag("--overwrite", options.overwrite, "replace output of other inputs or options");
+}
+
+void add_reconstruct_command(CLI::App& app) {
+  CLI::App* command = app.add_subcommand(
+      "reconstruct", "The shape in every frame: labelled points, closed mesh, report, pictures.");
+  auto options = std::make_shared<ReconstructOptions>();
+  add_reconstruct_options(*command, *options);
   command->add_option("--shard", options->shard,
                       "i/n: every n-th chunk of 50 frames, from the i-th (from 0); auto: as the "
                       "array of jobs of Slurm, PBS, Grid Engine and others says");
-  command->add_flag("--overwrite", options->overwrite, "replace output of other inputs or options");
   add_common_options(*command, options->common,
                      "pencilscan reconstruct --rig rig.json --frames frames --out result");
   command->callback([options] { reconstruct(*options); });

@@ -9,6 +9,7 @@
 
 #include "pencilscan/cli/command.h"
 #include "pencilscan/cli/rig_files.h"
+#include "pencilscan/cli/rig_fit_command.h"
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/io/file.h"
@@ -148,6 +149,7 @@ void add_ring(CLI::App& group) {
 struct CheckCommand {
   CommonOptions common;
   std::string rig_path;
+  RigFitCommand fit;
 };
 
 std::string family_name(const Rig& rig, const LineFamily& family) {
@@ -264,6 +266,8 @@ void print_coverage(const CoverageCheck& coverage) {
 
 void run_check(const CheckCommand& command) {
   const ThreadLimit threads(command.common.threads);
+  if (!command.fit.frames.empty())
+    return run_rig_fit(command.common, command.rig_path, command.fit);
   const Rig rig = read_rig(command.rig_path);
   const RigCheck check = check_rig(rig);
   const Json json = to_json(rig, check);
@@ -279,8 +283,11 @@ void run_check(const CheckCommand& command) {
 void add_check(CLI::App& group) {
   auto options = std::make_shared<CheckCommand>();
   CLI::App* command =
-      group.add_subcommand("check", "Compute what a rig can measure and warn about what it cannot");
+      group.add_subcommand("check",
+                           "Compute what a rig can measure and warn about what it cannot; "
+                           "with --frames: whether it still fits what its devices see");
   command->add_option("--rig", options->rig_path, "The rig (rig.json)")->required();
+  add_rig_fit_options(*command, options->fit);
   add_common_options(*command, options->common, "pencilscan rig check --rig rig.json");
   command->callback([options] { run_check(*options); });
 }

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "pencilscan/cli/command.h"
+#include "pencilscan/cli/sequence_jobs.h"
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/median.h"
 #include "pencilscan/core/parallel.h"
@@ -204,6 +205,8 @@ void add_sequence_command(CLI::App& app) {
   add_pack(*group);
   add_unpack(*group);
   add_info(*group);
+  add_sequence_jobs(*group);
+  add_sequence_export(*group);
 }
 
 }  // namespace pencilscan::cli

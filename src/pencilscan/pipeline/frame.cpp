@@ -278,6 +278,9 @@ PointResult measure_points(const Rig& stated, const Frame& frame, const PointOpt
       name_lines(rig, result.families, result.graphs, std::move(result.labeling), options);
   result.labeling = std::move(naming.labeling);
   result.crossings = naming.crossings;
+  if (result.crossings.crossings > 0)
+    result.device_crossings =
+        device_disagreements(rig, crossing_tracks(rig, result.graphs, result.labeling));
   if (!naming.warning.empty()) result.warnings.push_back(std::move(naming.warning));
   const std::optional<Rig>& corrected = naming.corrected;
   result.rig_is_off = corrected.has_value();

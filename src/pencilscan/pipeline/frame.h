@@ -69,9 +69,10 @@ struct PointResult {
   std::vector<GridGraph> graphs;            ///< per camera
   Labeling labeling;
   CrossingDisagreement crossings;  ///< joint only: the paper's two have none by construction
-  bool rig_is_off = false;         ///< lines were named with the devices as the frame corrects them
-  bool looked_again = false;       ///< after the dense surface
-  std::size_t contradicted = 0;    ///< labelled curve points that the dense surface contradicted
+  std::vector<CrossingDisagreement> device_crossings;  ///< the same: cameras, then projectors
+  bool rig_is_off = false;       ///< lines were named with the devices as the frame corrects them
+  bool looked_again = false;     ///< after the dense surface
+  std::size_t contradicted = 0;  ///< labelled curve points that the dense surface contradicted
   std::vector<MeasuredPoint> points;
   std::vector<StageTime> times;
   std::vector<std::string> warnings;

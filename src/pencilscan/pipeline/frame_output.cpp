@@ -3,12 +3,14 @@
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <opencv2/core.hpp>
 
 #include "pencilscan/core/median.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/report/overlay.h"
 #include "pencilscan/report/pictures.h"
 #include "pencilscan/rig/camera_light.h"
+#include "pencilscan/rig/device_list.h"
 
 namespace pencilscan {
 namespace {
@@ -23,14 +25,40 @@ ordered_json number(double value) {
   return std::round(value * scale) / scale;
 }
 
+/// Mean over all pixels and channels, of values in [0, 1].
+double level_of(const cv::Mat& image) {
+  const cv::Scalar mean = cv::mean(image);
+  double sum = 0;
+  for (int k = 0; k < image.channels(); ++k) sum += mean[k];
+  return sum / image.channels();
+}
+
+/// How far the crossings of each device miss each other.
+ordered_json device_reports(const Rig& rig, const std::vector<CrossingDisagreement>& devices) {
+  ordered_json reports = ordered_json::array();
+  for (std::size_t d = 0; d < devices.size(); ++d) {
+    reports.push_back({{"name", device_at(rig, d).name},
+                       {"crossings", devices[d].crossings},
+                       {"median_px", number(devices[d].median_px)},
+                       {"expected_px", number(devices[d].expected_px)}});
+  }
+  return reports;
+}
+
 ordered_json camera_report(const Rig& rig, const Frame& frame, const PointResult& result,
                            std::size_t c) {
   const GridGraph& graph = result.graphs[c];
   std::size_t without_crossing = 0;
   std::vector<float> sigmas;
+  std::vector<float> widths;
+  std::vector<float> heights;
   for (std::size_t k = 0; k < graph.curves.size(); ++k) {
     without_crossing += graph.component_of_curve[k] < 0;
-    for (const CurvePoint& p : graph.curves[k].points) sigmas.push_back(p.sigma_px);
+    for (const CurvePoint& p : graph.curves[k].points) {
+      sigmas.push_back(p.sigma_px);
+      widths.push_back(p.width_px);
+      heights.push_back(p.amplitude);
+    }
   }
   ordered_json report;
   report["name"] = rig.cameras[c].name;
@@ -42,7 +70,16 @@ ordered_json camera_report(const Rig& rig, const Frame& frame, const PointResult
   report["crossings"] = graph.crossings.size();
   report["components"] = graph.component_count;
   report["connections_cut"] = graph.cut_connections;
-  if (!sigmas.empty()) report["curve_sigma_median_px"] = number(upper_median(std::move(sigmas)));
+  if (!sigmas.empty()) {
+    report["curve_sigma_median_px"] = number(upper_median(std::move(sigmas)));
+    report["curve_width_median_px"] = number(upper_median(std::move(widths)));
+    report["curve_height_median"] = number(upper_median(std::move(heights)));
+  }
+  if (!frame.images[c].empty()) report["image_level"] = number(level_of(frame.images[c]));
+  if (frame.timing) {
+    report["time_offset_us"] = number(frame.timing->offset_us[c]);
+    report["late"] = static_cast<bool>(frame.timing->is_late[c]);
+  }
   if (c < result.labeling.undecided.size()) {
     const auto points = undecided_points(result.labeling.undecided[c], result.labeling.runs[c]);
     report["undecided_points"] = {{"no_crossing", points[0]},
@@ -169,6 +206,7 @@ nlohmann::ordered_json frame_report(const Rig& rig, const Frame& frame, const Po
     count = count.get<int>() + 1;
   }
   report["points_by_projector"] = per_projector;
+  if (frame.timing) report["time_spread_us"] = number(frame.timing->spread_us);
   report["cameras"] = ordered_json::array();
   for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
     report["cameras"].push_back(camera_report(rig, frame, points, c));
@@ -177,7 +215,8 @@ nlohmann::ordered_json frame_report(const Rig& rig, const Frame& frame, const Po
   if (points.crossings.crossings > 0) {
     report["crossing_disagreement"] = {{"crossings", points.crossings.crossings},
                                        {"median_px", number(points.crossings.median_px)},
-                                       {"expected_px", number(points.crossings.expected_px)}};
+                                       {"expected_px", number(points.crossings.expected_px)},
+                                       {"devices", device_reports(rig, points.device_crossings)}};
   }
   report["components"] = ordered_json::array();
   for (const ComponentReport& component : points.labeling.components) {

@@ -83,6 +83,16 @@ bool has_run_inputs(const fs::path& out) {
   return fs::exists(out / kInputsFile, ignored);
 }
 
+bool is_new_run(const fs::path& out) {
+  std::error_code error;
+  if (!fs::exists(out, error)) return true;
+  const std::string in_the_making = std::string(kInputsFile) + ".part";
+  for (fs::directory_iterator it(out, error), end; !error && it != end; it.increment(error)) {
+    if (!it->path().filename().string().starts_with(in_the_making)) return false;
+  }
+  return !error;
+}
+
 RunInputs read_run_inputs(const fs::path& out) {
   const fs::path file = out / kInputsFile;
   const json object = read_json(file);

@@ -21,6 +21,9 @@ struct RunInputs {
 };
 
 [[nodiscard]] bool has_run_inputs(const std::filesystem::path& out);
+/// True for a folder that is not there or holds nothing but an inputs.json that another program is
+/// writing, or was writing when it was killed.
+[[nodiscard]] bool is_new_run(const std::filesystem::path& out);
 /// InputError when the file is missing or none of this version.
 [[nodiscard]] RunInputs read_run_inputs(const std::filesystem::path& out);
 /// Writes it unless it is there with the same bytes.

@@ -66,7 +66,7 @@ std::vector<char> resumable(const fs::path& out, const RunInputs& inputs,
                             const std::vector<std::string>& images,
                             const SequenceOptions& options) {
   std::vector<char> done(own.size(), 0);
-  if (!fs::exists(out) || (fs::is_directory(out) && fs::is_empty(out))) return done;
+  if (is_new_run(out)) return done;
   const auto refuse = [&](const std::string& what) {
     if (!options.overwrite)
       throw InputError("--out", "", out.string(), what + " (or give --overwrite)");

@@ -127,6 +127,15 @@ TEST_F(Run, AFrameAppearsWholeAndTheFirstOneStays) {
   EXPECT_EQ(frame_status(out(), "000000", "t", "i").state, FrameState::kOther);
 }
 
+TEST_F(Run, IsNewWhileAnotherShardWritesTheFirstFile) {
+  EXPECT_TRUE(is_new_run(out()));
+  write_text(out() / "inputs.json.part123_0", "{");
+  EXPECT_TRUE(is_new_run(out()));
+  EXPECT_FALSE(is_new_run(out() / "inputs.json.part123_0"));
+  write_text(out() / "mine.txt", "mine");
+  EXPECT_FALSE(is_new_run(out()));
+}
+
 TEST_F(Run, AFailureSaysWhyAndMakesWayForAResult) {
   write_failure(out(), "000000", "s", "i", {"the disk is full", true});
   const FrameStatus status = frame_status(out(), "000000", "s", "i");

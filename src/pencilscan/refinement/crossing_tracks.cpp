@@ -139,6 +139,56 @@ void join(const Rig& rig, std::span<const Sighting> sightings, const TrackOption
   }
 }
 
+/// How far the planes of one crossing miss each other in one camera.
+struct Miss {
+  double px = 0;
+  double noise_px = 0;
+  int camera = 0;
+  std::array<int, 2> projectors{};
+};
+
+std::vector<Miss> misses_of(const Rig& rig, std::span<const CrossingTrack> tracks) {
+  std::vector<std::vector<Miss>> per_track(tracks.size());
+  parallel_for(tracks.size(), [&](std::size_t t) {
+    const auto& lines = tracks[t].lines;
+    for (const CrossingSighting& s : tracks[t].sightings) {
+      const auto miss_at = [&](const Vec2& pixel) -> std::optional<double> {
+        const auto a = sheet_depth(rig, s.camera, lines[0], pixel);
+        const auto b = sheet_depth(rig, s.camera, lines[1], pixel);
+        if (!a || !b) return std::nullopt;
+        const auto scale = [](const SheetDepth& d) { return d.per_px / (d.depth * d.depth); };
+        return (1 / a->depth - 1 / b->depth) / std::hypot(scale(*a), scale(*b));
+      };
+      const auto miss = miss_at(s.pixel);
+      const auto right = miss_at(s.pixel + Vec2(1, 0));
+      const auto below = miss_at(s.pixel + Vec2(0, 1));
+      if (!miss || !right || !below) continue;
+      const Eigen::RowVector2d slope(*right - *miss, *below - *miss);
+      per_track[t].push_back({std::abs(*miss),
+                              (slope * s.whitening.inverse()).norm(),
+                              s.camera,
+                              {lines[0].projector, lines[1].projector}});
+    }
+  });
+  std::vector<Miss> misses;
+  for (const auto& part : per_track) misses.insert(misses.end(), part.begin(), part.end());
+  return misses;
+}
+
+template <class Choice>
+CrossingDisagreement median_of(const std::vector<Miss>& misses, const Choice& counts) {
+  std::vector<double> px;
+  std::vector<double> noises;
+  for (const Miss& m : misses) {
+    if (!counts(m)) continue;
+    px.push_back(m.px);
+    noises.push_back(m.noise_px);
+  }
+  const std::size_t crossings = px.size();
+  return {crossings, upper_median(std::move(px)),
+          upper_median(std::move(noises)) / kDeviationPerMedian};
+}
+
 }  // namespace
 
 std::vector<CrossingTrack> crossing_tracks(const Rig& rig, std::span<const GridGraph> graphs,
@@ -165,38 +215,23 @@ std::vector<CrossingTrack> crossing_tracks(const Rig& rig, std::span<const GridG
 }
 
 CrossingDisagreement crossing_disagreement(const Rig& rig, std::span<const CrossingTrack> tracks) {
-  struct Miss {
-    double px = 0;
-    double noise_px = 0;
-  };
-  std::vector<std::vector<Miss>> per_track(tracks.size());
-  parallel_for(tracks.size(), [&](std::size_t t) {
-    for (const CrossingSighting& s : tracks[t].sightings) {
-      const auto miss_at = [&](const Vec2& pixel) -> std::optional<double> {
-        const auto a = sheet_depth(rig, s.camera, tracks[t].lines[0], pixel);
-        const auto b = sheet_depth(rig, s.camera, tracks[t].lines[1], pixel);
-        if (!a || !b) return std::nullopt;
-        const auto scale = [](const SheetDepth& d) { return d.per_px / (d.depth * d.depth); };
-        return (1 / a->depth - 1 / b->depth) / std::hypot(scale(*a), scale(*b));
-      };
-      const auto miss = miss_at(s.pixel);
-      const auto right = miss_at(s.pixel + Vec2(1, 0));
-      const auto below = miss_at(s.pixel + Vec2(0, 1));
-      if (!miss || !right || !below) continue;
-      const Eigen::RowVector2d slope(*right - *miss, *below - *miss);
-      per_track[t].push_back({std::abs(*miss), (slope * s.whitening.inverse()).norm()});
-    }
-  });
-  std::vector<double> misses;
-  std::vector<double> noises;
-  for (const auto& part : per_track) {
-    for (const Miss& m : part) {
-      misses.push_back(m.px);
-      noises.push_back(m.noise_px);
-    }
+  return median_of(misses_of(rig, tracks), [](const Miss&) { return true; });
+}
+
+std::vector<CrossingDisagreement> device_disagreements(const Rig& rig,
+                                                       std::span<const CrossingTrack> tracks) {
+  const std::vector<Miss> misses = misses_of(rig, tracks);
+  std::vector<CrossingDisagreement> result;
+  for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
+    result.push_back(
+        median_of(misses, [&](const Miss& m) { return m.camera == static_cast<int>(c); }));
   }
-  return {misses.size(), upper_median(std::move(misses)),
-          upper_median(std::move(noises)) / kDeviationPerMedian};
+  for (std::size_t p = 0; p < rig.projectors.size(); ++p) {
+    const auto is_of = [p](int projector) { return projector == static_cast<int>(p); };
+    result.push_back(median_of(
+        misses, [&](const Miss& m) { return is_of(m.projectors[0]) || is_of(m.projectors[1]); }));
+  }
+  return result;
 }
 
 bool are_enough(const CrossingDisagreement& crossings) {

@@ -62,6 +62,9 @@ struct CrossingDisagreement {
 };
 [[nodiscard]] CrossingDisagreement crossing_disagreement(const Rig& rig,
                                                          std::span<const CrossingTrack> tracks);
+/// The same of the crossings that each device takes part in: the cameras, then the projectors.
+[[nodiscard]] std::vector<CrossingDisagreement> device_disagreements(
+    const Rig& rig, std::span<const CrossingTrack> tracks);
 
 /// True when there are so many crossings that their median is no chance.
 [[nodiscard]] bool are_enough(const CrossingDisagreement& crossings);

@@ -1,0 +1,68 @@
+#include "pencilscan/cli/rig_fit_command.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <iostream>
+#include <nlohmann/json.hpp>
+#include <vector>
+
+#include "pencilscan/core/error.h"
+#include "pencilscan/core/parallel.h"
+#include "pencilscan/pipeline/frame_source.h"
+#include "pencilscan/pipeline/rig_fit.h"
+
+namespace pencilscan::cli {
+namespace {
+
+std::vector<FrameCurves> curves_of(const Rig& rig, const FrameSource& frames, std::size_t wanted) {
+  const Progress progress = stderr_progress();
+  const std::size_t count = std::min(frames.size(), wanted);
+  std::vector<FrameCurves> curves;
+  for (std::size_t i = 0; i < count; ++i) {
+    progress("lines of the frames", static_cast<double>(i) / static_cast<double>(count));
+    PointResult detected = detect_frame(rig, frames.read(rig, i * frames.size() / count));
+    curves.push_back({std::move(detected.families), std::move(detected.graphs)});
+  }
+  progress("crossings", 0);
+  return curves;
+}
+
+void print_devices(const RigFit& fit) {
+  std::printf("%-12s %9s %12s %12s %10s\n", "device", "crossings", "they miss px", "expected px",
+              "off by px");
+  for (const DeviceFit& device : fit.devices) {
+    std::printf("%-12s %9zu %12.3f %12.3f %10.3f%s\n", device.name.c_str(),
+                device.crossings.crossings, device.crossings.median_px,
+                device.crossings.expected_px, device.shift_px, device.has_moved ? "  moved" : "");
+  }
+  std::printf("\n");
+  std::fflush(stdout);
+}
+
+}  // namespace
+
+void add_rig_fit_options(CLI::App& command, RigFitCommand& options) {
+  command.add_option("--frames", options.frames,
+                     "Folder of frame folders, or a recording: does the rig still fit them?");
+  command.add_option("--frame-count", options.frame_count, "Frames to look at, evenly picked")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
+  command.add_option("--put-back", options.put_back,
+                     "Write the rig with the devices that moved put back (rig.json)");
+}
+
+void run_rig_fit(const CommonOptions& common, const std::string& rig_path,
+                 const RigFitCommand& options) {
+  const Rig rig = read_rig(rig_path);
+  const FrameSource frames = FrameSource::open(rig, options.frames);
+  const RigFit fit = check_rig_on_frames(rig, curves_of(rig, frames, options.frame_count));
+  print_devices(fit);
+  nlohmann::ordered_json report = rig_fit_json(fit);
+  write_figures(common, report);
+  report.erase("devices");
+  print_figures({}, report);
+  if (!options.put_back.empty()) write_rig(fit.put_back, options.put_back);
+  if (fit.verdict != RigVerdict::kFits) throw StageError(fit.text);
+}
+
+}  // namespace pencilscan::cli

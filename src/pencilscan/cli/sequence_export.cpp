@@ -1,0 +1,61 @@
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "pencilscan/cli/command.h"
+#include "pencilscan/cli/sequence_jobs.h"
+#include "pencilscan/core/error.h"
+#include "pencilscan/core/parallel.h"
+#include "pencilscan/jobs/film.h"
+
+namespace pencilscan::cli {
+namespace {
+
+struct FilmCommand {
+  CommonOptions common;
+  std::string result;
+  std::string zarr;
+  std::string usd;
+  double frames_per_second = 25;
+  bool measured_only = false;
+};
+
+void run_film_export(const FilmCommand& command) {
+  const ThreadLimit threads(command.common.threads);
+  if (command.zarr.empty() && command.usd.empty())
+    throw InputError("command line", "--zarr, --usd", "", "at least one must be given");
+  const Film film = find_film(command.result, command.measured_only);
+  nlohmann::ordered_json figures;
+  figures["frames"] = film.frames.size();
+  figures["frames_with_mesh"] = std::count(film.has_mesh.begin(), film.has_mesh.end(), 1);
+  if (!command.zarr.empty()) {
+    write_film_zarr(film, command.zarr, stderr_progress());
+    figures["zarr"] = command.zarr;
+  }
+  if (!command.usd.empty()) {
+    write_film_usd(film, command.frames_per_second, command.usd, stderr_progress());
+    figures["usd"] = command.usd;
+  }
+  print_figures(command.common, figures);
+}
+
+}  // namespace
+
+void add_sequence_export(CLI::App& group) {
+  auto options = std::make_shared<FilmCommand>();
+  CLI::App* command =
+      group.add_subcommand("export", "The shapes of all frames as one file for other programs");
+  command->add_option("--result", options->result, "The output folder of reconstruct")->required();
+  command->add_option("--zarr", options->zarr, "A Zarr group for Python (surface.zarr)");
+  command->add_option("--usd", options->usd,
+                      "USD text with time samples for Blender and Houdini (film.usda)");
+  command->add_option("--frames-per-second", options->frames_per_second, "Of the film")
+      ->check(CLI::Range(0.001, 1e6))
+      ->capture_default_str();
+  command->add_flag("--measured", options->measured_only,
+                    "What was measured, without what closes the surface");
+  add_common_options(*command, options->common,
+                     "pencilscan sequence export --result film --zarr surface.zarr");
+  command->callback([options] { run_film_export(*options); });
+}
+
+}  // namespace pencilscan::cli

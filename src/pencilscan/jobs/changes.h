@@ -1,0 +1,41 @@
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+namespace pencilscan {
+
+/// When a figure that was steady becomes another one.
+///
+/// A value is out when it is more than T spreads from the running median: of the kReference values
+/// before it, spread 1.4826 times their median distance from that median, and at least the noise
+/// from value to value of all of them. T is derived: of `values` independent Gaussian values, one
+/// is out by chance in 1 / chance sequences. From P(|z| > T) <= 2 exp(-T^2 / 2) follows T = sqrt(2
+/// ln(2 values / chance)): 5.6 for 36,000. So is one that differs by less than `smallest`, whatever
+/// the spread: no one would act on it. Three values out in a row on one side are a change, fewer
+/// are outliers. After a change the median starts anew.
+struct ChangeOptions {
+  double smallest = 0;  ///< difference that counts at all, in the unit of the values; > 0
+  std::size_t values =
+      1;  ///< of all figures that are watched together, so that one chance is for all
+  double chance = 0.01;  ///< of a false alarm in all of them
+};
+
+struct Change {
+  std::size_t at = 0;  ///< index of the first value that is different
+  double before = 0;   ///< median of the values before
+  double after = 0;    ///< of the first ones from there
+  double spreads = 0;  ///< difference over the spread before
+};
+
+struct ChangeReport {
+  std::vector<Change> changes;
+  std::vector<std::size_t> outliers;  ///< single values that differ
+};
+
+/// Values that are not finite are unknown and passed over.
+[[nodiscard]] ChangeReport find_changes(std::span<const double> values,
+                                        const ChangeOptions& options);
+
+}  // namespace pencilscan

@@ -1,0 +1,123 @@
+#include "pencilscan/jobs/frame_rows.h"
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "pencilscan/core/error.h"
+#include "pencilscan/core/median.h"
+#include "pencilscan/core/parallel.h"
+#include "pencilscan/io/file.h"
+
+namespace pencilscan {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+double figure(const json& object, const char* key) {
+  const auto found = object.find(key);
+  return found != object.end() && found->is_number() ? found->get<double>() : kUnknownFigure;
+}
+
+/// The entry of a list of objects that has this name; null where there is none.
+const json& named_entry(const json& object, const char* list, const std::string& name) {
+  static const json none = json::object();
+  const auto found = object.find(list);
+  if (found == object.end() || !found->is_array()) return none;
+  for (const json& entry : *found) {
+    if (entry.is_object() && entry.value("name", "") == name) return entry;
+  }
+  return none;
+}
+
+double share(double part, double whole) { return whole > 0 ? part / whole : kUnknownFigure; }
+
+CameraRow camera_row(const json& entry) {
+  CameraRow row;
+  row.labelled_share = share(figure(entry, "labelled_curve_points"), figure(entry, "curve_points"));
+  row.line_width_px = figure(entry, "curve_width_median_px");
+  row.line_height = figure(entry, "curve_height_median");
+  row.image_level = figure(entry, "image_level");
+  row.saturated_pixels = figure(entry, "saturated_pixels");
+  row.time_offset_us = figure(entry, "time_offset_us");
+  row.is_late = entry.value("late", json(false)) == true;
+  return row;
+}
+
+double median_of_known(const std::vector<CameraRow>& cameras, double CameraRow::*member) {
+  std::vector<double> known;
+  for (const CameraRow& camera : cameras) {
+    if (std::isfinite(camera.*member)) known.push_back(camera.*member);
+  }
+  return known.empty() ? kUnknownFigure : upper_median(std::move(known));
+}
+
+void read_report(const json& report, const SequenceDevices& devices, FrameRow& row) {
+  row.points = figure(report, "points");
+  row.time_spread_us = figure(report, "time_spread_us");
+  const json crossings = report.value("crossing_disagreement", json::object());
+  row.crossing_px = figure(crossings, "median_px");
+  row.crossing_expected_px = figure(crossings, "expected_px");
+  const json surface = report.value("surface", json::object());
+  if (figure(surface, "vertices") > 0) row.measured_share = figure(surface, "measured_share");
+  double curve_points = 0;
+  double labelled = 0;
+  double saturated = 0;
+  for (const std::string& name : devices.cameras) {
+    const json& entry = named_entry(report, "cameras", name);
+    row.cameras.push_back(camera_row(entry));
+    const auto add = [&](double& sum, const char* key) {
+      const double value = figure(entry, key);
+      if (std::isfinite(value)) sum += value;
+    };
+    add(curve_points, "curve_points");
+    add(labelled, "labelled_curve_points");
+    add(saturated, "saturated_pixels");
+    row.device_crossing_px.push_back(figure(named_entry(crossings, "devices", name), "median_px"));
+  }
+  const json by_projector = report.value("points_by_projector", json::object());
+  for (const std::string& name : devices.projectors) {
+    row.projector_points.push_back(figure(by_projector, name.c_str()));
+    row.device_crossing_px.push_back(figure(named_entry(crossings, "devices", name), "median_px"));
+  }
+  row.labelled_share = share(labelled, curve_points);
+  row.saturated_pixels = saturated;
+  row.line_width_px = median_of_known(row.cameras, &CameraRow::line_width_px);
+  row.line_height = median_of_known(row.cameras, &CameraRow::line_height);
+  for (const json& warning : report.value("warnings", json::array()))
+    row.warnings.push_back(warning.get<std::string>());
+}
+
+/// The report's figures, or what keeps it from being read.
+void read_row(const fs::path& file, const SequenceDevices& devices, FrameRow& row) {
+  FrameRow found = row;
+  try {
+    read_report(read_json(file), devices, found);
+    row = std::move(found);
+  } catch (const std::exception& error) {
+    row.warnings = {std::string("its report cannot be read: ") + error.what()};
+  }
+}
+
+}  // namespace
+
+std::vector<FrameRow> read_frame_rows(const fs::path& out, const RunInputs& inputs,
+                                      const SequenceDevices& devices) {
+  std::vector<FrameRow> rows(inputs.frames.size());
+  const std::string settings = inputs.settings();
+  parallel_for(rows.size(), [&](std::size_t i) {
+    FrameRow& row = rows[i];
+    row.name = inputs.frames[i];
+    row.status = frame_status(out, row.name, settings, std::nullopt);
+    if (row.status.state == FrameState::kDone)
+      read_row(out / row.name / "report.json", devices, row);
+    row.cameras.resize(devices.cameras.size());
+    row.device_crossing_px.resize(devices.cameras.size() + devices.projectors.size(),
+                                  kUnknownFigure);
+    row.projector_points.resize(devices.projectors.size(), kUnknownFigure);
+  });
+  return rows;
+}
+
+}  // namespace pencilscan

@@ -1,0 +1,55 @@
+#pragma once
+
+#include <filesystem>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "pencilscan/pipeline/run_folder.h"
+
+namespace pencilscan {
+
+inline constexpr double kUnknownFigure = std::numeric_limits<double>::quiet_NaN();
+
+/// What one frame's report says of a camera. Figures may be kUnknownFigure.
+struct CameraRow {
+  double labelled_share = kUnknownFigure;  ///< of its curve points
+  double line_width_px = kUnknownFigure;   ///< standard deviation of the lines' profiles
+  double line_height = kUnknownFigure;     ///< of the lines above their surroundings, linear light
+  double image_level = kUnknownFigure;     ///< mean of its picture, in [0, 1]
+  double saturated_pixels = kUnknownFigure;
+  double time_offset_us = kUnknownFigure;
+  bool is_late = false;
+};
+
+/// What one frame's folder says.
+struct FrameRow {
+  std::string name;
+  FrameStatus status;
+  double points = kUnknownFigure;
+  double labelled_share = kUnknownFigure;        ///< of the curve points of all cameras
+  double crossing_px = kUnknownFigure;           ///< median disagreement of crossings
+  double crossing_expected_px = kUnknownFigure;  ///< that noise explains
+  double measured_share = kUnknownFigure;        ///< of the closed mesh
+  double line_width_px = kUnknownFigure;         ///< median of the cameras
+  double line_height = kUnknownFigure;           ///< the same
+  double saturated_pixels = kUnknownFigure;      ///< sum of the cameras
+  double time_spread_us = kUnknownFigure;
+  std::vector<CameraRow> cameras;
+  std::vector<double> device_crossing_px;  ///< cameras, then projectors
+  std::vector<double> projector_points;
+  std::vector<std::string> warnings;
+};
+
+/// Names of what a sequence was taken with.
+struct SequenceDevices {
+  std::vector<std::string> cameras;
+  std::vector<std::string> projectors;
+};
+
+/// The rows of all frames that `out`/inputs.json names.
+[[nodiscard]] std::vector<FrameRow> read_frame_rows(const std::filesystem::path& out,
+                                                    const RunInputs& inputs,
+                                                    const SequenceDevices& devices);
+
+}  // namespace pencilscan

@@ -1,0 +1,244 @@
+#include "pencilscan/jobs/watch.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <functional>
+#include <map>
+#include <tuple>
+
+#include "pencilscan/jobs/changes.h"
+
+namespace pencilscan {
+namespace {
+
+using Reading = std::function<double(const FrameRow&)>;
+
+/// A figure of one device that is watched.
+struct Series {
+  std::string kind;
+  std::size_t device = 0;  ///< cameras, then projectors
+  bool is_ratio = false;   ///< its logarithm is watched: what counts is the factor
+  double smallest = 0;     ///< change that counts, of the logarithm where is_ratio
+  Reading value;
+};
+
+struct Found {
+  const Series* series = nullptr;
+  Change change;  ///< of the figure itself
+};
+
+/// The smallest changes that count, each with what it does to the result.
+const double kLabelled = 0.05;          // a twentieth of the points lost or won
+const double kWidth = std::log(1.15);   // deviations of points grow with width^1.5: by a fifth
+const double kHeight = std::log(1.25);  // they grow with noise over height: by a quarter
+const double kLevel = std::log(1.25);   // as much more light without lines
+const double kPoints = std::log(4.0);   // a projector that lost three quarters of its points
+/// Half of what the rule of disagreeing crossings (crossing_tracks.h) allows beyond noise.
+constexpr double kCrossingsPx = 0.05;
+
+double finite_log(double value) { return value > 0 ? std::log(value) : kUnknownFigure; }
+
+std::vector<Series> all_series(const SequenceDevices& devices) {
+  std::vector<Series> all;
+  for (std::size_t c = 0; c < devices.cameras.size(); ++c) {
+    const auto of_camera = [&](const char* kind, bool is_ratio, double smallest,
+                               double CameraRow::*member) {
+      all.push_back({kind, c, is_ratio, smallest,
+                     [c, member](const FrameRow& row) { return row.cameras[c].*member; }});
+    };
+    of_camera("labelled", false, kLabelled, &CameraRow::labelled_share);
+    of_camera("width", true, kWidth, &CameraRow::line_width_px);
+    of_camera("height", true, kHeight, &CameraRow::line_height);
+    of_camera("level", true, kLevel, &CameraRow::image_level);
+  }
+  for (std::size_t d = 0; d < devices.cameras.size() + devices.projectors.size(); ++d) {
+    all.push_back({"crossings", d, false, kCrossingsPx,
+                   [d](const FrameRow& row) { return row.device_crossing_px[d]; }});
+  }
+  for (std::size_t p = 0; p < devices.projectors.size(); ++p) {
+    // One is added, so that none is a number too.
+    all.push_back({"projector", devices.cameras.size() + p, true, kPoints,
+                   [p](const FrameRow& row) { return row.projector_points[p] + 1; }});
+  }
+  return all;
+}
+
+std::string name_of(const SequenceDevices& devices, std::size_t device) {
+  return device < devices.cameras.size()
+             ? "camera " + devices.cameras[device]
+             : "projector " + devices.projectors[device - devices.cameras.size()];
+}
+
+std::string bare_name(const SequenceDevices& devices, std::size_t device) {
+  const std::string name = name_of(devices, device);
+  return name.substr(name.find(' ') + 1);
+}
+
+std::string digits(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.3g", value);
+  return text;
+}
+
+std::string from_to(const Change& change) {
+  return digits(change.after) + " from here, " + digits(change.before) + " before";
+}
+
+std::string quantity(const std::string& kind) {
+  if (kind == "labelled") return "the share of its curves that has a line is ";
+  if (kind == "width") return "the width of its lines (px) is ";
+  if (kind == "height") return "the height of its lines above their surroundings is ";
+  if (kind == "level") return "the mean light of its picture is ";
+  if (kind == "projector") return "the number of points on its lines is ";
+  return "its crossing lines miss each other by (px) ";
+}
+
+/// What a change of one figure of one device, or of that figure in all cameras, usually comes from.
+std::string usual_cause(const std::string& kind, bool up, bool all) {
+  if (kind == "width")
+    return up ? (all ? "motion, or a screen out of focus" : "out of focus") : "sharper";
+  if (kind == "height")
+    return up ? "more light on the lines"
+              : (all ? "less light of the projectors"
+                     : "less light: aperture, exposure, or something before it");
+  if (kind == "level") return up ? "light from elsewhere: a lamp" : "less light";
+  if (kind == "labelled") return up ? "better again" : "lines are lost";
+  if (kind == "projector") return up ? "on again" : "off, covered or turned away";
+  return up ? "" : "agrees again";
+}
+
+SequenceEvent event_of(std::span<const FrameRow> rows, const SequenceDevices& devices,
+                       const Found& found) {
+  const Change& change = found.change;
+  const std::string& kind = found.series->kind;
+  const std::string cause = usual_cause(kind, change.after > change.before, false);
+  return {rows[change.at].name,
+          kind,
+          bare_name(devices, found.series->device),
+          change.before,
+          change.after,
+          name_of(devices, found.series->device) + ": " + quantity(kind) + from_to(change) + " (" +
+              cause + ")"};
+}
+
+/// The same change in most cameras at once is one event, of none of them.
+SequenceEvent event_of_all(std::span<const FrameRow> rows, const std::vector<Found>& together) {
+  const Change& change = together[together.size() / 2].change;
+  const std::string& kind = together.front().series->kind;
+  return {rows[together.front().change.at].name,
+          kind,
+          "",
+          change.before,
+          change.after,
+          std::to_string(together.size()) + " cameras: " + quantity(kind) + from_to(change) + " (" +
+              usual_cause(kind, change.after > change.before, true) + ")"};
+}
+
+/// Which device made crossings miss each other. One camera alone: that one, since a crossing's
+/// disagreement is that of one camera with two projectors. Several: the projector whose crossings
+/// suffer most, if there is one; of two projectors every crossing is of both.
+SequenceEvent bump(std::span<const FrameRow> rows, const SequenceDevices& devices,
+                   std::vector<Found> together) {
+  constexpr double kClearly = 1.3;  // a projector over the next one
+  const auto rise = [](const Found& f) { return f.change.after - f.change.before; };
+  std::stable_sort(together.begin(), together.end(),
+                   [&](const Found& a, const Found& b) { return rise(a) > rise(b); });
+  std::vector<const Found*> cameras;
+  std::vector<const Found*> projectors;
+  std::size_t first = together.front().change.at;
+  for (const Found& f : together) {
+    first = std::min(first, f.change.at);
+    (f.series->device < devices.cameras.size() ? cameras : projectors).push_back(&f);
+  }
+  const bool one_camera = cameras.size() == 1 && devices.cameras.size() > 1;
+  const bool one_projector =
+      !projectors.empty() &&
+      (projectors.size() == 1 ? devices.projectors.size() > 1
+                              : rise(*projectors[0]) > kClearly * rise(*projectors[1]));
+  const Found& most = one_camera                             ? *cameras.front()
+                      : one_projector && cameras.size() != 1 ? *projectors.front()
+                                                             : together.front();
+  SequenceEvent event{rows[first].name, "crossings", "", most.change.before, most.change.after, ""};
+  if (one_camera || (one_projector && cameras.size() != 1)) {
+    event.device = bare_name(devices, most.series->device);
+    event.text = name_of(devices, most.series->device) + " moved";
+  } else {
+    event.text = "devices moved, which one these figures do not tell";
+  }
+  event.text += ": crossing lines miss each other by " + from_to(most.change) +
+                " (px); rig check --frames says more, --refine-rig corrects the frames from here";
+  return event;
+}
+
+std::vector<Found> find_all(std::span<const FrameRow> rows, const SequenceDevices& devices,
+                            const std::vector<Series>& all, WatchReport& report) {
+  std::vector<Found> found;
+  for (const Series& series : all) {
+    std::vector<double> values;
+    for (const FrameRow& row : rows) {
+      const double value =
+          row.status.state == FrameState::kDone ? series.value(row) : kUnknownFigure;
+      values.push_back(series.is_ratio ? finite_log(value) : value);
+    }
+    ChangeReport changes = find_changes(values, {series.smallest, all.size() * rows.size()});
+    for (Change& change : changes.changes) {
+      if (series.is_ratio) {
+        change.before = std::exp(change.before);
+        change.after = std::exp(change.after);
+      }
+      found.push_back({&series, change});
+    }
+    for (const std::size_t at : changes.outliers) {
+      const double value = series.value(rows[at]);
+      report.odd.push_back({at, name_of(devices, series.device) + ": " + quantity(series.kind) +
+                                    digits(value) + " in this frame alone"});
+    }
+  }
+  return found;
+}
+
+/// Takes out of `found` what changed in the same figure and direction within a few frames of the
+/// first one.
+std::vector<Found> take_together(std::vector<Found>& found) {
+  constexpr std::size_t kFramesApart = 5;
+  const Found first = found.front();
+  std::vector<Found> together;
+  std::vector<Found> rest;
+  for (const Found& f : found) {
+    const bool same =
+        f.series->kind == first.series->kind &&
+        (f.change.after > f.change.before) == (first.change.after > first.change.before) &&
+        f.change.at <= first.change.at + kFramesApart;
+    (same ? together : rest).push_back(f);
+  }
+  found = std::move(rest);
+  return together;
+}
+
+}  // namespace
+
+WatchReport watch_sequence(std::span<const FrameRow> rows, const SequenceDevices& devices) {
+  WatchReport report;
+  const std::vector<Series> all = all_series(devices);
+  std::vector<Found> found = find_all(rows, devices, all, report);
+  std::stable_sort(found.begin(), found.end(), [](const Found& a, const Found& b) {
+    return std::tie(a.change.at, a.series->kind) < std::tie(b.change.at, b.series->kind);
+  });
+  while (!found.empty()) {
+    const std::vector<Found> together = take_together(found);
+    const Found& first = together.front();
+    const bool rises = first.change.after > first.change.before;
+    if (first.series->kind == "crossings" && rises) {
+      report.events.push_back(bump(rows, devices, together));
+    } else if (first.series->kind != "projector" && together.size() > 1 &&
+               2 * together.size() > devices.cameras.size()) {
+      report.events.push_back(event_of_all(rows, together));
+    } else {
+      for (const Found& f : together) report.events.push_back(event_of(rows, devices, f));
+    }
+  }
+  return report;
+}
+
+}  // namespace pencilscan

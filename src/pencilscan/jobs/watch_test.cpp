@@ -1,0 +1,171 @@
+#include "pencilscan/jobs/watch.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "pencilscan/core/random.h"
+#include "pencilscan/jobs/changes.h"
+
+namespace pencilscan {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::SizeIs;
+
+constexpr std::size_t kFrames = 300;
+
+std::vector<double> noise(double sigma, std::uint64_t seed) {
+  Random random(seed);
+  std::vector<double> values;
+  for (std::size_t k = 0; k < kFrames; ++k) values.push_back(1 + random.normal(0, sigma));
+  return values;
+}
+
+/// A turning object: once round in five seconds.
+double slow_wave(std::size_t k) {
+  return 0.3 * std::sin(2 * std::numbers::pi * static_cast<double>(k) / 125);
+}
+
+TEST(Changes, NoiseAndSlowMotionAreNone) {
+  std::size_t alarms = 0;
+  for (std::uint64_t seed = 1; seed <= 100; ++seed) {
+    std::vector<double> values = noise(0.02, seed);
+    alarms += find_changes(values, {0.01, 100 * kFrames}).changes.size();
+    for (std::size_t k = 0; k < kFrames; ++k) values[k] += slow_wave(k);
+    alarms += find_changes(values, {0.01, 100 * kFrames}).changes.size();
+  }
+  EXPECT_EQ(alarms, 0U);
+}
+
+TEST(Changes, AStepIsFoundWhereItIs) {
+  for (std::uint64_t seed = 1; seed <= 50; ++seed) {
+    std::vector<double> values = noise(0.02, seed);
+    for (std::size_t k = 0; k < kFrames; ++k) values[k] += k >= 200 ? 0.3 : 0;
+    const ChangeReport report = find_changes(values, {0.05, 20 * kFrames});
+    ASSERT_THAT(report.changes, SizeIs(1));
+    EXPECT_EQ(report.changes[0].at, 200U);
+    EXPECT_NEAR(report.changes[0].before, 1, 0.03);
+    EXPECT_NEAR(report.changes[0].after, 1.3, 0.06);
+    EXPECT_GT(report.changes[0].spreads, 5);
+  }
+}
+
+TEST(Changes, WhatReturnsIsAnOutlierAndUnknownValuesAreNothing) {
+  std::vector<double> values = noise(0.02, 3);
+  values[100] = 2;
+  values[150] = values[151] = 0;
+  for (std::size_t k = 170; k < 200; ++k) values[k] = kUnknownFigure;
+  const ChangeReport report = find_changes(values, {0.05, kFrames});
+  EXPECT_THAT(report.changes, IsEmpty());
+  EXPECT_THAT(report.outliers, ElementsAre(100, 150, 151));
+}
+
+TEST(Changes, SmallerThanWhatCountsIsNone) {
+  std::vector<double> values(kFrames, 1.0);
+  for (std::size_t k = 100; k < kFrames; ++k) values[k] = 1.04;
+  EXPECT_THAT(find_changes(values, {0.05, kFrames}).changes, IsEmpty());
+  EXPECT_THAT(find_changes(values, {0.03, kFrames}).changes, SizeIs(1));
+}
+
+/// Three cameras and three projectors that see the same thing frame after frame.
+class Watch : public ::testing::Test {
+ protected:
+  Watch() {
+    Random random(7);
+    const auto about = [&](double value) { return value * (1 + random.normal(0, 0.02)); };
+    for (std::size_t k = 0; k < kFrames; ++k) {
+      FrameRow& row = rows_.emplace_back();
+      row.name = std::to_string(k);
+      row.status.state = FrameState::kDone;
+      for (std::size_t c = 0; c < 3; ++c) {
+        CameraRow& camera = row.cameras.emplace_back();
+        camera.labelled_share = about(0.9);
+        camera.line_width_px = about(1.4);
+        camera.line_height = about(0.2);
+        camera.image_level = about(0.1);
+        row.projector_points.push_back(std::round(about(5000)));
+      }
+      for (std::size_t d = 0; d < 6; ++d) row.device_crossing_px.push_back(about(0.08));
+    }
+  }
+  std::vector<SequenceEvent> events() { return watch_sequence(rows_, devices_).events; }
+  void from(std::size_t first, const std::function<void(FrameRow&)>& change) {
+    for (std::size_t k = first; k < kFrames; ++k) change(rows_[k]);
+  }
+
+  std::vector<FrameRow> rows_;
+  SequenceDevices devices_{{"cam0", "cam1", "cam2"}, {"proj0", "proj1", "proj2"}};
+};
+
+TEST_F(Watch, NothingHappens) {
+  const WatchReport report = watch_sequence(rows_, devices_);
+  EXPECT_THAT(report.events, IsEmpty());
+  EXPECT_THAT(report.odd, IsEmpty());
+}
+
+TEST_F(Watch, ABumpedCameraIsNamed) {
+  from(120, [](FrameRow& row) {
+    row.device_crossing_px[1] += 0.4;
+    for (const std::size_t p : {3U, 4U, 5U}) row.device_crossing_px[p] += 0.1;
+  });
+  const auto found = events();
+  ASSERT_THAT(found, SizeIs(1));
+  EXPECT_EQ(found[0].frame, "120");
+  EXPECT_EQ(found[0].device, "cam1");
+  EXPECT_THAT(found[0].text, HasSubstr("camera cam1 moved"));
+}
+
+TEST_F(Watch, ABumpedProjectorIsNamedAndOneOfTwoIsNot) {
+  const std::vector<FrameRow> steady = rows_;
+  from(120, [](FrameRow& row) {
+    for (double& px : row.device_crossing_px) px += 0.2;
+    row.device_crossing_px[4] += 0.2;
+  });
+  auto found = events();
+  ASSERT_THAT(found, SizeIs(1));
+  EXPECT_EQ(found[0].device, "proj1");
+  rows_ = steady;
+  from(120, [](FrameRow& row) {
+    for (double& px : row.device_crossing_px) px += 0.2;
+  });
+  found = events();
+  ASSERT_THAT(found, SizeIs(1));
+  EXPECT_EQ(found[0].device, "");
+  EXPECT_THAT(found[0].text, HasSubstr("do not tell"));
+}
+
+TEST_F(Watch, FocusLampAndProjectorAreToldApart) {
+  from(100, [](FrameRow& row) { row.cameras[2].line_width_px *= 1.5; });
+  from(150, [](FrameRow& row) {
+    for (CameraRow& camera : row.cameras) camera.image_level *= 2;
+  });
+  from(200, [](FrameRow& row) { row.projector_points[0] = 0; });
+  const auto found = events();
+  ASSERT_THAT(found, SizeIs(3));
+  EXPECT_EQ(found[0].device, "cam2");
+  EXPECT_THAT(found[0].text, HasSubstr("out of focus"));
+  EXPECT_EQ(found[1].device, "");
+  EXPECT_EQ(found[1].frame, "150");
+  EXPECT_THAT(found[1].text, HasSubstr("3 cameras"));
+  EXPECT_THAT(found[1].text, HasSubstr("lamp"));
+  EXPECT_EQ(found[2].device, "proj0");
+  EXPECT_THAT(found[2].text, HasSubstr("off, covered"));
+}
+
+TEST_F(Watch, OneBadFrameIsOddAndNoEvent) {
+  rows_[50].cameras[0].labelled_share = 0.2;
+  rows_[60].status.state = FrameState::kFailed;
+  const WatchReport report = watch_sequence(rows_, devices_);
+  EXPECT_THAT(report.events, IsEmpty());
+  ASSERT_THAT(report.odd, SizeIs(1));
+  EXPECT_EQ(report.odd[0].row, 50U);
+  EXPECT_THAT(report.odd[0].text, HasSubstr("camera cam0"));
+}
+
+}  // namespace
+}  // namespace pencilscan

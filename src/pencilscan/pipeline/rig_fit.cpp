@@ -1,0 +1,186 @@
+#include "pencilscan/pipeline/rig_fit.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <iterator>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "pencilscan/pipeline/line_naming.h"
+
+namespace pencilscan {
+namespace {
+
+using nlohmann::ordered_json;
+
+struct NamedCrossings {
+  std::vector<CrossingTrack> tracks;
+  double labelled_share = 0;
+};
+
+NamedCrossings named_crossings(const Rig& rig, std::span<const FrameCurves> frames) {
+  NamedCrossings result;
+  double points = 0;
+  double labelled = 0;
+  for (const FrameCurves& frame : frames) {
+    const PointOptions options;
+    const SolutionMethod& method = solution_method(options.method);
+    const LineNaming naming =
+        name_lines(rig, frame.families, frame.graphs,
+                   method.solve(rig, frame.families, frame.graphs, options.method), options);
+    auto tracks = crossing_tracks(rig, frame.graphs, naming.labeling);
+    std::move(tracks.begin(), tracks.end(), std::back_inserter(result.tracks));
+    for (const GridGraph& graph : frame.graphs) {
+      labelled += static_cast<double>(
+          labelled_points(naming.labeling.runs[static_cast<std::size_t>(graph.camera)]));
+      for (const Curve& curve : graph.curves) points += static_cast<double>(curve.points.size());
+    }
+  }
+  result.labelled_share = points > 0 ? labelled / points : 0;
+  return result;
+}
+
+std::string formatted(const char* format, double value) {
+  char text[64];
+  std::snprintf(text, sizeof text, format, value);
+  return text;
+}
+
+std::string full_name(const DeviceFit& device) {
+  return (device.is_projector ? "projector " : "camera ") + device.name;
+}
+
+RigVerdict verdict_of(const RigFit& fit, std::size_t moved) {
+  if (!are_enough(fit.before)) return RigVerdict::kUnknown;
+  if (disagrees(fit.after)) return RigVerdict::kUnexplained;
+  return moved == 0   ? RigVerdict::kFits
+         : moved == 1 ? RigVerdict::kOneMoved
+                      : RigVerdict::kSeveralMoved;
+}
+
+std::string verdict_text(const RigFit& fit) {
+  std::string moved;
+  for (const DeviceFit& device : fit.devices) {
+    if (device.has_moved)
+      moved += (moved.empty() ? "" : ", ") + full_name(device) +
+               formatted(" by %.2f px", device.shift_px);
+  }
+  const std::string misses =
+      "crossing lines miss each other by " + formatted("%.3f px (median), ", fit.before.median_px) +
+      "where image noise explains " + formatted("%.3f", fit.before.expected_px);
+  switch (fit.verdict) {
+    case RigVerdict::kFits:
+      return "the rig fits: " + misses;
+    case RigVerdict::kOneMoved:
+      return "one device is to be put back: " + moved + "; then they miss by " +
+             formatted("%.3f px", fit.after.median_px);
+    case RigVerdict::kSeveralMoved:
+      return "several devices moved: " + moved + "; then crossing lines miss each other by " +
+             formatted("%.3f px", fit.after.median_px) +
+             ": reconstruct --refine-rig, or calibrate anew";
+    case RigVerdict::kUnexplained:
+      return misses +
+             ", and putting devices back does not help: lens parameters, or an object "
+             "that moved while the shutters were open";
+    case RigVerdict::kUnknown:
+      return "only " + std::to_string(fit.before.crossings) +
+             " crossings of labelled lines: too few to tell";
+  }
+  return {};
+}
+
+double thousandth(double value) { return std::isfinite(value) ? std::round(1e3 * value) / 1e3 : 0; }
+
+ordered_json disagreement_json(const CrossingDisagreement& d) {
+  return {{"crossings", d.crossings},
+          {"median_px", thousandth(d.median_px)},
+          {"expected_px", thousandth(d.expected_px)}};
+}
+
+}  // namespace
+
+const char* to_string(RigVerdict verdict) {
+  switch (verdict) {
+    case RigVerdict::kFits:
+      return "fits";
+    case RigVerdict::kOneMoved:
+      return "one moved";
+    case RigVerdict::kSeveralMoved:
+      return "several moved";
+    case RigVerdict::kUnexplained:
+      return "unexplained";
+    case RigVerdict::kUnknown:
+      return "unknown";
+  }
+  return "";
+}
+
+RigFit check_rig_on_frames(const Rig& stated, std::span<const FrameCurves> frames,
+                           const MovedDevicesOptions& options) {
+  const double unit = footprint(stated);
+  const Rig rig = with_registered_patterns(scaled(stated, 1 / unit));
+  const NamedCrossings named = named_crossings(rig, frames);
+  const MovedDevices found = find_moved_devices(rig, named.tracks, options);
+  RigCorrection correction(device_count(rig));
+  for (const DeviceMove& move : found.moved) correction[move.device] = move.correction;
+  const Rig put_back = corrected_rig(rig, correction);
+
+  RigFit fit;
+  fit.frames = frames.size();
+  fit.labelled_share = named.labelled_share;
+  fit.before = crossing_disagreement(rig, named.tracks);
+  fit.after = crossing_disagreement(put_back, named.tracks);
+  const auto per_device = device_disagreements(rig, named.tracks);
+  for (std::size_t d = 0; d < device_count(rig); ++d) {
+    fit.devices.push_back({device_at(rig, d).name, d >= rig.cameras.size(), per_device[d],
+                           found.alone[d].shift_px, found.alone[d].sigma_px, false, 0, 0});
+  }
+  fit.put_back = stated;
+  for (const DeviceMove& move : found.moved) {
+    DeviceFit& device = fit.devices[move.device];
+    device.has_moved = true;
+    device.shift_px = move.shift_px;
+    device.sigma_px = move.sigma_px;
+    device.rotation_px = move.correction.rotation_px.norm();
+    device.translation_mm = unit * move.correction.translation_mm.norm();
+    PoseCorrection in_mm = move.correction;
+    in_mm.translation_mm *= unit;
+    Device& changed = device_at(fit.put_back, move.device);
+    changed.device_from_world = corrected_pose(changed, in_mm);
+  }
+  fit.verdict = verdict_of(fit, found.moved.size());
+  fit.text = verdict_text(fit);
+  return fit;
+}
+
+ordered_json rig_fit_json(const RigFit& fit) {
+  ordered_json report;
+  report["verdict"] = to_string(fit.verdict);
+  report["text"] = fit.text;
+  report["frames"] = fit.frames;
+  report["labelled_share"] = thousandth(fit.labelled_share);
+  report["before"] = disagreement_json(fit.before);
+  report["after"] = disagreement_json(fit.after);
+  report["moved"] = ordered_json::array();
+  report["devices"] = ordered_json::array();
+  for (const DeviceFit& device : fit.devices) {
+    if (device.has_moved) report["moved"].push_back(device.name);
+    ordered_json entry = {{"name", device.name},
+                          {"kind", device.is_projector ? "projector" : "camera"},
+                          {"crossings", device.crossings.crossings},
+                          {"median_px", thousandth(device.crossings.median_px)},
+                          {"expected_px", thousandth(device.crossings.expected_px)},
+                          {"off_by_px", thousandth(device.shift_px)},
+                          {"off_by_sigma_px", thousandth(device.sigma_px)},
+                          {"moved", device.has_moved}};
+    if (device.has_moved) {
+      entry["rotation_px"] = thousandth(device.rotation_px);
+      entry["translation_mm"] = thousandth(device.translation_mm);
+    }
+    report["devices"].push_back(entry);
+  }
+  return report;
+}
+
+}  // namespace pencilscan

@@ -1,0 +1,71 @@
+#include "pencilscan/refinement/moved_devices.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "pencilscan/refinement/ring_scene.h"
+
+namespace pencilscan {
+namespace {
+
+using ::testing::IsEmpty;
+using ::testing::SizeIs;
+
+/// The rig as its file says it, when `device` has been turned by so many pixels.
+Rig stated_rig(const RingScene& scene, std::size_t device, double rotation_px, std::uint64_t seed) {
+  Random random(seed);
+  RigCorrection correction(device_count(scene.rig));
+  Vec3 axis = Vec3(random.normal(), random.normal(), 0).normalized();
+  // Of a projector only what moves its lines across shows.
+  if (device >= scene.rig.cameras.size()) {
+    const Axis across =
+        scene.rig.projectors[device - scene.rig.cameras.size()].patterns.front().axis;
+    axis = across == Axis::kColumn ? Vec3::UnitY() : Vec3::UnitX();
+  }
+  correction[device].rotation_px = rotation_px * axis;
+  return corrected_rig(scene.rig, correction);
+}
+
+TEST(MovedDevices, ATrueRigIsNotAccused) {
+  RingScene scene;
+  for (std::uint64_t seed = 1; seed <= 5; ++seed)
+    EXPECT_THAT(find_moved_devices(scene.rig, scene.tracks(3, 0.1, seed)).moved, IsEmpty());
+}
+
+TEST(MovedDevices, ABumpedOneIsNamedWithHowFar) {
+  RingScene scene;
+  const auto tracks = scene.tracks(3, 0.1, 1);
+  for (std::size_t device = 0; device < 8; ++device) {
+    const Rig stated = stated_rig(scene, device, 0.5, device + 1);
+    const MovedDevices found = find_moved_devices(stated, tracks);
+    ASSERT_THAT(found.moved, SizeIs(1)) << device_at(stated, device).name;
+    EXPECT_EQ(found.moved[0].device, device);
+    EXPECT_NEAR(found.moved[0].shift_px, 0.5, 0.1);
+    EXPECT_LT(found.moved[0].sigma_px, 0.1);
+  }
+}
+
+TEST(MovedDevices, TwoThatMovedAreBothNamed) {
+  RingScene scene;
+  const auto tracks = scene.tracks(3, 0.1, 1);
+  Rig stated = stated_rig(scene, 1, 1.0, 3);
+  const Rig other = stated_rig(scene, 2, 0.7, 4);
+  stated.cameras[2] = other.cameras[2];
+  const MovedDevices found = find_moved_devices(stated, tracks);
+  ASSERT_THAT(found.moved, SizeIs(2));
+  EXPECT_EQ(found.moved[0].device, 1U);
+  EXPECT_EQ(found.moved[1].device, 2U);
+}
+
+TEST(MovedDevices, TooFewCrossingsAccuseNobody) {
+  RingScene scene;
+  const Rig stated = stated_rig(scene, 0, 2, 1);
+  auto tracks = scene.tracks(3, 0.1, 1);
+  tracks.resize(20);
+  const MovedDevices found = find_moved_devices(stated, tracks);
+  EXPECT_THAT(found.moved, IsEmpty());
+  EXPECT_LE(found.alone[0].tracks, 20U);
+}
+
+}  // namespace
+}  // namespace pencilscan
