@@ -27,7 +27,10 @@ double incidence(const CameraLight& light, const Vec2& pixel, const Quadric& q, 
 bool acceptable(const CameraLight& light, const Vec2& pixel, const WindowFit& fit,
                 const ObjectSpace& space, int half, const DepthOptions& options) {
   if (fit.misfit > options.max_misfit) return false;
-  if (fit.relative_residual > options.max_relative_residual) return false;
+  const auto usual = static_cast<double>(light.usual_residual);
+  if (static_cast<double>(fit.relative_residual) >
+      std::max(options.max_relative_residual, 2 * usual))
+    return false;
   if (fit.significance < 5) return false;
   if (std::sqrt(fit.variance) * static_cast<double>(fit.lines_per_w) > options.max_sigma_lines)
     return false;
@@ -157,10 +160,13 @@ CameraLight measure_light(const Rig& rig, int camera, const std::vector<ColorFam
   }
   using Samples = std::vector<std::pair<float, float>>;  // mean and variance of a window
   std::vector<Samples> samples_of(families.size());
-  run(0.5F * (low + high), [&](const WindowFit&, const WindowFitter& fitter) {
+  std::vector<float> residuals;
+  run(0.5F * (low + high), [&](const WindowFit& fit, const WindowFitter& fitter) {
+    residuals.push_back(fit.relative_residual);
     for (std::size_t f = 0; f < families.size(); ++f)
       samples_of[f].emplace_back(fitter.family_mean(f), fitter.family_variance(f));
   });
+  if (!residuals.empty()) light.usual_residual = upper_median(std::move(residuals));
   // Noise per family: a line through the medians of the darker and the brighter half.
   for (std::size_t f = 0; f < families.size(); ++f) {
     Samples& samples = samples_of[f];

@@ -16,11 +16,11 @@ struct DepthOptions {
   int stride = 4;  ///< px between nodes, in [1, 8]
   int half = 5;    ///< radius of a window, px, in [2, 10]
   double seed_radius_px = 10;
-  double max_misfit = 8;  ///< chi^2 per degree of freedom
-  double max_relative_residual = 0.25;
-  double max_sigma_lines = 0.08;  ///< of the best pattern
-  double min_cosine = 0.2;        ///< of the incidence to the camera
-  double max_move = 2;            ///< footprints; of a node started from the closed surface
+  double max_misfit = 8;                ///< chi^2 per degree of freedom
+  double max_relative_residual = 0.25;  ///< or twice the usual one (JPEG), if that is more
+  double max_sigma_lines = 0.08;        ///< of the best pattern
+  double min_cosine = 0.2;              ///< of the incidence to the camera
+  double max_move = 2;                  ///< footprints; of a node started from the closed surface
 };
 
 /// Light as one camera sees it (presence, sampled, valid: see CameraLight), blur and noise measured

@@ -29,6 +29,7 @@ struct CameraLight {
   cv::Mat valid;                  ///< CV_8U, 0 where saturated
   float blur_px = 0.8F;           ///< standard deviation of camera and projector blur together
   std::vector<NoiseModel> noise;  ///< per family
+  float usual_residual = 0;       ///< WindowFit::relative_residual, median of the pilot windows
 };
 
 /// Inverse depth over a window: w = q . (1, x, y, x^2, x y, y^2), x = dx / half, y = dy / half.
