@@ -82,7 +82,8 @@ void leave_out(const Rig& rig, const std::vector<PictureFinding>& findings, Poin
     result.detections[c] = {};
     result.graphs[c] = {};
     result.graphs[c].camera = finding.camera;
-    result.warnings.push_back(describe(rig, finding));
+    result.wrong_pictures.push_back(describe(rig, finding));
+    result.warnings.push_back(result.wrong_pictures.back());
   }
 }
 
@@ -104,7 +105,7 @@ double plane_error_px(const CrossingDisagreement& crossings) {
 /// Why a frame has no points.
 std::string why_nothing(const PointResult& result) {
   std::string why = "no curve could be given its projector line";
-  for (const std::string& warning : result.warnings) why += "; " + warning;
+  for (const std::string& wrong : result.wrong_pictures) why += "; " + wrong;
   return why;
 }
 

@@ -64,7 +64,8 @@ struct StageTime {
 /// Labelled points of one frame and everything that led to them.
 struct PointResult {
   std::vector<ColorFamily> families;
-  std::vector<char> left_out;  ///< per camera: 1 where its picture is wrong; warnings say how
+  std::vector<char> left_out;               ///< per camera: 1 where its picture is wrong
+  std::vector<std::string> wrong_pictures;  ///< how, one sentence each; warnings hold them too
   std::vector<CameraDetection> detections;  ///< per camera; curves have moved into the graphs
   std::vector<GridGraph> graphs;            ///< per camera
   Labeling labeling;
