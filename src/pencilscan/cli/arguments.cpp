@@ -4,6 +4,14 @@
 
 namespace pencilscan::cli {
 
+std::vector<std::string> listed_words(CLI::Option& option) {
+  try {
+    return words_of_either(option.get_validator(kWordsRule)->get_description());
+  } catch (const CLI::OptionNotFound&) {
+    return {};
+  }
+}
+
 void refuse_existing(const std::string& option, const std::filesystem::path& file, bool overwrite) {
   std::error_code ignored;
   if (overwrite || !std::filesystem::exists(std::filesystem::symlink_status(file, ignored))) return;

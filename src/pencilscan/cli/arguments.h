@@ -73,6 +73,9 @@ template <class Number>
   return number_that<double>([](double value) { return value >= 0; }, "0 or above");
 }
 
+/// The name of rules that list words; what they say is either() of these.
+inline constexpr const char* kWordsRule = "words";
+
 /// One of these words.
 [[nodiscard]] inline CLI::Validator one_of(const std::vector<std::string>& words) {
   return {[=](std::string& text) {
@@ -80,7 +83,7 @@ template <class Number>
               if (text == word) return std::string();
             return refusal(text, either(words)) + did_you_mean(text, words);
           },
-          either(words)};
+          either(words), kWordsRule};
 }
 /// The same for words that stand for values of an enumeration: for transform(), not check().
 template <class Enum>
@@ -94,8 +97,10 @@ template <class Enum>
             text = std::to_string(static_cast<int>(found->second));
             return std::string();
           },
-          either(words)};
+          either(words), kWordsRule};
 }
+/// The words that an option's rule lists: nothing where its values are not words.
+[[nodiscard]] std::vector<std::string> listed_words(CLI::Option& option);
 
 /// InputError that names the file where `option` would replace one.
 void refuse_existing(const std::string& option, const std::filesystem::path& file, bool overwrite);

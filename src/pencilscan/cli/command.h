@@ -51,5 +51,7 @@ void add_show_command(CLI::App& app);
 void add_capture_command(CLI::App& app);
 void add_report_command(CLI::App& app);
 void add_view_command(CLI::App& app);
+void add_completion_command(CLI::App& app);
+void add_manual_command(CLI::App& app);
 
 }  // namespace pencilscan::cli

@@ -4,6 +4,7 @@
 #include <optional>
 #include <vector>
 
+#include "pencilscan/cli/help_format.h"
 #include "pencilscan/cli/spelling.h"
 
 namespace pencilscan::cli {
@@ -32,7 +33,8 @@ std::vector<const CLI::App*> commands_of(const CLI::App& command) {
 
 std::vector<std::string> command_names(const CLI::App& command) {
   std::vector<std::string> names;
-  for (const CLI::App* below : commands_of(command)) names.push_back(below->get_name());
+  for (const CLI::App* below : commands_of(command))
+    if (!is_hidden(*below)) names.push_back(below->get_name());
   return names;
 }
 

@@ -62,8 +62,13 @@ std::string HelpFormat::make_option_desc(const CLI::Option* option) const {
   return text;
 }
 
+void hide(CLI::App& command) { command.group(""); }  // the library's sign of it
+
+bool is_hidden(const CLI::App& command) { return command.get_group().empty(); }
+
 void name_commands(CLI::App& command) {
-  for (CLI::App* below : command.get_subcommands([](const CLI::App*) { return true; })) {
+  for (CLI::App* below :
+       command.get_subcommands([](const CLI::App* app) { return !is_hidden(*app); })) {
     below->group("Commands");
     name_commands(*below);
   }

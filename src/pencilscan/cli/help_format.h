@@ -14,6 +14,11 @@ class HelpFormat : public CLI::Formatter {
   std::string make_option_desc(const CLI::Option* option) const override;
 };
 
+/// Commands for programs, such as the one that writes man pages, are not in help: hide() makes one
+/// so.
+void hide(CLI::App& command);
+[[nodiscard]] bool is_hidden(const CLI::App& command);
+
 /// Lists the commands below as commands, and theirs.
 void name_commands(CLI::App& command);
 

@@ -1,6 +1,7 @@
 #include "pencilscan/cli/spelling.h"
 
 #include <algorithm>
+#include <sstream>
 
 namespace pencilscan::cli {
 namespace {
@@ -67,6 +68,16 @@ std::string either(const std::vector<std::string>& words) {
     text += words[i];
   }
   return text;
+}
+
+std::vector<std::string> words_of_either(const std::string& text) {
+  std::istringstream stream(text);
+  std::vector<std::string> words;
+  for (std::string word; stream >> word;) {
+    if (word.ends_with(',')) word.pop_back();
+    if (word != "or") words.push_back(word);
+  }
+  return words;
 }
 
 }  // namespace pencilscan::cli

@@ -19,5 +19,7 @@ namespace pencilscan::cli {
 
 /// "a, b or c".
 [[nodiscard]] std::string either(const std::vector<std::string>& words);
+/// The words of which either() made the text; they hold no spaces and no commas.
+[[nodiscard]] std::vector<std::string> words_of_either(const std::string& text);
 
 }  // namespace pencilscan::cli
