@@ -62,6 +62,9 @@ install(FILES ${PROJECT_SOURCE_DIR}/README.md ${PROJECT_SOURCE_DIR}/SECURITY.md
         DESTINATION ${documents} COMPONENT documents)
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/docs DESTINATION ${documents} COMPONENT documents
         PATTERN site EXCLUDE)
+# The site, where script/docs built it.
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/build/docs/html DESTINATION ${documents} COMPONENT documents OPTIONAL
+        PATTERN .doctrees EXCLUDE PATTERN .buildinfo EXCLUDE)
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/python/examples DESTINATION ${documents} COMPONENT documents
         FILES_MATCHING PATTERN *.py)
 
