@@ -29,6 +29,8 @@ constexpr double kGuessedTransferMs = 60;
 constexpr double kUsualRefreshHz = 60;
 /// Added to the delay when a picture is taken again.
 constexpr double kRetakeMs = 50;
+/// A camera without a picture so many times in a row gives none any more.
+constexpr int kMostMissing = 4;
 /// Pictures of all cameras that may wait to be written: half a gigabyte at most.
 constexpr std::size_t kWaitingPictures = 24;
 
@@ -72,9 +74,10 @@ class ProjectorRun {
         work_(work),
         report_(report),
         shots_(shots_of(screen.projectors()[projector], options)),
-        coarse_(shots_.size() + 1, std::vector<cv::Mat>(cameras.group().size())) {}
+        coarse_(shots_.size() + 1, std::vector<cv::Mat>(cameras.group().size())),
+        missing_in_a_row_(cameras.group().size(), 0) {}
 
-  /// False when `watch` asked to stop.
+  /// False when `watch` asked to stop, or a camera is gone.
   bool run(const std::function<bool(double share)>& watch);
   /// Removes the folders of cameras that see nothing.
   void drop_unseen() const;
@@ -93,6 +96,11 @@ class ProjectorRun {
   /// Shots to take again, with the reason for every camera that complains.
   [[nodiscard]] std::set<std::size_t> failed(bool last);
   void note(std::size_t camera, std::size_t i, const std::string& why, bool given_up);
+  /// Why there is no picture of a camera, as far as that is known.
+  [[nodiscard]] std::string why_missing(std::size_t camera) const;
+  /// True, with a fault, when a camera gives no pictures any more: waiting for each of them would
+  /// take minutes.
+  [[nodiscard]] bool lost_a_camera();
   void judge_stillness();
   /// Share of a camera's picture that changes at all during the sequence.
   [[nodiscard]] double changing_share(std::size_t camera) const;
@@ -106,6 +114,7 @@ class ProjectorRun {
   GrayCaptureReport& report_;
   std::vector<Shot> shots_;
   std::vector<std::vector<cv::Mat>> coarse_;  ///< [shot][camera]; empty: none came
+  std::vector<int> missing_in_a_row_;         ///< per camera
   std::vector<LitView> views_;
 };
 
@@ -140,6 +149,7 @@ void ProjectorRun::take(std::size_t i, int again) {
   work_.wait(kWaitingPictures);
   for (std::size_t c = 0; c < frames.size(); ++c) {
     coarse_[i][c].release();
+    missing_in_a_row_[c] = frames[c].frame ? 0 : missing_in_a_row_[c] + 1;
     if (!frames[c].frame) continue;
     work_.add([this, i, c, frame = frames[c].frame] {
       const cv::Mat picture = picture_for_files(*frame);
@@ -147,6 +157,30 @@ void ProjectorRun::take(std::size_t i, int again) {
       if (i < shots_.size()) write_image(folder_ / name_of(c) / shots_[i].file, picture);
     });
   }
+}
+
+std::string ProjectorRun::why_missing(std::size_t camera) const {
+  const LiveCameras::Count count = cameras_.count(camera);
+  if (count.incomplete == 0) return "no picture came";
+  return "no picture came whole: " + std::to_string(count.incomplete) + " of " +
+         std::to_string(count.incomplete + count.whole) + " lack packets that the network lost";
+}
+
+bool ProjectorRun::lost_a_camera() {
+  bool lost = false;
+  for (Fault& fault : cameras_.group().faults()) {
+    lost = lost || fault.kind == "dead";
+    if (fault.kind == "dead") report_.faults.push_back(std::move(fault));
+  }
+  for (std::size_t c = 0; !lost && c < missing_in_a_row_.size(); ++c) {
+    if (missing_in_a_row_[c] < kMostMissing) continue;
+    lost = true;
+    report_.faults.push_back(
+        {"missing", name_of(c),
+         why_missing(c) + ", " + std::to_string(missing_in_a_row_[c]) + " times in a row",
+         "check the camera, its trigger and its network"});
+  }
+  return lost;
 }
 
 void ProjectorRun::judge_whites() {
@@ -179,7 +213,7 @@ std::set<std::size_t> ProjectorRun::failed(bool last) {
     for (std::size_t i = 0; i <= shots_.size(); ++i) {
       if (!coarse_[i][c].empty()) continue;
       again.insert(i);
-      note(c, i, "no picture came", last);
+      note(c, i, why_missing(c), last);
     }
     // A camera that sees nothing between white and black, and then something: these came late.
     if (views_[c].share < kLeastSeen) {
@@ -235,6 +269,7 @@ bool ProjectorRun::run(const std::function<bool(double share)>& watch) {
                              dark + static_cast<std::int64_t>(1e6 * delay_ms() + 5e8));
   for (std::size_t i = 0; i < count; ++i) {
     take(i);
+    if (lost_a_camera()) return false;
     if (!watch(static_cast<double>(i + 1) / static_cast<double>(count))) return false;
   }
   work_.wait();
@@ -244,7 +279,7 @@ bool ProjectorRun::run(const std::function<bool(double share)>& watch) {
     for (const std::size_t i : again) {
       take(i, round);
       ++report_.retaken;
-      if (!watch(1)) return false;
+      if (lost_a_camera() || !watch(1)) return false;
     }
     work_.wait();
   }

@@ -58,7 +58,8 @@ using ProjectorDone = std::function<void(std::size_t projector)>;
 /// where it was: existing projectors are kept. `rig`: names and sizes of the cameras, in the order
 /// of `cameras`.
 ///
-/// Faults: picture (given up after the retakes), moved, missing (a camera gives no pictures),
+/// A camera that is gone, or gives no pictures any more, ends the capture; the next one goes on.
+/// Faults: picture (given up after the retakes), moved, missing (a camera gives no pictures), dead,
 /// unseen (no camera sees the projector), and those of the screen.
 [[nodiscard]] GrayCaptureReport capture_gray_codes(LiveCameras& cameras, ProjectorScreen& screen,
                                                    const Rig& rig, const std::filesystem::path& out,

@@ -49,6 +49,7 @@ void add_evaluate_command(CLI::App& app);
 void add_artefact_command(CLI::App& app);
 void add_show_command(CLI::App& app);
 void add_capture_command(CLI::App& app);
+void add_lab_command(CLI::App& app);
 void add_report_command(CLI::App& app);
 void add_view_command(CLI::App& app);
 void add_completion_command(CLI::App& app);

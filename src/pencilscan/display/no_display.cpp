@@ -3,6 +3,7 @@
 #include "pencilscan/display/dummy_screen.h"
 #include "pencilscan/display/projector_windows.h"
 #include "pencilscan/display/screen_faults.h"
+#include "pencilscan/display/shown_watch.h"
 #include "pencilscan/display/x_screen.h"
 
 namespace pencilscan {
@@ -49,6 +50,11 @@ DummyScreen::DummyScreen(const std::filesystem::path&, const std::vector<Output>
 DummyScreen::~DummyScreen() = default;
 const std::string& DummyScreen::display() const { fail(); }
 void DummyScreen::enter() const { fail(); }
+
+struct ShownWatch::State {};
+ShownWatch::ShownWatch(const std::string&, std::vector<std::string>, Sink) { fail(); }
+ShownWatch::~ShownWatch() = default;
+void ShownWatch::settle() { fail(); }
 
 struct ProjectorWindows::State {};
 ProjectorWindows::ProjectorWindows(const std::vector<OutputUse>&, const std::string&) { fail(); }

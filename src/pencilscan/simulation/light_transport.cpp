@@ -129,44 +129,46 @@ LightTransport::LightTransport(const Rig& rig, std::size_t camera_index,
   }
 }
 
-cv::Mat LightTransport::render(std::span<const PanelPicture> panels) const {
-  PENCILSCAN_CHECK(panels.size() == tables_.size());
-  const int width = ambient_.cols;
-  cv::Mat image(ambient_.rows, width, CV_32FC3);
-  // Of each projector: what a panel value becomes in the camera, colours mixed and scaled.
-  std::vector<Eigen::Matrix3f> mix;
-  for (std::size_t p = 0; p < panels.size(); ++p) {
-    const cv::Mat& light = panels[p].light;
-    PENCILSCAN_CHECK(light.empty() || (light.type() == CV_8UC3 && light.isContinuous() &&
-                                       light.size() == tables_[p].panel));
-    mix.push_back(tables_[p].color * panels[p].gain.cast<float>().asDiagonal() / 255.F);
-  }
+cv::Mat LightTransport::ambient() const {
+  cv::Mat image;
+  cv::merge(std::vector<cv::Mat>(3, ambient_), image);
+  return image;
+}
+
+void LightTransport::add(std::size_t projector, const PanelPicture& panel, cv::Mat& image) const {
+  if (panel.light.empty()) return;
+  const Table& table = tables_[projector];
+  PENCILSCAN_CHECK(panel.light.type() == CV_8UC3 && panel.light.isContinuous() &&
+                   panel.light.size() == table.panel && image.type() == CV_32FC3 &&
+                   image.size() == ambient_.size());
+  // What a panel value becomes in the camera, colours mixed and scaled.
+  const Eigen::Matrix3f mix = table.color * panel.gain.cast<float>().asDiagonal() / 255.F;
+  const auto black = static_cast<float>(panel.black_level);
+  const std::uint8_t* pixels = panel.light.data;
+  const auto width = static_cast<std::size_t>(image.cols);
   parallel_for(static_cast<std::size_t>(image.rows), [&](std::size_t row) {
-    const int y = static_cast<int>(row);
-    auto* out = image.ptr<float>(y);
-    const auto* ambient = ambient_.ptr<float>(y);
-    for (int x = 0; x < width; ++x) out[3 * x] = out[3 * x + 1] = out[3 * x + 2] = ambient[x];
-    for (std::size_t p = 0; p < panels.size(); ++p) {
-      if (panels[p].light.empty()) continue;
-      const Table& table = tables_[p];
-      const std::uint8_t* panel = panels[p].light.data;
-      const auto black = static_cast<float>(panels[p].black_level);
-      const std::uint32_t* begin = table.begin.data() + row * static_cast<std::size_t>(width);
-      for (int x = 0; x < width; ++x) {
-        if (begin[x] == begin[x + 1]) continue;
-        Eigen::Vector3f sum = Eigen::Vector3f::Zero();
-        float all = 0;
-        for (std::uint32_t i = begin[x]; i < begin[x + 1]; ++i) {
-          const std::uint8_t* value = panel + 3 * static_cast<std::size_t>(table.pixel[i]);
-          sum += table.weight[i] * Eigen::Vector3f(value[0], value[1], value[2]);
-          all += table.weight[i];
-        }
-        const Eigen::Vector3f seen =
-            mix[p] * ((1 - black) * sum + Eigen::Vector3f::Constant(255 * black * all));
-        for (int k = 0; k < 3; ++k) out[3 * x + k] += seen[k];
+    auto* out = image.ptr<float>(static_cast<int>(row));
+    const std::uint32_t* begin = table.begin.data() + row * width;
+    for (std::size_t x = 0; x < width; ++x) {
+      if (begin[x] == begin[x + 1]) continue;
+      Eigen::Vector3f sum = Eigen::Vector3f::Zero();
+      float all = 0;
+      for (std::uint32_t i = begin[x]; i < begin[x + 1]; ++i) {
+        const std::uint8_t* value = pixels + 3 * static_cast<std::size_t>(table.pixel[i]);
+        sum += table.weight[i] * Eigen::Vector3f(value[0], value[1], value[2]);
+        all += table.weight[i];
       }
+      const Eigen::Vector3f seen =
+          mix * ((1 - black) * sum + Eigen::Vector3f::Constant(255 * black * all));
+      for (std::size_t k = 0; k < 3; ++k) out[3 * x + k] += seen[static_cast<Eigen::Index>(k)];
     }
   });
+}
+
+cv::Mat LightTransport::render(std::span<const PanelPicture> panels) const {
+  PENCILSCAN_CHECK(panels.size() == tables_.size());
+  cv::Mat image = ambient();
+  for (std::size_t p = 0; p < panels.size(); ++p) add(p, panels[p], image);
   return image;
 }
 

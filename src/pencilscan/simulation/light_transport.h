@@ -30,6 +30,9 @@ class LightTransport {
 
   /// Linear light, CV_32FC3 RGB, without sensor effects. One entry per projector of the rig.
   [[nodiscard]] cv::Mat render(std::span<const PanelPicture> panels) const;
+  /// Its parts: what is there without projectors, and what one projector adds. CV_32FC3 RGB.
+  [[nodiscard]] cv::Mat ambient() const;
+  void add(std::size_t projector, const PanelPicture& panel, cv::Mat& image) const;
   /// Bytes that it takes.
   [[nodiscard]] std::size_t bytes() const;
 

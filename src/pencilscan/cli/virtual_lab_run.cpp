@@ -1,0 +1,275 @@
+#include "pencilscan/cli/virtual_lab_run.h"
+
+#include <Eigen/Geometry>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "pencilscan/cli/interruption.h"
+#include "pencilscan/core/child_process.h"
+#include "pencilscan/core/error.h"
+#include "pencilscan/core/parallel.h"
+#include "pencilscan/core/private_network.h"
+#include "pencilscan/core/random.h"
+#include "pencilscan/core/stopwatch.h"
+#include "pencilscan/io/file.h"
+#include "pencilscan/io/mesh_file.h"
+#include "pencilscan/lab/virtual_lab.h"
+#include "pencilscan/lab/virtual_objects.h"
+#include "pencilscan/planning/ring.h"
+#include "pencilscan/rig/devices_file.h"
+
+namespace pencilscan::cli {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+/// How well a calibration of single cameras by a board knows K, one standard deviation.
+constexpr double kFocalError = 1e-3;
+constexpr double kCenterErrorPx = 1;
+/// Three frames: more than the X server and its watch ever need.
+constexpr double kSmallDelayMs = 50;
+constexpr double kTurn = 0.05;  ///< s between looks at a command that runs
+
+/// Five devices on a third of a circle, with a seventh of the usual pixels: for quick tries.
+Rig small_ring() {
+  RingOptions ring;
+  ring.cameras = 3;
+  ring.projectors = 2;
+  ring.arc_rad = 2.2;
+  ring.camera_width = 480;
+  ring.camera_height = 360;
+  ring.camera_focal_px = 860;
+  ring.projector_width = 384;
+  ring.projector_height = 288;
+  ring.projector_focal_px = 720;
+  return make_ring(ring);
+}
+
+/// What an owner of this rig knows before its calibration.
+UncalibratedRig devices_of(const Rig& rig, std::uint64_t seed) {
+  UncalibratedRig devices{rig, {}};
+  Random random(seed, 0x6b);
+  for (Camera& camera : devices.rig.cameras) {
+    const double focal = 1 + kFocalError * random.normal();
+    camera.K(0, 0) *= focal;
+    camera.K(1, 1) *= focal;
+    camera.K(0, 2) += kCenterErrorPx * random.normal();
+    camera.K(1, 2) += kCenterErrorPx * random.normal();
+    camera.color_matrix.reset();
+    camera.color_matrix_by_projector.clear();
+    devices.given.push_back({true, false, false});
+  }
+  for (Projector& projector : devices.rig.projectors) {
+    projector.output.clear();  // lab.json names it
+    devices.given.push_back({});
+  }
+  devices.rig.volume.reset();
+  return devices;
+}
+
+/// Ten digits.
+std::string digits(double value) {
+  std::ostringstream text;
+  text.precision(10);
+  text << value;
+  return text.str();
+}
+
+/// The movement of the true rig onto the calibrated one: centres of all devices on each other. What
+/// is left is for the evaluation to align: a rig's frame is as good as its devices' centres.
+RigidTransform calibrated_from_true(const Rig& truth, const Rig& calibrated) {
+  std::vector<Vec3> from;
+  std::vector<Vec3> to;
+  const auto add = [&](const Device& a, const Device& b) {
+    from.push_back(a.center());
+    to.push_back(b.center());
+  };
+  for (std::size_t c = 0; c < truth.cameras.size(); ++c)
+    add(truth.cameras[c], calibrated.cameras[c]);
+  for (std::size_t p = 0; p < truth.projectors.size(); ++p)
+    add(truth.projectors[p], calibrated.projectors[p]);
+  Eigen::Matrix3Xd a(3, from.size());
+  Eigen::Matrix3Xd b(3, to.size());
+  for (std::size_t i = 0; i < from.size(); ++i) {
+    a.col(static_cast<Eigen::Index>(i)) = from[i];
+    b.col(static_cast<Eigen::Index>(i)) = to[i];
+  }
+  const Eigen::Matrix4d moved = Eigen::umeyama(a, b, false);
+  return {moved.topLeftCorner<3, 3>(), moved.topRightCorner<3, 1>()};
+}
+
+class VirtualRun {
+ public:
+  VirtualRun(const VirtualLabCommand& command, Interruption& interruption)
+      : command_(command), interruption_(interruption), out_(fs::absolute(command.out)) {}
+  void run();
+
+ private:
+  using Words = std::vector<std::string>;
+  /// Runs a command of this program; its words go to logs/NAME.txt, its figures are returned.
+  /// StageError with its complaint when it fails.
+  Json step(const std::string& name, const Words& words);
+  void prepare();
+  void calibrate();
+  void record();
+  [[nodiscard]] Json judge(const std::string& name, const fs::path& rig, const fs::path& frames,
+                           const fs::path& truth);
+  [[nodiscard]] Json plain_frame();
+  void place(const TriangleMesh& mesh) { lab_->room().place(SimulatedObject(mesh)); }
+  [[nodiscard]] std::string at(const std::string& file) const { return (out_ / file).string(); }
+
+  const VirtualLabCommand& command_;
+  Interruption& interruption_;
+  fs::path out_;
+  Rig rig_;
+  TriangleMesh object_;
+  std::unique_ptr<VirtualLab> lab_;
+  Json figures_;
+};
+
+/// The last thing a command said of itself, without its name.
+std::string complaint_in(const fs::path& log) {
+  const std::string own = "pencilscan: ";
+  std::ifstream file(log);
+  std::string last;
+  for (std::string line; std::getline(file, line);) {
+    // Progress ends in carriage returns where it is no line of its own.
+    line.erase(0, line.find_last_of('\r') == std::string::npos ? 0 : line.find_last_of('\r') + 1);
+    if (line.starts_with(own)) last = line.substr(own.size());
+  }
+  return last;
+}
+
+Json VirtualRun::step(const std::string& name, const Words& words) {
+  std::cerr << "$ pencilscan";
+  for (const std::string& word : words) std::cerr << " " << word;
+  std::cerr << std::endl;
+  const fs::path log = out_ / "logs" / (name + ".txt");
+  const fs::path json = out_ / "logs" / (name + ".json");
+  Words all{fs::read_symlink("/proc/self/exe").string()};
+  all.insert(all.end(), words.begin(), words.end());
+  all.insert(all.end(), {"--json", json.string()});
+  if (command_.common.threads > 0)
+    all.insert(all.end(), {"--threads", std::to_string(command_.common.threads)});
+  ChildProcess::Options options;
+  options.error_file = log.string();
+  const Stopwatch watch;
+  ChildProcess child(all, options);
+  std::optional<int> code;
+  while (!(code = child.wait(ChildProcess::Seconds(kTurn)))) {
+    if (interruption_.within(0)) throw StageError("stopped");
+  }
+  figures_["seconds"][name] = watch.seconds();
+  if (*code != 0)
+    throw StageError(name + " failed: " + complaint_in(log) + " (" + log.string() + ")");
+  return fs::exists(json) ? Json(read_json(json)) : Json();
+}
+
+void VirtualRun::prepare() {
+  rig_ = !command_.rig_path.empty() ? read_rig(command_.rig_path)
+         : command_.small           ? small_ring()
+                                    : make_ring();
+  const Sphere volume = working_volume(rig_);
+  object_ = command_.mesh_path.empty() ? make_pebble(volume)
+                                       : fitted(read_mesh(command_.mesh_path), volume);
+  for (const char* folder : {"logs", "screen", "truth"}) fs::create_directories(out_ / folder);
+  write_rig(rig_, out_ / "truth" / "rig.json");
+  write_mesh(out_ / "truth" / "object.ply", object_);
+  write_devices(devices_of(rig_, command_.common.seed), out_ / "devices.json");
+  PhotographyOptions photo;
+  photo.noise = command_.noise;
+  photo.seed = command_.common.seed;
+  lab_ = std::make_unique<VirtualLab>(rig_, out_ / "screen", photo);
+  Lab lab = lab_->lab_file();
+  if (command_.small)  // nobody measures it
+    for (const Projector& projector : rig_.projectors) lab.delay_ms[projector.name] = kSmallDelayMs;
+  write_lab(lab, out_ / "lab.json");
+}
+
+void VirtualRun::calibrate() {
+  const auto volume = working_volume(rig_);
+  Words words{"calibrate", "--devices", at("devices.json"), "--out", at("rig.json")};
+  const int poses = command_.poses > 0 ? command_.poses : command_.small ? 2 : 3;
+  for (int i = 1; i <= poses; ++i) {
+    const std::string pose = "pose" + std::to_string(i);
+    place(make_heap(volume, command_.common.seed + static_cast<std::uint64_t>(i)));
+    if (i == 1 && !command_.small)
+      step("test", {"capture", "--rig", at("devices.json"), "--lab", at("lab.json"), "--test",
+                    at("lab.json"), "--overwrite"});
+    Words capture{"capture", "--rig", at("devices.json"), "--lab", at("lab.json"), "--gray-code",
+                  "--out",   at(pose)};
+    if (!command_.small) capture.emplace_back("--solids");
+    const Json taken = step(pose, capture);
+    figures_["captures"][pose] = {{"pictures", taken["pictures"]},
+                                  {"retaken", taken["retaken"]},
+                                  {"seconds", taken["seconds"]}};
+    words.insert(words.end(), {"--captures", at(pose)});
+  }
+  const double distance = (rig_.cameras[0].center() - rig_.cameras[1].center()).norm();
+  words.insert(words.end(),
+               {"--known-distance", rig_.cameras[0].name, rig_.cameras[1].name, digits(distance)});
+  const Json found = step("calibrate", words);
+  for (const char* key : {"verdict", "rms_px", "held_out_rms_px"})
+    figures_["calibration"][key] = found[key];
+}
+
+void VirtualRun::record() {
+  place(object_);
+  step("record", {"capture", "--rig", at("rig.json"), "--lab", at("lab.json"), "--show", "--frames",
+                  "1", "--still", "--rate", "1", "--out", at("frames")});
+}
+
+Json VirtualRun::judge(const std::string& name, const fs::path& rig, const fs::path& frames,
+                       const fs::path& truth) {
+  const fs::path result = out_ / ("result" + name);
+  step("reconstruct" + name, {"reconstruct", "--rig", rig.string(), "--frames", frames.string(),
+                              "--out", result.string()});
+  const Json all =
+      step("evaluate" + name, {"evaluate", "--truth", truth.string(), "--rig", rig.string(),
+                               "--result", (result / "000000").string(), "--align", "rigid"});
+  Json chosen;
+  for (const char* key : {"points", "label_error", "line_recall", "distance_median_mm",
+                          "mesh_distance_median_mm", "completeness_1mm"})
+    chosen[key] = all[key];
+  return chosen;
+}
+
+Json VirtualRun::plain_frame() {
+  step("simulate",
+       {"simulate", "--rig", at("truth/rig.json"), "--mesh", at("truth/object.ply"), "--pixelated",
+        "--black-level", "0.004", "--noise", command_.noise, "--out", at("plain")});
+  return judge("_plain", out_ / "truth" / "rig.json", out_ / "plain" / "frames",
+               out_ / "truth" / "object.ply");
+}
+
+void VirtualRun::run() {
+  const Stopwatch watch;
+  prepare();
+  calibrate();
+  record();
+  const fs::path truth = out_ / "truth" / "mesh.ply";
+  write_mesh(truth, transformed(object_, calibrated_from_true(rig_, read_rig(out_ / "rig.json"))));
+  figures_["laboratory"] = judge("", out_ / "rig.json", out_ / "frames", truth);
+  figures_["simulated"] = plain_frame();
+  figures_["seconds"]["all"] = watch.seconds();
+  print_figures(command_.common, figures_);
+}
+
+}  // namespace
+
+void run_virtual_lab(const VirtualLabCommand& command, Interruption& interruption) {
+  std::error_code ignored;
+  if (fs::exists(command.out, ignored) &&
+      (!fs::is_directory(command.out, ignored) || !fs::is_empty(command.out, ignored)))
+    throw InputError("command line", "--out", command.out, "must be a new or empty folder");
+  enter_private_network(16);
+  const ThreadLimit threads(command.common.threads);
+  VirtualRun(command, interruption).run();
+}
+
+}  // namespace pencilscan::cli

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <string>
+
+#include "pencilscan/cli/command.h"
+
+namespace pencilscan::cli {
+
+class Interruption;
+
+/// What `pencilscan lab --virtual` is asked for.
+struct VirtualLabCommand {
+  CommonOptions common;
+  std::string out;
+  std::string rig_path;   ///< the true rig; empty: a ring
+  std::string mesh_path;  ///< the object; empty: a pebble
+  std::string noise = "low";
+  int poses = 0;  ///< 0: two in the small setting, else three
+  bool small = false;
+};
+
+/// Builds a virtual laboratory and goes all the way in it with this program's own commands, each a
+/// process of its own: flashes (not in the small setting), captures, calibration, a frame, its
+/// reconstruction and evaluation; then the same frame simulated without devices. Prints every
+/// command line and the figures. To be called before any other thread is there. InputError for an
+/// --out that is not empty; StageError when a command fails, with what it said.
+void run_virtual_lab(const VirtualLabCommand& command, Interruption& interruption);
+
+}  // namespace pencilscan::cli
