@@ -24,6 +24,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kMostOutputs = 16;
+constexpr int kSmallestDesktop = 64;  ///< px: the driver refuses less
 constexpr ChildProcess::Seconds kStart{20};
 
 struct Size {
@@ -44,7 +45,7 @@ Size desktop_of(const std::vector<DummyScreen::Output>& outputs) {
     size.width += output.width;
     size.height = std::max(size.height, output.height);
   }
-  return size;
+  return {std::max(size.width, kSmallestDesktop), std::max(size.height, kSmallestDesktop)};
 }
 
 /// Neither devices nor terminals nor power saving. The driver starts with a mode of its own, for
