@@ -180,6 +180,11 @@ class Points(_Table):
         0 to 1.
     plane : (n,) float32
         The line coordinate that was triangulated.
+    normal : (n, 3) float32
+        Outward unit normal of the surface, 0 where it is not known; also as nx, ny, nz.
+    color : (n, 3) uint8
+        Colour of the surface as a screen shows it (sRGB), 0 where it is not known; also as red,
+        green, blue.
     """
 
     xyz: np.ndarray
@@ -196,6 +201,14 @@ class Points(_Table):
     sigma: np.ndarray
     confidence: np.ndarray
     plane: np.ndarray
+    normal: np.ndarray
+    nx: np.ndarray
+    ny: np.ndarray
+    nz: np.ndarray
+    color: np.ndarray
+    red: np.ndarray
+    green: np.ndarray
+    blue: np.ndarray
 
 
 class Curves(_Table):

@@ -269,7 +269,11 @@ py::dict point_arrays(const ResultPtr& result) {
   Fields<P> fields(result->points, py::cast(result));
   static_assert(offsetof(P, y) == offsetof(P, x) + sizeof(float) &&
                 offsetof(P, z) == offsetof(P, y) + sizeof(float) &&
-                offsetof(P, v) == offsetof(P, u) + sizeof(float));
+                offsetof(P, v) == offsetof(P, u) + sizeof(float) &&
+                offsetof(P, ny) == offsetof(P, nx) + sizeof(float) &&
+                offsetof(P, nz) == offsetof(P, ny) + sizeof(float) &&
+                offsetof(P, green) == offsetof(P, red) + 1 &&
+                offsetof(P, blue) == offsetof(P, green) + 1);
   fields.add("xyz", &P::x, 3);
   fields.add("uv", &P::u, 2);
   fields.add("x", &P::x);
@@ -284,6 +288,14 @@ py::dict point_arrays(const ResultPtr& result) {
   fields.add("sigma", &P::sigma);
   fields.add("confidence", &P::confidence);
   fields.add("plane", &P::plane);
+  fields.add("normal", &P::nx, 3);
+  fields.add("nx", &P::nx);
+  fields.add("ny", &P::ny);
+  fields.add("nz", &P::nz);
+  fields.add("color", &P::red, 3);
+  fields.add("red", &P::red);
+  fields.add("green", &P::green);
+  fields.add("blue", &P::blue);
   return fields.arrays();
 }
 

@@ -23,7 +23,7 @@ import pencilscan as ps
 from pencilscan import _core
 
 PROGRAM = os.environ["PENCILSCAN_PROGRAM"]
-POINT_PROPERTIES = "x y z u v camera projector pattern line sigma confidence plane".split()
+POINT_PROPERTIES = "x y z u v camera projector pattern line sigma confidence plane nx ny nz red green blue".split()
 
 
 def small_ring() -> ps.Rig:
@@ -88,7 +88,7 @@ class PackageTest(unittest.TestCase):
         points = self.scene.result.points
         content = (self.scene.folder / "out" / "000000" / "points.ply").read_bytes()
         header, body = content.split(b"end_header\n", 1)
-        types = {b"float": "<f4", b"uchar": "u1", b"ushort": "<u2"}
+        types = {b"float": "<f4", b"uchar": "u1", b"int": "<i4"}
         fields = [
             (words[2].decode(), types[words[1]])
             for words in (line.split() for line in header.splitlines())
@@ -96,7 +96,9 @@ class PackageTest(unittest.TestCase):
         ]
         stored = np.frombuffer(body, dtype=fields)
         for name in POINT_PROPERTIES:
-            self.assertEqual(points[name].tobytes(), stored[name].tobytes(), name)
+            self.assertTrue((points[name] == stored[name]).all(), name)
+        self.assertEqual((points.normal.shape, points.color.shape), (points.xyz.shape, points.xyz.shape))
+        self.assertGreater((np.abs(np.linalg.norm(points.normal, axis=1) - 1) < 1e-5).mean(), 0.9)
         self.assertEqual(points.xyz.dtype, np.float32)
         self.assertEqual(points.xyz.shape, (len(stored), 3))
 

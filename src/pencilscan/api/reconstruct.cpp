@@ -111,7 +111,7 @@ Reconstruction reconstruct(const Rig& rig, const Images& images,
     points.progress = shape.progress = progress;
     FrameResult found = reconstruct_frame(rig, frame, points, shape, options.mesh);
     result.report = json_text(frame_report(rig, frame, found.points, found.shape));
-    result.curves = describe_curves(found.points);
+    result.curves = describe_curves(rig, found.points);
     if (options.depth_maps) result.depth = depth_of(rig, found.shape.depth);
     result.points = std::move(found.points.points);
     result.mesh = std::move(found.shape.surface.mesh);

@@ -12,17 +12,22 @@
 namespace pencilscan {
 namespace {
 
+// No uint and no ushort, which Open3D does not read into tensors.
 constexpr const char* kVertexHeader =
-    "property float u\nproperty float v\nproperty float sigma_px\nproperty float amplitude\n"
-    "property uchar camera\nproperty uint curve\nproperty uchar family\nproperty uchar color\n"
+    "property float x\nproperty float y\nproperty float z\nproperty float u\nproperty float "
+    "v\nproperty float sigma_px\nproperty float amplitude\n"
+    "property uchar camera\nproperty int curve\nproperty uchar family\nproperty uchar color\n"
     "property float color_lead\nproperty uchar state\nproperty uchar projector\n"
-    "property uchar pattern\nproperty ushort line\nproperty float confidence\n";
+    "property uchar pattern\nproperty int line\nproperty float confidence\n"
+    "property uchar red\nproperty uchar green\nproperty uchar blue\n";
+constexpr const char* kEdgeHeader = "property int vertex1\nproperty int vertex2\n";
 constexpr const char* kCrossingHeader =
-    "property float u\nproperty float v\nproperty uchar camera\nproperty uint curve_a\n"
-    "property uint curve_b\n";
+    "property float u\nproperty float v\nproperty uchar camera\nproperty int curve_a\n"
+    "property int curve_b\n";
 
 void append(std::string& bytes, const CurveSample& s) {
-  for (const float value : {s.u, s.v, s.sigma_px, s.amplitude}) append_little_endian(bytes, value);
+  for (const float value : {s.x, s.y, s.z, s.u, s.v, s.sigma_px, s.amplitude})
+    append_little_endian(bytes, value);
   append_little_endian(bytes, s.camera);
   append_little_endian(bytes, s.curve);
   append_little_endian(bytes, s.family);
@@ -31,8 +36,30 @@ void append(std::string& bytes, const CurveSample& s) {
   append_little_endian(bytes, static_cast<std::uint8_t>(s.state));
   append_little_endian(bytes, s.projector);
   append_little_endian(bytes, s.pattern);
-  append_little_endian(bytes, s.line);
+  append_little_endian(bytes, static_cast<std::int32_t>(s.line));
   append_little_endian(bytes, s.confidence);
+  for (const auto value : {s.red, s.green, s.blue}) append_little_endian(bytes, value);
+}
+
+/// From a sample to the next one of its curve; places in the file.
+struct CurveEdge {
+  std::int32_t vertex1 = 0;
+  std::int32_t vertex2 = 0;
+};
+
+void append(std::string& bytes, const CurveEdge& edge) {
+  append_little_endian(bytes, edge.vertex1);
+  append_little_endian(bytes, edge.vertex2);
+}
+
+std::vector<CurveEdge> edges_of(const std::vector<CurveSample>& samples) {
+  std::vector<CurveEdge> edges;
+  for (std::size_t i = 1; i < samples.size(); ++i) {
+    const CurveSample& before = samples[i - 1];
+    if (samples[i].camera == before.camera && samples[i].curve == before.curve)
+      edges.push_back({static_cast<std::int32_t>(i - 1), static_cast<std::int32_t>(i)});
+  }
+  return edges;
 }
 
 void append(std::string& bytes, const CurveCrossing& crossing) {
@@ -92,12 +119,15 @@ constexpr double kAnyFloat = 0;  // unused for floats
 }  // namespace
 
 void write_curves(const std::filesystem::path& path, const CurveFile& curves) {
+  const std::vector<CurveEdge> edges = edges_of(curves.samples);
   write_atomically(path, [&](std::ostream& stream) {
     stream << "ply\nformat binary_little_endian 1.0\ncomment detected curves, camera pixels\n"
            << "element vertex " << curves.samples.size() << "\n"
-           << kVertexHeader << "element crossing " << curves.crossings.size() << "\n"
+           << kVertexHeader << "element edge " << edges.size() << "\n"
+           << kEdgeHeader << "element crossing " << curves.crossings.size() << "\n"
            << kCrossingHeader << "end_header\n";
     write_items(stream, curves.samples);
+    write_items(stream, edges);
     write_items(stream, curves.crossings);
   });
 }

@@ -20,6 +20,8 @@ enum class CurveState : std::uint8_t {
 /// One sub-pixel point of a detected curve: a vertex of curves.ply (docs/formats.md). Points of one
 /// curve follow each other.
 struct CurveSample {
+  /// For viewers, world, mm: the pixel on a picture of the camera that stands before the object.
+  float x = 0, y = 0, z = 0;
   float u = 0, v = 0;       ///< camera pixel
   float sigma_px = 0;       ///< one standard deviation across the curve
   float amplitude = 0;      ///< height of the line above its surroundings
@@ -33,6 +35,8 @@ struct CurveSample {
   std::uint8_t pattern = 0;
   std::uint16_t line = 0;
   float confidence = 0;  ///< of the label, 0..1
+  /// For viewers (sRGB): the colour of the line that the label names, grey where there is none.
+  std::uint8_t red = 0, green = 0, blue = 0;
 };
 
 /// Where two curves of a camera cross.
@@ -48,9 +52,11 @@ struct CurveFile {
   std::vector<CurveCrossing> crossings;
 };
 
-/// Writes curves.ply, binary little endian: elements `vertex` and `crossing`. Whole or not at all.
+/// Writes curves.ply, binary little endian: elements `vertex`, `edge` (neighbours on a curve, which
+/// viewers draw as lines) and `crossing`. Whole or not at all.
 void write_curves(const std::filesystem::path& path, const CurveFile& curves);
-/// Reads what write_curves() wrote; InputError when a property is missing or out of range.
+/// Reads what write_curves() wrote, but for what is for viewers; InputError when a property is
+/// missing or out of range.
 [[nodiscard]] CurveFile read_curves(const std::filesystem::path& path);
 
 }  // namespace pencilscan

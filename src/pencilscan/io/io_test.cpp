@@ -411,6 +411,11 @@ TEST_F(Io, CurvesComeBackAsWritten) {
   EXPECT_EQ(last.confidence, 0.875F);
   ASSERT_EQ(read.crossings.size(), 1U);
   EXPECT_EQ(read.crossings[0].curve_b, 70'000U);
+  const PlyFile file = read_ply(folder_ / "curves.ply");
+  const PlyElement* edges = file.find("edge");
+  ASSERT_NE(edges, nullptr);
+  EXPECT_THAT(edges->find("vertex1")->values, ::testing::ElementsAre(0, 1));
+  EXPECT_THAT(edges->find("vertex2")->values, ::testing::ElementsAre(1, 2));
 }
 
 TEST_F(Io, CurvesWithStatesThatDoNotExistAreRefused) {

@@ -1,5 +1,6 @@
 #include "pencilscan/labeling/point_file.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <string>
@@ -12,17 +13,34 @@
 namespace pencilscan {
 namespace {
 
-void append_point(std::string& bytes, const MeasuredPoint& point) {
+/// What is known of some point.
+struct KnownProperties {
+  bool normals = false;
+  bool colors = false;
+};
+
+KnownProperties known_of(const std::vector<MeasuredPoint>& points) {
+  const auto any = [&](auto has) { return std::any_of(points.begin(), points.end(), has); };
+  return {any([](const MeasuredPoint& p) { return p.nx != 0 || p.ny != 0 || p.nz != 0; }),
+          any([](const MeasuredPoint& p) { return p.red != 0 || p.green != 0 || p.blue != 0; })};
+}
+
+void append_point(std::string& bytes, const MeasuredPoint& point, const KnownProperties& known) {
   for (const float value : {point.x, point.y, point.z, point.u, point.v}) {
     append_little_endian(bytes, value);
   }
   append_little_endian(bytes, point.camera);
   append_little_endian(bytes, point.projector);
   append_little_endian(bytes, point.pattern);
-  append_little_endian(bytes, point.line);
+  append_little_endian(bytes, static_cast<std::int32_t>(point.line));
   for (const float value : {point.sigma, point.confidence, point.plane}) {
     append_little_endian(bytes, value);
   }
+  if (known.normals)
+    for (const float value : {point.nx, point.ny, point.nz}) append_little_endian(bytes, value);
+  if (known.colors)
+    for (const auto value : {point.red, point.green, point.blue})
+      append_little_endian(bytes, value);
 }
 
 /// Access to the scalar properties of one vertex element, with the errors of a user's file.
@@ -70,6 +88,7 @@ class Columns {
 }  // namespace
 
 void write_points(const std::filesystem::path& path, const std::vector<MeasuredPoint>& points) {
+  const KnownProperties known = known_of(points);
   write_atomically(path, [&](std::ostream& stream) {
     stream << "ply\nformat binary_little_endian 1.0\ncomment unit mm, world frame of rig.json\n"
            << "element vertex " << points.size() << "\n";
@@ -77,14 +96,16 @@ void write_points(const std::filesystem::path& path, const std::vector<MeasuredP
     for (const char* name : {"camera", "projector", "pattern"}) {
       stream << "property uchar " << name << "\n";
     }
-    stream << "property ushort line\n";
+    stream << "property int line\n";  // Open3D reads no ushort into tensors
     for (const char* name : {"sigma", "confidence", "plane"}) {
       stream << "property float " << name << "\n";
     }
+    if (known.normals) stream << "property float nx\nproperty float ny\nproperty float nz\n";
+    if (known.colors) stream << "property uchar red\nproperty uchar green\nproperty uchar blue\n";
     stream << "end_header\n";
     std::string bytes;
     for (const MeasuredPoint& point : points) {
-      append_point(bytes, point);
+      append_point(bytes, point, known);
       if (bytes.size() > (std::size_t{1} << 16)) {
         stream << bytes;
         bytes.clear();

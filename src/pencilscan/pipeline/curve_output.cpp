@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <opencv2/core.hpp>
 
+#include "pencilscan/core/chunks.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/io/image.h"
+#include "pencilscan/io/srgb.h"
 #include "pencilscan/report/overlay.h"
 #include "pencilscan/rig/camera_light.h"
 
@@ -61,9 +63,45 @@ void add_samples(const GridGraph& graph, std::uint8_t camera, std::vector<CurveS
   }
 }
 
+/// As a screen shows it: of the label's line, or grey.
+void put_look(const Rig& rig, CurveSample& sample) {
+  constexpr Rgb kGrey = {0.2, 0.2, 0.2};
+  const Rgb light = sample.state == CurveState::kLabelled
+                        ? rig.pattern({sample.projector, sample.pattern}).color(sample.line)
+                        : kGrey;
+  sample.red = to_srgb_byte(light[0]);
+  sample.green = to_srgb_byte(light[1]);
+  sample.blue = to_srgb_byte(light[2]);
+}
+
+/// Where a camera's ray meets its standing picture, `depth` before it.
+void put_place(const Camera& camera, double depth, CurveSample& sample) {
+  const Ray ray = camera.ray(Vec2(static_cast<double>(sample.u), static_cast<double>(sample.v)));
+  const double along_axis = camera.forward().dot(ray.direction);
+  const Vec3 x = ray.origin + depth / along_axis * ray.direction;
+  sample.x = static_cast<float>(x.x());
+  sample.y = static_cast<float>(x.y());
+  sample.z = static_cast<float>(x.z());
+}
+
+void put_looks(const Rig& rig, std::vector<CurveSample>& samples) {
+  constexpr double kLeastShare = 0.5;  // of the way to the centre, for cameras near the volume
+  const Sphere volume = working_volume(rig);
+  std::vector<double> depths;
+  for (const Camera& camera : rig.cameras) {
+    const double center = camera.forward().dot(volume.center - camera.center());
+    depths.push_back(std::max(center - volume.radius, kLeastShare * std::abs(center)));
+  }
+  parallel_chunks(samples.size(), [&](std::size_t i) {
+    CurveSample& sample = samples[i];
+    put_look(rig, sample);
+    put_place(rig.cameras[sample.camera], depths[sample.camera], sample);
+  });
+}
+
 }  // namespace
 
-CurveFile describe_curves(const PointResult& points) {
+CurveFile describe_curves(const Rig& rig, const PointResult& points) {
   CurveFile file;
   for (std::size_t c = 0; c < points.graphs.size(); ++c) {
     const GridGraph& graph = points.graphs[c];
@@ -95,6 +133,7 @@ CurveFile describe_curves(const PointResult& points) {
                                 static_cast<std::uint32_t>(crossing.curve_b)});
     }
   }
+  put_looks(rig, file.samples);
   return file;
 }
 

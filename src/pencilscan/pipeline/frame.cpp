@@ -380,7 +380,8 @@ void look_again(const Rig& stated, const PointOptions& options, PointResult& poi
   const std::vector<MeasuredPoint> triangulated =
       triangulate(rig, points.graphs, points.labeling, options.triangulation);
   SettledPoints settled = settle_on_surface(
-      rig, *shape.scene, settle_points(rig, triangulated, surfaces, options.settle));
+      rig, *shape.scene, settle_points(rig, triangulated, surfaces, options.settle),
+      shape.surface.mesh.color);
   points.points = std::move(settled.points);
   points.contradicted += settled.contradicted;
   SurfaceReport& report = shape.surface.report;

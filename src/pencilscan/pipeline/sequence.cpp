@@ -116,7 +116,7 @@ void write_frame(const Rig& rig, const FrameSource& frames, std::size_t index,
       reconstruct_frame(rig, frame, options.points, options.shape, options.meshes);
   const SurfaceResult& surface = shape.surface;
   write_points(folder / "points.ply", points.points);
-  write_curves(folder / "curves.ply", describe_curves(points));
+  write_curves(folder / "curves.ply", describe_curves(rig, points));
   if (options.meshes) {
     write_mesh(folder / "mesh.ply", surface.mesh);
     write_mesh(folder / "mesh_measured.ply", surface.measured);

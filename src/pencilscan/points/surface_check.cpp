@@ -7,6 +7,7 @@
 
 #include "pencilscan/core/check.h"
 #include "pencilscan/core/chunks.h"
+#include "pencilscan/io/srgb.h"
 
 namespace pencilscan {
 namespace {
@@ -72,6 +73,31 @@ class SurfaceCheck {
   const RayScene& surface_;
 };
 
+/// Gives a point the normal of the surface where it lies, between those of the face's vertices, and
+/// its colour.
+void take_looks(const TriangleMesh& mesh, std::span<const Vec3> normals,
+                std::span<const std::array<float, 3>> colors, const RayScene::Hit& hit,
+                MeasuredPoint& point) {
+  Vec3 normal = Vec3::Zero();
+  Vec3 color = Vec3::Zero();
+  for (std::size_t k = 0; k < 3; ++k) {
+    const auto v = static_cast<std::size_t>(mesh.faces[hit.face][k]);
+    const double weight = hit.barycentric[static_cast<Eigen::Index>(k)];
+    normal += weight * normals[v];
+    if (!colors.empty())
+      for (std::size_t i = 0; i < 3; ++i)
+        color[static_cast<Eigen::Index>(i)] += weight * static_cast<double>(colors[v][i]);
+  }
+  if (normal.isZero()) return;
+  normal.normalize();
+  point.nx = static_cast<float>(normal.x());
+  point.ny = static_cast<float>(normal.y());
+  point.nz = static_cast<float>(normal.z());
+  point.red = to_srgb_byte(color.x());
+  point.green = to_srgb_byte(color.y());
+  point.blue = to_srgb_byte(color.z());
+}
+
 }  // namespace
 
 std::size_t drop_contradicted(const Rig& rig, const RayScene& surface,
@@ -124,7 +150,8 @@ std::size_t drop_contradicted(const Rig& rig, const RayScene& surface,
 }
 
 SettledPoints settle_on_surface(const Rig& rig, const RayScene& surface,
-                                std::span<const MeasuredPoint> points) {
+                                std::span<const MeasuredPoint> points,
+                                std::span<const std::array<float, 3>> colors) {
   constexpr double kFarthest = 4;  // deviations of the difference
   constexpr double kLeastCosine = 0.2;
   // Shares of what the surface says and of its difference from the point: on rendered bunnies, a
@@ -135,7 +162,9 @@ SettledPoints settle_on_surface(const Rig& rig, const RayScene& surface,
   constexpr double kOffSurface = 1.5;
   const TriangleMesh& mesh = surface.mesh();
   PENCILSCAN_CHECK(mesh.sigma.size() == mesh.vertices.size() &&
-                   mesh.confidence.size() == mesh.vertices.size());
+                   mesh.confidence.size() == mesh.vertices.size() &&
+                   (colors.empty() || colors.size() == mesh.vertices.size()));
+  const std::vector<Vec3> normals = vertex_normals(mesh);
   const SurfaceCheck check(rig, surface);
   SettledPoints settled;
   settled.points.assign(points.begin(), points.end());
@@ -165,6 +194,7 @@ SettledPoints settle_on_surface(const Rig& rig, const RayScene& surface,
     p.y = static_cast<float>(hit->point.y());
     p.z = static_cast<float>(hit->point.z());
     p.sigma = static_cast<float>(std::hypot(kOfSurface * of_surface, kOfDifference * difference));
+    take_looks(mesh, normals, colors, *hit, p);
   });
   std::size_t count = 0;
   for (std::size_t i = 0; i < keep.size(); ++i) {

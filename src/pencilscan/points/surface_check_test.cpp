@@ -3,9 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "pencilscan/core/median.h"
+#include "pencilscan/io/srgb.h"
 #include "pencilscan/labeling/two_projector_scene.h"
 #include "pencilscan/points/triangulate.h"
 
@@ -107,6 +109,33 @@ TEST_F(SurfaceCheckTest, PointsSettleOnTheSurfaceAndTheirSigmaTellsOfTheWayThere
   EXPECT_GT(errors.size(), before.size() / 2);
   EXPECT_GT(moved_far, 20U) << "the noise of the curves ought to be seen";
   EXPECT_LT(upper_median(std::move(errors)), 0.01);
+}
+
+TEST_F(SurfaceCheckTest, PointsHaveTheNormalAndTheColourOfTheSurface) {
+  // Lighter from one side of the surface to the other.
+  std::vector<std::array<float, 3>> colors;
+  for (const Vec3& x : mesh_.vertices)
+    colors.push_back({static_cast<float>(0.5 + x.y() / 200), 0.25F, 0.5F});
+  const SettledPoints settled = settle_on_surface(rig, RayScene(mesh_), points(), colors);
+  std::size_t known = 0;
+  for (std::size_t i = 0; i < settled.points.size(); ++i) {
+    const MeasuredPoint& p = settled.points[i];
+    const Vec3 normal(p.nx, p.ny, p.nz);
+    EXPECT_EQ(normal.isZero(), settled.on_surface[i] == 0);
+    if (settled.on_surface[i] == 0) continue;
+    ++known;
+    constexpr double kStep = 0.5;  // mm
+    const Vec3 along_y = surface(p.y + kStep, p.z) - surface(p.y - kStep, p.z);
+    const Vec3 along_z = surface(p.y, p.z + kStep) - surface(p.y, p.z - kStep);
+    constexpr double kSameDirection = 0.995;  // 6 degrees: the mesh is coarse
+    EXPECT_NEAR(normal.norm(), 1, 1e-6);
+    EXPECT_GT(normal.dot(along_y.cross(along_z).normalized()), kSameDirection);
+    EXPECT_NEAR(from_srgb(p.red / 255.0), 0.5 + p.y / 200.0, 0.01);
+    EXPECT_EQ(p.green, to_srgb_byte(0.25));
+  }
+  EXPECT_GT(known, settled.points.size() / 2);
+  const SettledPoints colorless = settle_on_surface(rig, RayScene(mesh_), points());
+  EXPECT_EQ(colorless.points.front().green, 0);
 }
 
 }  // namespace
