@@ -55,6 +55,45 @@ TEST(ParallelFor, StopsNestedLoopsWhenAsked) {
   EXPECT_EQ(bodies, 0);
 }
 
+TEST(RunAtOnce, KeepsToItsNumberAndDoesAll) {
+  std::atomic<int> now{0};
+  std::atomic<int> most{0};
+  std::vector<int> visits(40, 0);
+  run_at_once(visits.size(), 3, [&](std::size_t i) {
+    const int here = ++now;
+    for (int seen = most; here > seen && !most.compare_exchange_weak(seen, here);) {
+    }
+    parallel_for(10, [](std::size_t) {});
+    ++visits[i];
+    --now;
+  });
+  EXPECT_LE(most, 3);
+  EXPECT_EQ(std::accumulate(visits.begin(), visits.end(), 0), 40);
+  EXPECT_EQ(*std::max_element(visits.begin(), visits.end()), 1);
+}
+
+TEST(RunAtOnce, PassesTheFirstExceptionOnAndStartsNoMore) {
+  std::atomic<int> started{0};
+  try {
+    run_at_once(1000, 2, [&](std::size_t i) {
+      ++started;
+      if (i >= 3) throw StageError(std::to_string(i));
+    });
+    FAIL() << "nothing was thrown";
+  } catch (const StageError& error) {
+    EXPECT_STREQ(error.what(), "3");
+  }
+  EXPECT_LE(started, 5);
+}
+
+TEST(RunAtOnce, HearsThatItIsToStop) {
+  std::atomic<bool> stop{false};
+  const CancelScope scope(stop);
+  std::atomic<int> bodies{0};
+  EXPECT_THROW(run_at_once(1000, 2, [&](std::size_t) { stop = ++bodies > 5; }), Cancelled);
+  EXPECT_LT(bodies, 10);
+}
+
 TEST(Random, NormalHasUnitVarianceAndUniformItsMoments) {
   Random random(7);
   double sum = 0;

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <exception>
 #include <mutex>
+#include <optional>
 #include <thread>
 #include <vector>
 
@@ -59,6 +60,36 @@ void parallel_for(std::size_t count, const std::function<void(std::size_t)>& bod
   });
   // An exception elsewhere ends oneTBB's nested loops early and silently.
   stop_if_cancelled();
+}
+
+void run_at_once(std::size_t count, std::size_t at_once,
+                 const std::function<void(std::size_t)>& body) {
+  const std::atomic<bool>* stop = current_stop;
+  std::atomic<std::size_t> next{0};
+  std::mutex mutex;
+  std::size_t failed = count;
+  std::exception_ptr failure;
+  const auto work = [&] {
+    std::optional<CancelScope> scope;
+    if (stop != nullptr) scope.emplace(*stop);
+    for (std::size_t i = next++; i < count; i = next++) {
+      try {
+        stop_if_cancelled();
+        body(i);
+      } catch (...) {
+        const std::lock_guard lock(mutex);
+        next = count;
+        if (i >= failed) return;
+        failed = i;
+        failure = std::current_exception();
+      }
+    }
+  };
+  std::vector<std::thread> others;
+  for (std::size_t t = 1; t < std::min(at_once, count); ++t) others.emplace_back(work);
+  work();
+  for (std::thread& thread : others) thread.join();
+  if (failure) std::rethrow_exception(failure);
 }
 
 #ifdef PENCILSCAN_STD_THREADS

@@ -25,4 +25,11 @@ class ThreadLimit {
 /// The first exception by index of detection is rethrown.
 void parallel_for(std::size_t count, const std::function<void(std::size_t)>& body);
 
+/// Calls body(i) for i in [0, count), started in that order, at most `at_once` (>= 1) at a time,
+/// each with parallel loops of its own: for long tasks that alone do not keep all threads busy.
+/// After an exception no other one is started, and that of the smallest index is rethrown when all
+/// have ended.
+void run_at_once(std::size_t count, std::size_t at_once,
+                 const std::function<void(std::size_t)>& body);
+
 }  // namespace pencilscan

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <string>
 
+#include "pencilscan/core/parallel.h"
 #include "pencilscan/depth/depth_image.h"
 #include "pencilscan/io/image.h"
 #include "pencilscan/report/palette.h"
@@ -76,11 +77,12 @@ void write_depth_maps(const fs::path& folder, const Rig& rig, const ShapeResult&
 }
 
 void write_hole_pictures(const fs::path& folder, const Rig& rig, const ShapeResult& shape) {
-  std::vector<Picture> pictures;
-  for (const DepthMap& map : shape.depth.maps) {
-    const Camera& camera = rig.cameras[static_cast<std::size_t>(map.camera)];
-    pictures.push_back({camera.name + "_holes", hole_picture(camera, map)});
-  }
+  const std::vector<DepthMap>& maps = shape.depth.maps;
+  std::vector<Picture> pictures(maps.size());
+  parallel_for(maps.size(), [&](std::size_t i) {
+    const Camera& camera = rig.camera(maps[i].camera);
+    pictures[i] = {camera.name + "_holes", hole_picture(camera, maps[i])};
+  });
   write_pictures(folder, pictures);
 }
 

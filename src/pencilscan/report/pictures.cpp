@@ -5,6 +5,7 @@
 #include <limits>
 #include <numbers>
 
+#include "pencilscan/core/parallel.h"
 #include "pencilscan/io/image.h"
 #include "pencilscan/report/overlay.h"
 #include "pencilscan/report/shaded_view.h"
@@ -170,9 +171,9 @@ std::vector<Picture> make_pictures(const FrameResults& results, const PictureOpt
 }
 
 void write_pictures(const std::filesystem::path& folder, std::span<const Picture> pictures) {
-  for (const Picture& picture : pictures) {
-    write_image(folder / (picture.name + ".png"), picture.image);
-  }
+  parallel_for(pictures.size(), [&](std::size_t i) {
+    write_image(folder / (pictures[i].name + ".png"), pictures[i].image);
+  });
 }
 
 }  // namespace pencilscan

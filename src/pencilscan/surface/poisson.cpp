@@ -4,6 +4,7 @@
 #include <open3d/geometry/TriangleMesh.h>
 #include <open3d/utility/Logging.h>
 
+#include <mutex>
 #include <utility>
 
 #include "pencilscan/core/error.h"
@@ -11,6 +12,9 @@
 namespace pencilscan {
 
 TriangleMesh poisson_surface(std::span<const SurfaceSample> samples, int depth, double scale) {
+  // Open3D's threads and its level of messages are the process's, not the caller's.
+  static std::mutex one_at_a_time;
+  const std::lock_guard lock(one_at_a_time);
   const open3d::utility::VerbosityContextManager quiet(open3d::utility::VerbosityLevel::Error);
   open3d::geometry::PointCloud cloud;
   cloud.points_.reserve(samples.size());
