@@ -4,7 +4,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <cctype>
 #include <map>
 #include <set>
 #include <thread>
@@ -12,6 +11,7 @@
 #include "pencilscan/core/child_process.h"
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/host_clock.h"
+#include "pencilscan/core/lower_case.h"
 #include "pencilscan/io/file.h"
 #include "pencilscan/io/image.h"
 
@@ -24,9 +24,7 @@ constexpr auto kLook = std::chrono::milliseconds(20);  ///< between looks into a
 constexpr Seconds kLongestShot{30};                    ///< a program may take for a picture
 
 bool is_picture(const fs::path& path) {
-  std::string ending = path.extension().string();
-  std::transform(ending.begin(), ending.end(), ending.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const std::string ending = lower_case(path.extension().string());
   static const std::set<std::string> known{".png", ".tif", ".tiff", ".jpg", ".jpeg", ".bmp"};
   return known.contains(ending) && !path.filename().string().starts_with('.');
 }

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "pencilscan/calibration/from_captures.h"
+#include "pencilscan/cli/arguments.h"
 #include "pencilscan/cli/command.h"
 #include "pencilscan/cli/device_arguments.h"
 #include "pencilscan/core/error.h"
@@ -159,12 +160,12 @@ void add_calibrate_command(CLI::App& app) {
       ->add_option("--focal-tolerance", options->focal_tolerance_percent,
                    "How far off given focal lengths may be, one standard deviation in per cent; 0: "
                    "they are exact")
-      ->check(CLI::Range(0.0, 100.0))
+      ->check(between(0.0, 100.0))
       ->capture_default_str();
   command
       ->add_option("--center-tolerance", options->center_tolerance_px,
                    "The same of given principal points, px")
-      ->check(CLI::Range(0.0, 10000.0))
+      ->check(between(0.0, 10000.0))
       ->capture_default_str();
   command->add_flag("--keep-unusable", options->keep_unusable,
                     "Write an unusable rig, too: rig.unusable.json for --out rig.json");

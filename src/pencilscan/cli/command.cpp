@@ -1,7 +1,6 @@
 #include "pencilscan/cli/command.h"
 
 #include <algorithm>
-#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <iomanip>
@@ -10,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "pencilscan/core/formatted.h"
 #include "pencilscan/io/file.h"
 
 namespace pencilscan::cli {
@@ -35,9 +35,7 @@ void flatten(const Json& value, const std::string& prefix,
       flatten(entry, prefix.empty() ? key : prefix + "." + key, lines);
     }
   } else if (value.is_number_float()) {
-    char text[32];
-    std::snprintf(text, sizeof text, "%.6g", value.get<double>());
-    lines.emplace_back(prefix, text);
+    lines.emplace_back(prefix, formatted(value.get<double>(), "%.6g"));
   } else if (value.is_string()) {
     lines.emplace_back(prefix, value.get<std::string>());
   } else {

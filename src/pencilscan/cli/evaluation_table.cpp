@@ -2,13 +2,14 @@
 
 #include <algorithm>
 #include <array>
-#include <cstdio>
 #include <iomanip>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
+
+#include "pencilscan/core/formatted.h"
 
 namespace pencilscan::cli {
 namespace {
@@ -80,9 +81,7 @@ std::string text_of(const Json& value) {
     return text;
   }
   if (!value.is_number_float()) return value.is_string() ? value.get<std::string>() : value.dump();
-  std::array<char, 32> text{};
-  std::snprintf(text.data(), text.size(), "%.6g", value.get<double>());
-  return text.data();
+  return formatted(value.get<double>(), "%.6g");
 }
 
 void print_keys(const Json& figures, std::ostream& out) {

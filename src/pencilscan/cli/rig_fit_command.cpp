@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
+#include "pencilscan/cli/arguments.h"
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/pipeline/frame_source.h"
@@ -45,7 +46,7 @@ void add_rig_fit_options(CLI::App& command, RigFitCommand& options) {
   command.add_option("--frames", options.frames,
                      "Folder of frame folders, or a recording: does the rig still fit them?");
   command.add_option("--frame-count", options.frame_count, "Frames to look at, evenly picked")
-      ->check(CLI::Range(1, 1000))
+      ->check(between(1, 1000))
       ->capture_default_str();
   command.add_option("--put-back", options.put_back,
                      "Write the rig with the devices that moved put back (rig.json)");

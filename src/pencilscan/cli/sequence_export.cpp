@@ -1,6 +1,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "pencilscan/cli/arguments.h"
 #include "pencilscan/cli/command.h"
 #include "pencilscan/cli/sequence_jobs.h"
 #include "pencilscan/core/error.h"
@@ -49,7 +50,7 @@ void add_sequence_export(CLI::App& group) {
   command->add_option("--usd", options->usd,
                       "USD text with time samples for Blender and Houdini (film.usda)");
   command->add_option("--frames-per-second", options->frames_per_second, "Of the film")
-      ->check(CLI::Range(0.001, 1e6))
+      ->check(between(0.001, 1e6))
       ->capture_default_str();
   command->add_flag("--measured", options->measured_only,
                     "What was measured, without what closes the surface");

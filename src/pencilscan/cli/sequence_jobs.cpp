@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "pencilscan/cli/arguments.h"
 #include "pencilscan/cli/command.h"
 #include "pencilscan/cli/interruption.h"
 #include "pencilscan/cli/reconstruct_options.h"
@@ -193,7 +194,7 @@ void add_submit(CLI::App& group) {
   CLI::App* command = group.add_subcommand(
       "submit", "Reconstruct on several processes, machines, or with Slurm; then finish");
   command->add_option("--local", options->local, "So many processes on this machine")
-      ->check(CLI::Range(1, 4096));
+      ->check(between(1, 4096));
   command
       ->add_option("--ssh", options->hosts,
                    "Machines that see the same folders, with commas; one task each at a time")
@@ -205,12 +206,12 @@ void add_submit(CLI::App& group) {
       ->add_option("--max-tasks", options->max_tasks,
                    "Slurm's MaxArraySize is 1001 as it comes; tasks of longer sequences take "
                    "several chunks of 50 frames")
-      ->check(CLI::Range(1, 1000000))
+      ->check(between(1, 1000000))
       ->capture_default_str();
   command
       ->add_option("--retries", options->retries,
                    "How often a task that was killed is started again")
-      ->check(CLI::Range(0, 100))
+      ->check(between(0, 100))
       ->capture_default_str();
   command->add_option("--sbatch", options->sbatch,
                       "A further option for sbatch, such as --sbatch=--partition=long");
@@ -256,7 +257,7 @@ void add_finish(CLI::App& group) {
   command
       ->add_option("--rounds", options->rounds,
                    "Slurm: how often the job that finishes may itself resubmit")
-      ->check(CLI::Range(0, 100))
+      ->check(between(0, 100))
       ->capture_default_str();
   add_common_options(*command, options->common, "pencilscan sequence finish --out result");
   command->callback([options] { run_finish(*options); });

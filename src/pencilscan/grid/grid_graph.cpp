@@ -91,6 +91,12 @@ void find_components(GridGraph& graph) {
 
 }  // namespace
 
+std::size_t curve_points(const GridGraph& graph) {
+  std::size_t count = 0;
+  for (const Curve& curve : graph.curves) count += curve.points.size();
+  return count;
+}
+
 GridGraph build_grid_graph(const Rig& rig, const std::vector<ColorFamily>& families, int camera,
                            std::vector<Curve> curves, const GridOptions& options) {
   GridGraph graph;

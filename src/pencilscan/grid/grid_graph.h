@@ -28,6 +28,8 @@ struct GridGraph {
   std::size_t cut_connections = 0;  ///< wrong connections cut by code or neighbours
 };
 
+[[nodiscard]] std::size_t curve_points(const GridGraph& graph);
+
 struct GridOptions {
   bool identify = true;         ///< decide pattern and local ID of each curve on its own
   double min_angle_rad = 0.26;  ///< flatter crossings are not used

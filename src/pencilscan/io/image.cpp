@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cstring>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
@@ -12,6 +11,7 @@
 
 #include "pencilscan/core/check.h"
 #include "pencilscan/core/error.h"
+#include "pencilscan/core/lower_case.h"
 #include "pencilscan/io/file.h"
 
 namespace pencilscan {
@@ -98,10 +98,7 @@ cv::Mat encodable(const cv::Mat& image, const std::string& ending, int bit_depth
 }
 
 std::string lower_ending(const std::filesystem::path& path) {
-  std::string ending = path.extension().string();
-  std::transform(ending.begin(), ending.end(), ending.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return ending;
+  return lower_case(path.extension().string());
 }
 
 }  // namespace

@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
@@ -7,6 +6,7 @@
 #include <string>
 
 #include "pencilscan/core/error.h"
+#include "pencilscan/core/lower_case.h"
 #include "pencilscan/io/file.h"
 #include "pencilscan/io/little_endian.h"
 #include "pencilscan/io/mesh_file.h"
@@ -161,9 +161,7 @@ std::string glb_bytes(const TriangleMesh& mesh) {
 }  // namespace
 
 void export_mesh(const std::filesystem::path& path, const TriangleMesh& mesh) {
-  std::string ending = path.extension().string();
-  std::transform(ending.begin(), ending.end(), ending.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const std::string ending = lower_case(path.extension().string());
   std::string bytes;
   if (ending == ".obj") {
     bytes = obj_text(mesh);

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <assimp/Importer.hpp>
-#include <cctype>
 #include <cmath>
 #include <map>
 #include <span>
@@ -13,6 +12,7 @@
 
 #include "pencilscan/core/check.h"
 #include "pencilscan/core/error.h"
+#include "pencilscan/core/lower_case.h"
 #include "pencilscan/io/file.h"
 #include "pencilscan/io/little_endian.h"
 #include "pencilscan/io/ply.h"
@@ -170,9 +170,7 @@ void check_mesh(const std::filesystem::path& path, const TriangleMesh& mesh) {
 }  // namespace
 
 TriangleMesh read_mesh(const std::filesystem::path& path) {
-  std::string ending = path.extension().string();
-  std::transform(ending.begin(), ending.end(), ending.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const std::string ending = lower_case(path.extension().string());
   TriangleMesh mesh;
   if (ending == ".ply") {
     mesh = read_ply_mesh(path);

@@ -25,7 +25,7 @@ SequenceDevices devices_of_output(const fs::path& out) {
 /// Why there is nothing, as far as the log of its task says.
 std::string why_missing(const fs::path& out, std::size_t row, std::size_t tasks) {
   if (tasks == 0) return "was not made";
-  const std::size_t task = row / kChunkFrames % tasks;
+  const std::size_t task = shard_of(row, tasks);
   const std::string last = last_log_line(out, task);
   return "was not made by task " + std::to_string(task) +
          (last.empty() ? ", which has not said anything" : ", whose log ends: " + last);
@@ -41,7 +41,7 @@ std::vector<Hole> holes_of(const fs::path& out, const std::vector<FrameRow>& row
       case FrameState::kDone:
         break;
       case FrameState::kMissing: {
-        std::string& reason = of_task[tasks == 0 ? 0 : i / kChunkFrames % tasks];
+        std::string& reason = of_task[tasks == 0 ? 0 : shard_of(i, tasks)];
         if (reason.empty()) reason = why_missing(out, i, tasks);
         holes.push_back({i, "missing", reason, true});
         break;
@@ -83,7 +83,7 @@ SequenceSummary summarize_sequence(const fs::path& out) {
 std::vector<std::size_t> tasks_with_holes(const SequenceSummary& summary, std::size_t tasks) {
   std::vector<char> has_hole(tasks, 0);
   for (const Hole& hole : summary.holes) {
-    if (hole.may_fill) has_hole[hole.row / kChunkFrames % tasks] = 1;
+    if (hole.may_fill) has_hole[shard_of(hole.row, tasks)] = 1;
   }
   std::vector<std::size_t> result;
   for (std::size_t i = 0; i < tasks; ++i) {

@@ -1,8 +1,8 @@
 #include <cmath>
-#include <cstdio>
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "pencilscan/core/formatted.h"
 #include "pencilscan/io/file.h"
 #include "pencilscan/jobs/finish.h"
 
@@ -16,10 +16,7 @@ using Columns = std::vector<std::pair<std::string, double>>;
 
 /// Six digits, so that files stay readable; empty when unknown.
 std::string six_figures(double value) {
-  if (!std::isfinite(value)) return {};
-  char text[32];
-  std::snprintf(text, sizeof text, "%.6g", value);
-  return text;
+  return std::isfinite(value) ? formatted(value, "%.6g") : std::string();
 }
 
 ordered_json json_figure(double value) {

@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <functional>
 #include <map>
 #include <tuple>
 
+#include "pencilscan/core/formatted.h"
 #include "pencilscan/jobs/changes.h"
 
 namespace pencilscan {
@@ -37,6 +37,8 @@ const double kPoints = std::log(4.0);   // a projector that lost three quarters 
 /// Half of what the rule of disagreeing crossings (crossing_tracks.h) allows beyond noise.
 constexpr double kCrossingsPx = 0.05;
 
+constexpr const char* kDigits = "%.3g";
+
 double finite_log(double value) { return value > 0 ? std::log(value) : kUnknownFigure; }
 
 std::vector<Series> all_series(const SequenceDevices& devices) {
@@ -64,25 +66,18 @@ std::vector<Series> all_series(const SequenceDevices& devices) {
   return all;
 }
 
+const std::string& bare_name(const SequenceDevices& devices, std::size_t device) {
+  return device < devices.cameras.size() ? devices.cameras[device]
+                                         : devices.projectors[device - devices.cameras.size()];
+}
+
 std::string name_of(const SequenceDevices& devices, std::size_t device) {
-  return device < devices.cameras.size()
-             ? "camera " + devices.cameras[device]
-             : "projector " + devices.projectors[device - devices.cameras.size()];
-}
-
-std::string bare_name(const SequenceDevices& devices, std::size_t device) {
-  const std::string name = name_of(devices, device);
-  return name.substr(name.find(' ') + 1);
-}
-
-std::string digits(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.3g", value);
-  return text;
+  return (device < devices.cameras.size() ? "camera " : "projector ") + bare_name(devices, device);
 }
 
 std::string from_to(const Change& change) {
-  return digits(change.after) + " from here, " + digits(change.before) + " before";
+  return formatted(change.after, kDigits) + " from here, " + formatted(change.before, kDigits) +
+         " before";
 }
 
 std::string quantity(const std::string& kind) {
@@ -192,7 +187,7 @@ std::vector<Found> find_all(std::span<const FrameRow> rows, const SequenceDevice
     for (const std::size_t at : changes.outliers) {
       const double value = series.value(rows[at]);
       report.odd.push_back({at, name_of(devices, series.device) + ": " + quantity(series.kind) +
-                                    digits(value) + " in this frame alone"});
+                                    formatted(value, kDigits) + " in this frame alone"});
     }
   }
   return found;

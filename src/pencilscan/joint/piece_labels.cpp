@@ -218,22 +218,32 @@ struct VisiblePattern {
   std::vector<std::size_t> colors;  ///< of one period
 };
 
+/// The picture's pixel in the middle of a piece.
+Vec2 middle_pixel(const GridGraph& graph, const CurvePiece& piece) {
+  const Curve& curve = graph.curves[static_cast<std::size_t>(piece.curve)];
+  const auto middle = static_cast<std::size_t>((piece.begin + piece.end) / 2);
+  return curve.points[middle].position.cast<double>();
+}
+
+/// Of each piece, whether the ray through its middle meets the volume.
+std::vector<char> meets_volume(const Camera& camera, const Sphere& volume, const GridGraph& graph,
+                               const PieceGraph& pieces) {
+  std::vector<char> meets;
+  for (const CurvePiece& piece : pieces.pieces)
+    meets.push_back(depth_range(camera, volume, middle_pixel(graph, piece)) ? 1 : 0);
+  return meets;
+}
+
 /// Where lines may lie: the volume, and where a good part of the curves misses it, so that there is
 /// a room around the object, what is near it, too. A floor's line that had no label of its own
 /// would take that of a place in the air above it.
-Sphere reach_of_labels(const Camera& camera, const Sphere& volume, const GridGraph& graph,
-                       const PieceGraph& pieces) {
-  constexpr double kRoom =
-      0.1;  // of the pieces: rims of an object that fills the volume stay below
+Sphere reach_of_labels(const Sphere& volume, const std::vector<char>& meets_volume) {
+  // Of the pieces; rims of an object that fills the volume stay below.
+  constexpr double kRoom = 0.1;
   constexpr double kSurround = 2;  // radii; what lies farther rarely meets other lines by chance
-  std::size_t outside = 0;
-  for (const CurvePiece& piece : pieces.pieces) {
-    const Curve& curve = graph.curves[static_cast<std::size_t>(piece.curve)];
-    const auto middle = static_cast<std::size_t>((piece.begin + piece.end) / 2);
-    if (!depth_range(camera, volume, curve.points[middle].position.cast<double>())) ++outside;
-  }
+  const auto outside = std::count(meets_volume.begin(), meets_volume.end(), 0);
   const bool is_room =
-      static_cast<double>(outside) > kRoom * static_cast<double>(pieces.pieces.size());
+      static_cast<double>(outside) > kRoom * static_cast<double>(meets_volume.size());
   return {volume.center, is_room ? kSurround * volume.radius : volume.radius};
 }
 
@@ -296,7 +306,8 @@ LabelledPieces possible_labels(const Rig& rig, const std::vector<ColorFamily>& f
         visible[f].emplace_back(rig, camera, families[f], ref);
     }
   }
-  const Sphere reach = reach_of_labels(camera, volume, graph, result.graph);
+  const std::vector<char> is_inside = meets_volume(camera, volume, graph, result.graph);
+  const Sphere reach = reach_of_labels(volume, is_inside);
   const double distance = (camera.device_from_world * volume.center).z();
   result.inverse_depth_range = static_cast<float>(
       1 / std::max(1e-3 * distance, distance - reach.radius) - 1 / (distance + reach.radius));
@@ -308,13 +319,11 @@ LabelledPieces possible_labels(const Rig& rig, const std::vector<ColorFamily>& f
   std::vector<PieceLabel> labels;
   result.labels.resize(result.graph.pieces.size());
   for (std::size_t p = 0; p < result.graph.pieces.size(); ++p) {
+    if (is_inside[p] == 0) continue;
     const CurvePiece& piece = result.graph.pieces[p];
     labels.clear();
     const Curve& curve = graph.curves[static_cast<std::size_t>(piece.curve)];
-    const auto middle = static_cast<std::size_t>((piece.begin + piece.end) / 2);
-    const Vec2 pixel = curve.points[middle].position.cast<double>();
-    if (!depth_range(camera, volume, pixel)) continue;
-    const auto range = depth_range(camera, reach, pixel);
+    const auto range = depth_range(camera, reach, middle_pixel(graph, piece));
     const auto w_low = static_cast<float>(1 / range->far);
     const auto w_high = static_cast<float>(1 / range->near);
     const ColorFamily& family = families[static_cast<std::size_t>(curve.family)];

@@ -2,8 +2,9 @@
 
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <map>
+
+#include "pencilscan/core/formatted.h"
 
 namespace pencilscan {
 namespace {
@@ -11,37 +12,37 @@ namespace {
 using nlohmann::json;
 
 struct Known {
-  const char* part;  ///< of the warning's text
+  const char* about;
   const char* action;
 };
 
-/// What to do about the warnings that detection and surface give.
-constexpr std::array<Known, 7> kKnown = {{
+/// What to do about warnings, by their code (core/warning.h).
+constexpr std::array<Known, 9> kKnown = {{
     {"saturated",
      "Close the aperture or shorten the exposure until the brightest lines stay below "
      "full scale, and capture again."},
-    {"has no image",
+    {"no-picture",
      "Check that this camera was triggered and that its file lies in the frame's "
      "folder under the camera's name."},
-    {"no projected line",
+    {"no-lines",
      "Check that the camera sees the object and that the projectors were on; "
      "compare its picture with the others below."},
-    {"cannot be told apart",
+    {"colors-mix",
      "Give projectors whose lines overlap colours of different channels "
      "(blue/cyan against red/yellow), or state color_matrix in the rig."},
-    {"calibration is off",
+    {"rig-is-off",
      "Run reconstruct with --refine-rig, or calibrate again if devices were "
      "moved."},
-    {"rests on the labelled curves",
+    {"curves-only",
      "Look at the hole map of each camera below: it says what kept "
      "depth from being found between the curves."},
-    {"open", "Look at the mesh for gaps; more overlap between the cameras closes them."},
+    {"not-closed", "Look at the mesh for gaps; more overlap between the cameras closes them."},
+    {"little-measured", "More cameras and projectors around the object measure more of it."},
+    {"colors-filled-in", "Let the camera give raw pictures and state its mosaic in the rig."},
 }};
 
 std::string percent(double share) {
-  std::array<char, 32> text{};
-  std::snprintf(text.data(), text.size(), share < 0.1 ? "%.1f %%" : "%.0f %%", 100 * share);
-  return text.data();
+  return formatted(100 * share, share < 0.1 ? "%.1f %%" : "%.0f %%");
 }
 
 double number_at(const json& object, const char* key) {
@@ -50,11 +51,29 @@ double number_at(const json& object, const char* key) {
   return it != object.end() && it->is_number() ? it->get<double>() : 0.0;
 }
 
+std::string word_at(const json& object, const char* key) {
+  const bool has = object.is_object() && object.contains(key) && object[key].is_string();
+  return has ? object[key].get<std::string>() : std::string();
+}
+
 const json& child(const json& object, const char* key) {
   static const json kNothing;
   if (!object.is_object()) return kNothing;
   const auto it = object.find(key);
   return it == object.end() ? kNothing : *it;
+}
+
+/// What to do about a warning, by the code of the finding that says the same; empty: unknown.
+std::string action_for(const std::string& warning, const json& findings) {
+  if (!findings.is_array()) return {};
+  for (const json& finding : findings) {
+    if (word_at(finding, "text") != warning) continue;
+    const std::string code = word_at(finding, "code");
+    for (const Known& known : kKnown) {
+      if (code == known.about) return known.action;
+    }
+  }
+  return {};
 }
 
 /// Surface that nobody measured, by reason, where it is more than a few percent.
@@ -89,7 +108,7 @@ void advise_holes(const json& area, std::vector<Advice>& advice) {
     const auto known = kByReason.find(words);
     const double share = mm2.is_number() ? mm2.get<double>() / total : 0;
     if (known == kByReason.end() || share < kWorthSaying) continue;
-    advice.push_back({percent(share) + " " + known->second.part, known->second.action});
+    advice.push_back({percent(share) + " " + known->second.about, known->second.action});
   }
 }
 
@@ -119,13 +138,8 @@ std::vector<Advice> advise(const json& report) {
   if (warnings.is_array()) {
     for (const json& warning : warnings) {
       if (!warning.is_string()) continue;
-      Advice entry{warning.get<std::string>(), ""};
-      for (const Known& known : kKnown) {
-        if (entry.warning.find(known.part) == std::string::npos) continue;
-        entry.action = known.action;
-        break;
-      }
-      advice.push_back(std::move(entry));
+      const auto text = warning.get<std::string>();
+      advice.push_back({text, action_for(text, child(report, "findings"))});
     }
   }
   const json& surface = child(report, "surface");

@@ -220,12 +220,15 @@ TEST(Histogram, CountsEveryValueOnce) {
 }
 
 TEST(Advice, NamesWhatToDoAndToleratesAnything) {
-  const auto advice = advise({{"warnings", {"camera cam0: 3 % of its pixels are saturated"}},
+  const char* saturated = "camera cam0: 3 % of its pixels are saturated";
+  const auto advice = advise({{"warnings", {saturated}},
+                              {"findings", {{{"code", "saturated"}, {"text", saturated}}}},
                               {"surface", {{"area_mm2", {{"measured", 80}, {"not seen", 20}}}}}});
   ASSERT_EQ(advice.size(), 2U);
   EXPECT_THAT(advice[0].action, HasSubstr("exposure"));
   EXPECT_THAT(advice[1].warning, HasSubstr("20 %"));
-  for (const char* odd : {"null", "[]", "3", R"({"warnings": 3, "cameras": [1], "surface": []})"})
+  for (const char* odd :
+       {"null", "[]", "3", R"({"warnings": 3, "findings": 4, "cameras": [1], "surface": []})"})
     EXPECT_TRUE(advise(nlohmann::json::parse(odd)).empty()) << odd;
 }
 

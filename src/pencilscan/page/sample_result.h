@@ -108,7 +108,11 @@ inline void write_frame(const std::filesystem::path& folder, const Rig& rig) {
              {{"frame", folder.filename().string()},
               {"points", measured.size()},
               {"surface", {{"measured_share", 0.5}}},
-              {"warnings", {"camera cam0: 3 % of its pixels are saturated; lower exposure"}}});
+              {"warnings", {"camera cam0: 3 % of its pixels are saturated; lower exposure"}},
+              {"findings",
+               {{{"code", "saturated"},
+                 {"device", "cam0"},
+                 {"text", "camera cam0: 3 % of its pixels are saturated; lower exposure"}}}}});
 }
 
 /// An output folder with frames 000000, 000001, ...

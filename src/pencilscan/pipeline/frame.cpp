@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <optional>
 #include <utility>
 
@@ -9,7 +10,7 @@
 #include "pencilscan/core/median.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/core/stopwatch.h"
-#include "pencilscan/detection/mosaic_trace.h"
+#include "pencilscan/pipeline/frame_warnings.h"
 #include "pencilscan/pipeline/line_naming.h"
 #include "pencilscan/pipeline/picture_check.h"
 #include "pencilscan/points/surface_check.h"
@@ -24,56 +25,6 @@ void announce(const Progress& progress, const char* stage) {
   if (progress) progress(stage, 0);
 }
 
-std::vector<std::string> detection_warnings(const Rig& rig, const Frame& frame,
-                                            const std::vector<ColorFamily>& families,
-                                            const std::vector<CameraDetection>& detections) {
-  std::vector<std::string> warnings;
-  for (const ColorFamily& family : families) {
-    if (family.leakage <= 0.1) continue;
-    std::string names;
-    for (const PatternColor& color : family.colors)
-      names += (names.empty() ? "" : "/") + color.text();
-    warnings.push_back("the colours " + names +
-                       " cannot be told apart from those of other projectors");
-  }
-  for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
-    const Camera& camera = rig.cameras[c];
-    if (camera.sees_texture_only) continue;
-    const std::string who = "camera " + camera.name;
-    if (frame.images[c].empty()) {
-      warnings.push_back(who + " has no image in frame " + frame.name +
-                         ": reconstructed without it");
-      continue;
-    }
-    if (detections[c].curves.empty())
-      warnings.push_back(who + ": no projected line was found in its image");
-    const double saturated = static_cast<double>(detections[c].saturated_pixels) /
-                             static_cast<double>(frame.images[c].total());
-    if (saturated > 0.01) {
-      warnings.push_back(who + ": " + std::to_string(static_cast<int>(100 * saturated)) +
-                         " % of its pixels are saturated; lower exposure or gain");
-    }
-  }
-  return warnings;
-}
-
-/// Says which cameras' colours were filled in; empty: none.
-std::string interpolation_warning(const Rig& rig, const Frame& frame) {
-  std::vector<char> filled(rig.cameras.size(), 0);
-  parallel_for(rig.cameras.size(), [&](std::size_t c) {
-    filled[c] = !frame.images[c].empty() && !rig.cameras[c].mosaic &&
-                !rig.cameras[c].sees_texture_only && looks_interpolated(frame.images[c]);
-  });
-  std::string names;
-  for (std::size_t c = 0; c < filled.size(); ++c) {
-    if (filled[c] != 0) names += (names.empty() ? "" : ", ") + rig.cameras[c].name;
-  }
-  if (names.empty()) return {};
-  return "the colours of " + names +
-         " were filled in behind a mosaic: raw pictures, with \"mosaic\" in the rig, are more "
-         "accurate";
-}
-
 /// Forgets what the cameras of the findings saw.
 void leave_out(const Rig& rig, const std::vector<PictureFinding>& findings, PointResult& result) {
   for (const PictureFinding& finding : findings) {
@@ -82,8 +33,8 @@ void leave_out(const Rig& rig, const std::vector<PictureFinding>& findings, Poin
     result.detections[c] = {};
     result.graphs[c] = {};
     result.graphs[c].camera = finding.camera;
-    result.wrong_pictures.push_back(describe(rig, finding));
-    result.warnings.push_back(result.wrong_pictures.back());
+    result.warnings.push_back(
+        {WarningCode::kWrongPicture, describe(rig, finding), rig.camera(finding.camera).name});
   }
 }
 
@@ -105,7 +56,9 @@ double plane_error_px(const CrossingDisagreement& crossings) {
 /// Why a frame has no points.
 std::string why_nothing(const PointResult& result) {
   std::string why = "no curve could be given its projector line";
-  for (const std::string& wrong : result.wrong_pictures) why += "; " + wrong;
+  for (const Warning& warning : result.warnings) {
+    if (warning.code == WarningCode::kWrongPicture) why += "; " + warning.text;
+  }
   return why;
 }
 
@@ -147,36 +100,62 @@ cv::Mat without_overexposed(const cv::Mat& linear, const cv::Mat& values) {
   return image;
 }
 
+/// What camera c sees in the light of the projectors, or in plain light where it is a texture
+/// camera.
+ColorView lit_view(const Rig& rig, const Frame& frame, std::size_t c, const PointResult& points,
+                   const DepthReport& depth) {
+  const Camera& camera = rig.cameras[c];
+  ColorView view;
+  view.camera = static_cast<int>(c);
+  view.is_plain = camera.sees_texture_only;
+  const cv::Mat linear = linear_light(camera, frame.images[c]);
+  view.image = view.is_plain ? registered(camera, linear)
+                             : projector_light(camera, linear, points.detections[c].unmixing);
+  view.image = without_overexposed(view.image, frame.images[c]);
+  for (const CameraDepthReport& of_camera : depth.cameras) {
+    if (of_camera.camera == view.camera) view.blur_px = of_camera.blur_px;
+  }
+  return view;
+}
+
+ColorView plain_view(const Rig& rig, const Frame& frame, std::size_t c) {
+  const Camera& camera = rig.cameras[c];
+  ColorView view;
+  view.camera = static_cast<int>(c);
+  view.is_plain = true;
+  view.image =
+      without_overexposed(registered(camera, linear_light(camera, frame.plain[c])), frame.plain[c]);
+  return view;
+}
+
 /// Images as vertex_colors() wants them.
 std::vector<ColorView> color_views(const Rig& rig, const Frame& frame, const PointResult& points,
                                    const DepthReport& depth) {
-  std::vector<ColorView> views;
+  std::vector<std::function<ColorView()>> makers;
   for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
-    if (frame.images[c].empty()) continue;
-    ColorView view;
-    view.camera = static_cast<int>(c);
-    view.is_plain = rig.cameras[c].sees_texture_only;
-    const Camera& camera = rig.cameras[c];
-    const cv::Mat linear = linear_light(camera, frame.images[c]);
-    view.image = view.is_plain ? registered(camera, linear)
-                               : projector_light(camera, linear, points.detections[c].unmixing);
-    view.image = without_overexposed(view.image, frame.images[c]);
-    for (const CameraDepthReport& of_camera : depth.cameras) {
-      if (of_camera.camera == view.camera) view.blur_px = of_camera.blur_px;
-    }
-    views.push_back(std::move(view));
+    if (!frame.images[c].empty())
+      makers.push_back([&, c] { return lit_view(rig, frame, c, points, depth); });
   }
   for (std::size_t c = 0; c < frame.plain.size(); ++c) {
-    if (frame.plain[c].empty()) continue;
-    ColorView view;
-    view.camera = static_cast<int>(c);
-    view.is_plain = true;
-    const Camera& camera = rig.cameras[c];
-    view.image = without_overexposed(registered(camera, linear_light(camera, frame.plain[c])),
-                                     frame.plain[c]);
-    views.push_back(std::move(view));
+    if (!frame.plain[c].empty()) makers.push_back([&, c] { return plain_view(rig, frame, c); });
   }
+  std::vector<ColorView> views(makers.size());
+  parallel_for(views.size(), [&](std::size_t i) { views[i] = makers[i](); });
   return views;
+}
+
+/// Of the cameras that see the projectors' light.
+std::vector<Silhouette> silhouettes_of(const Rig& rig, const std::vector<ColorView>& views) {
+  std::vector<const ColorView*> lit;
+  for (const ColorView& view : views) {
+    if (!view.is_plain) lit.push_back(&view);
+  }
+  std::vector<Silhouette> silhouettes(lit.size());
+  parallel_for(lit.size(), [&](std::size_t i) {
+    const Camera& camera = rig.camera(lit[i]->camera);
+    silhouettes[i] = silhouette(lit[i]->camera, lit[i]->image, line_reach_px(rig, camera));
+  });
+  return silhouettes;
 }
 
 /// The measured mesh has vertices of the closed one, in the same order.
@@ -236,8 +215,6 @@ PointResult detect_frame(const Rig& rig, const Frame& frame, const PointOptions&
         detect_curves(rig.cameras[c], rig, result.families, frame.images[c], options.detection);
   });
   result.warnings = detection_warnings(rig, frame, result.families, result.detections);
-  if (std::string warning = interpolation_warning(rig, frame); !warning.empty())
-    result.warnings.push_back(std::move(warning));
   result.times.push_back({"detection", detection_watch.seconds()});
 
   announce(options.progress, "grid");
@@ -256,6 +233,8 @@ PointResult detect_frame(const Rig& rig, const Frame& frame, const PointOptions&
 PointResult measure_points(const Rig& stated, const Frame& frame, const PointOptions& options) {
   const Rig rig = with_registered_patterns(stated);
   PointResult result = detect_frame(rig, frame, options);
+  if (std::optional<Warning> warning = interpolation_warning(rig, frame))
+    result.warnings.push_back(std::move(*warning));
   result.left_out.assign(rig.cameras.size(), 0);
   leave_out(rig, plain_faults(rig, frame), result);
   announce(options.progress, "solution");
@@ -279,10 +258,8 @@ PointResult measure_points(const Rig& stated, const Frame& frame, const PointOpt
       name_lines(rig, result.families, result.graphs, std::move(result.labeling), options);
   result.labeling = std::move(naming.labeling);
   result.crossings = naming.crossings;
-  if (result.crossings.crossings > 0)
-    result.device_crossings =
-        device_disagreements(rig, crossing_tracks(rig, result.graphs, result.labeling));
-  if (!naming.warning.empty()) result.warnings.push_back(std::move(naming.warning));
+  result.device_crossings = std::move(naming.device_crossings);
+  if (naming.warning) result.warnings.push_back(std::move(*naming.warning));
   const std::optional<Rig>& corrected = naming.corrected;
   result.rig_is_off = corrected.has_value();
   result.times.push_back({"solution", solution_watch.seconds()});
@@ -326,14 +303,8 @@ ShapeResult measure_shape(const Rig& stated, const Frame& frame, const PointResu
     announce(options.progress, "surface");
     const Stopwatch surface_watch;
     const std::vector<ColorView> views = color_views(rig, frame, points, result.depth.report);
-    std::vector<Silhouette> silhouettes;
-    for (const ColorView& view : views) {
-      const Camera& camera = rig.cameras[static_cast<std::size_t>(view.camera)];
-      if (view.is_plain) continue;
-      silhouettes.push_back(silhouette(view.camera, view.image, line_reach_px(rig, camera)));
-    }
     const std::vector<DepthMap>& maps = result.depth.maps;
-    result.surface = close_depth(rig, maps, options.fusion, silhouettes);
+    result.surface = close_depth(rig, maps, options.fusion, silhouettes_of(rig, views));
     complete_depth(rig, RayScene(result.surface.mesh), options.depth, result.depth);
     result.depth.lights.clear();
     follow_depth(rig, points.points, maps, options.fusion, result.surface);
@@ -359,7 +330,8 @@ ShapeResult measure_shape(const Rig& stated, const Frame& frame, const PointResu
   result.times.push_back({"surface", surface_watch.seconds()});
   if (options.depth.enabled) {
     result.surface.report.warnings.push_back(
-        "dense depth found too little: the surface rests on the labelled curves alone");
+        {WarningCode::kCurvesOnly,
+         "dense depth found too little: the surface rests on the labelled curves alone"});
   }
   return result;
 }

@@ -7,6 +7,7 @@
 
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/progress.h"
+#include "pencilscan/core/warning.h"
 #include "pencilscan/depth/depth.h"
 #include "pencilscan/detection/detect.h"
 #include "pencilscan/grid/grid_graph.h"
@@ -64,8 +65,7 @@ struct StageTime {
 /// Labelled points of one frame and everything that led to them.
 struct PointResult {
   std::vector<ColorFamily> families;
-  std::vector<char> left_out;               ///< per camera: 1 where its picture is wrong
-  std::vector<std::string> wrong_pictures;  ///< how, one sentence each; warnings hold them too
+  std::vector<char> left_out;  ///< per camera: 1 where its picture is wrong; warnings say how
   std::vector<CameraDetection> detections;  ///< per camera; curves have moved into the graphs
   std::vector<GridGraph> graphs;            ///< per camera
   Labeling labeling;
@@ -76,7 +76,7 @@ struct PointResult {
   std::size_t contradicted = 0;  ///< labelled curve points that the dense surface contradicted
   std::vector<MeasuredPoint> points;
   std::vector<StageTime> times;
-  std::vector<std::string> warnings;
+  std::vector<Warning> warnings;
 };
 
 /// The first half of measure_points(): curves and grid graphs, which do not depend on where the

@@ -1,9 +1,9 @@
 #include "pencilscan/pipeline/frame_files.h"
 
 #include <algorithm>
-#include <cctype>
 
 #include "pencilscan/core/error.h"
+#include "pencilscan/core/lower_case.h"
 #include "pencilscan/io/file.h"
 #include "pencilscan/io/found_files.h"
 #include "pencilscan/io/hash.h"
@@ -12,11 +12,6 @@
 
 namespace pencilscan {
 namespace {
-
-std::string lower_case(std::string text) {
-  for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return text;
-}
 
 /// A file that would be the camera's but for capitals is not passed over in silence.
 void refuse_other_case(const std::filesystem::path& folder, const std::string& camera) {

@@ -240,8 +240,18 @@ nlohmann::ordered_json frame_report(const Rig& rig, const Frame& frame, const Po
     for (std::size_t k = 1; k < kHoleReasons; ++k)
       area[to_string(static_cast<HoleReason>(k))] = number(shape.holes.area_mm2[k]);
   }
-  report["warnings"] = points.warnings;
-  for (const std::string& warning : s.warnings) report["warnings"].push_back(warning);
+  std::vector<Warning> warnings = points.warnings;
+  warnings.insert(warnings.end(), s.warnings.begin(), s.warnings.end());
+  report["warnings"] = ordered_json::array();
+  report["findings"] = ordered_json::array();
+  for (const Warning& warning : warnings) {
+    report["warnings"].push_back(warning.text);
+    ordered_json& finding = report["findings"].emplace_back();
+    finding["code"] = to_string(warning.code);
+    if (!warning.device.empty()) finding["device"] = warning.device;
+    for (const auto& [name, value] : warning.figures) finding[name] = number(value);
+    finding["text"] = warning.text;
+  }
   return report;
 }
 

@@ -1,10 +1,9 @@
 #include "pencilscan/pipeline/line_naming.h"
 
-#include <array>
-#include <cstdio>
 #include <limits>
 #include <utility>
 
+#include "pencilscan/pipeline/frame_warnings.h"
 #include "pencilscan/pipeline/rig_refinement.h"
 
 namespace pencilscan {
@@ -12,29 +11,16 @@ namespace {
 
 std::size_t curve_points(const std::vector<GridGraph>& graphs) {
   std::size_t count = 0;
-  for (const GridGraph& graph : graphs) {
-    for (const Curve& curve : graph.curves) count += curve.points.size();
-  }
+  for (const GridGraph& graph : graphs) count += curve_points(graph);
   return count;
 }
 
-CrossingDisagreement disagreement(const Rig& rig, const std::vector<GridGraph>& graphs,
-                                  const Labeling& labeling) {
-  return crossing_disagreement(rig, crossing_tracks(rig, graphs, labeling));
-}
-
-std::string disagreement_warning(const CrossingDisagreement& crossings, bool labels_are_corrected) {
-  std::array<char, 400> text{};
-  std::snprintf(
-      text.data(), text.size(),
-      "crossing lines miss each other by %.2f projector pixels (median) where image noise "
-      "explains %.2f: the rig's calibration is off. %s; --refine-rig can correct %s",
-      crossings.median_px, crossings.expected_px,
-      labels_are_corrected ? "Lines were named with the devices as this frame corrects them, "
-                             "points lie where the rig as given puts them"
-                           : "This frame does not say how, many lines may be named wrong",
-      labels_are_corrected ? "the points too" : "it from several frames");
-  return text.data();
+/// What the crossings of the labels say, with the rig as given.
+void judge(const Rig& rig, const std::vector<GridGraph>& graphs, LineNaming& naming) {
+  const std::vector<CrossingTrack> tracks = crossing_tracks(rig, graphs, naming.labeling);
+  naming.crossings = crossing_disagreement(rig, tracks);
+  naming.device_crossings = naming.crossings.crossings > 0 ? device_disagreements(rig, tracks)
+                                                           : std::vector<CrossingDisagreement>();
 }
 
 }  // namespace
@@ -50,7 +36,7 @@ LineNaming name_lines(const Rig& rig, const std::vector<ColorFamily>& families,
   const SolutionMethod& method = solution_method(options.method);
   result.labeling = std::move(labeling);
   if (!method.capabilities.corrects_rig) return result;
-  result.crossings = disagreement(rig, graphs, result.labeling);
+  judge(rig, graphs, result);
   const bool is_off = disagrees(result.crossings);
   const auto points = static_cast<double>(labelled_points(result.labeling));
   if (!are_enough(result.crossings)) return result;
@@ -64,7 +50,8 @@ LineNaming name_lines(const Rig& rig, const std::vector<ColorFamily>& families,
   RigRefinement found = refine_rig_on_frames(rig, {&curves, 1}, refinement);
   if (found.report.refined) {
     Labeling& again = found.labelings.front();
-    const CrossingDisagreement left = disagreement(found.rig, graphs, again);
+    const CrossingDisagreement left =
+        crossing_disagreement(found.rig, crossing_tracks(found.rig, graphs, again));
     const auto named = static_cast<double>(labelled_points(again));
     const double misses = left.median_px / result.crossings.median_px;
     const bool agrees = !disagrees(left);
@@ -76,11 +63,11 @@ LineNaming name_lines(const Rig& rig, const std::vector<ColorFamily>& families,
     if (is_off ? agrees || is_better : agrees && names_more) {
       result.labeling = std::move(again);
       result.corrected = std::move(found.rig);
-      result.crossings = disagreement(rig, graphs, result.labeling);
+      judge(rig, graphs, result);
     }
   }
   if (is_off || result.corrected)
-    result.warning = disagreement_warning(result.crossings, result.corrected.has_value());
+    result.warning = rig_warning(result.crossings, result.corrected.has_value());
   return result;
 }
 

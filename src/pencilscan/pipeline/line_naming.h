@@ -1,7 +1,6 @@
 #pragma once
 
 #include <optional>
-#include <string>
 #include <vector>
 
 #include "pencilscan/pipeline/frame.h"
@@ -12,8 +11,9 @@ namespace pencilscan {
 struct LineNaming {
   Labeling labeling;
   std::optional<Rig> corrected;  ///< that the labels were made with, where it is not the one given
-  CrossingDisagreement crossings;  ///< of the labels, with the rig as given
-  std::string warning;             ///< empty: nothing to say
+  CrossingDisagreement crossings;                      ///< of the labels, with the rig as given
+  std::vector<CrossingDisagreement> device_crossings;  ///< the same; empty without crossings
+  std::optional<Warning> warning;
 };
 
 /// Keeps the names that the solution gave with the rig as given. Where their crossings then miss

@@ -98,12 +98,6 @@ const std::vector<Remedy>& remedies() {
   return all;
 }
 
-std::size_t curve_points_of(const GridGraph& graph) {
-  std::size_t count = 0;
-  for (const Curve& curve : graph.curves) count += curve.points.size();
-  return count;
-}
-
 /// Share of a camera's curve points that have a name, of those that a right picture could have
 /// named: what nothing crosses, or lies outside the volume (walls, people), says nothing.
 double named_share(const Labeling& labeling, std::size_t c) {
@@ -147,7 +141,8 @@ class PictureTrial {
 /// A camera that may have a wrong picture.
 struct Suspect {
   std::size_t camera = 0;
-  double named = 0;  ///< named_share() of its own picture, alone
+  double share = 0;  ///< named_share() of its own picture, among the others
+  double named = 0;  ///< the same, alone
   cv::Mat light;
   PictureFinding best;
   double best_named = 0;
@@ -226,19 +221,19 @@ std::vector<PictureFinding> misplaced_pictures(const Rig& rig, const Frame& fram
   constexpr double kFarLess = 0.5;  // of what the other cameras have
   constexpr double kFarMore = 2;    // of what the picture as it is has, alone
   constexpr std::size_t kLeastPoints = 500;
-  std::vector<double> shares(rig.cameras.size(), 0);
   std::vector<double> of_others;
   std::vector<Suspect> suspects;
   for (std::size_t c = 0; c < graphs.size(); ++c) {
-    if (frame.images[c].empty() || curve_points_of(graphs[c]) < kLeastPoints) continue;
-    shares[c] = named_share(labeling, c);
-    if (shares[c] < kFew) {
-      Suspect suspect;
-      suspect.camera = c;
-      suspects.push_back(std::move(suspect));
-    } else {
-      of_others.push_back(shares[c]);
+    if (frame.images[c].empty() || curve_points(graphs[c]) < kLeastPoints) continue;
+    const double share = named_share(labeling, c);
+    if (share >= kFew) {
+      of_others.push_back(share);
+      continue;
     }
+    Suspect suspect;
+    suspect.camera = c;
+    suspect.share = share;
+    suspects.push_back(std::move(suspect));
   }
   if (suspects.empty()) return {};
   const std::size_t others = of_others.size();
@@ -272,7 +267,7 @@ std::vector<PictureFinding> misplaced_pictures(const Rig& rig, const Frame& fram
   for (const Suspect& s : suspects) {
     if (s.best_named > 0) {
       findings.push_back(s.best);
-    } else if (shares[s.camera] < kFarLess * usual && suspects.size() < others) {
+    } else if (s.share < kFarLess * usual && suspects.size() < others) {
       findings.push_back({PictureFault::kDoesNotFit, static_cast<int>(s.camera), -1});
     }
   }

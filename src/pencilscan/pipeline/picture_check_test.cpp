@@ -54,8 +54,8 @@ class PictureCheck : public testing::Test {
   static std::vector<std::string> said_of(const Frame& frame, const Rig& rig = *rig_) {
     const PointResult result = measure_points(rig, frame);
     std::vector<std::string> said;
-    for (const std::string& warning : result.warnings) {
-      if (warning.find("its picture") != std::string::npos) said.push_back(warning);
+    for (const Warning& warning : result.warnings) {
+      if (warning.code == WarningCode::kWrongPicture) said.push_back(warning.text);
     }
     const auto left_out = std::count(result.left_out.begin(), result.left_out.end(), 1);
     EXPECT_EQ(static_cast<std::size_t>(left_out), said.size());

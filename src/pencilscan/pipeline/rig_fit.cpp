@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <iterator>
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "pencilscan/core/formatted.h"
 #include "pencilscan/pipeline/line_naming.h"
 
 namespace pencilscan {
@@ -21,8 +21,8 @@ struct NamedCrossings {
 
 NamedCrossings named_crossings(const Rig& rig, std::span<const FrameCurves> frames) {
   NamedCrossings result;
-  double points = 0;
-  double labelled = 0;
+  std::size_t points = 0;
+  std::size_t labelled = 0;
   for (const FrameCurves& frame : frames) {
     const PointOptions options;
     const SolutionMethod& method = solution_method(options.method);
@@ -32,19 +32,13 @@ NamedCrossings named_crossings(const Rig& rig, std::span<const FrameCurves> fram
     auto tracks = crossing_tracks(rig, frame.graphs, naming.labeling);
     std::move(tracks.begin(), tracks.end(), std::back_inserter(result.tracks));
     for (const GridGraph& graph : frame.graphs) {
-      labelled += static_cast<double>(
-          labelled_points(naming.labeling.runs[static_cast<std::size_t>(graph.camera)]));
-      for (const Curve& curve : graph.curves) points += static_cast<double>(curve.points.size());
+      labelled += labelled_points(naming.labeling.runs[static_cast<std::size_t>(graph.camera)]);
+      points += curve_points(graph);
     }
   }
-  result.labelled_share = points > 0 ? labelled / points : 0;
+  if (points > 0)
+    result.labelled_share = static_cast<double>(labelled) / static_cast<double>(points);
   return result;
-}
-
-std::string formatted(const char* format, double value) {
-  char text[64];
-  std::snprintf(text, sizeof text, format, value);
-  return text;
 }
 
 std::string full_name(const DeviceFit& device) {
@@ -64,20 +58,20 @@ std::string verdict_text(const RigFit& fit) {
   for (const DeviceFit& device : fit.devices) {
     if (device.has_moved)
       moved += (moved.empty() ? "" : ", ") + full_name(device) +
-               formatted(" by %.2f px", device.shift_px);
+               formatted(device.shift_px, " by %.2f px");
   }
   const std::string misses =
-      "crossing lines miss each other by " + formatted("%.3f px (median), ", fit.before.median_px) +
-      "where image noise explains " + formatted("%.3f", fit.before.expected_px);
+      "crossing lines miss each other by " + formatted(fit.before.median_px, "%.3f px (median), ") +
+      "where image noise explains " + formatted(fit.before.expected_px, "%.3f");
   switch (fit.verdict) {
     case RigVerdict::kFits:
       return "the rig fits: " + misses;
     case RigVerdict::kOneMoved:
       return "one device is to be put back: " + moved + "; then they miss by " +
-             formatted("%.3f px", fit.after.median_px);
+             formatted(fit.after.median_px, "%.3f px");
     case RigVerdict::kSeveralMoved:
       return "several devices moved: " + moved + "; then crossing lines miss each other by " +
-             formatted("%.3f px", fit.after.median_px) +
+             formatted(fit.after.median_px, "%.3f px") +
              ": reconstruct --refine-rig, or calibrate anew";
     case RigVerdict::kUnexplained:
       return misses +

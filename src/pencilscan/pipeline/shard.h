@@ -14,14 +14,17 @@ namespace pencilscan {
 /// a minute of capture is 30 chunks.
 constexpr std::size_t kChunkFrames = 50;
 
+/// Which of `shards` does a frame.
+[[nodiscard]] constexpr std::size_t shard_of(std::size_t frame, std::size_t shards) {
+  return frame / kChunkFrames % shards;
+}
+
 /// The part of a sequence that one of several programs does: every count-th chunk.
 struct Shard {
   std::size_t index = 0;  ///< < count
   std::size_t count = 1;  ///< >= 1
 
-  [[nodiscard]] bool holds(std::size_t frame) const {
-    return frame / kChunkFrames % count == index;
-  }
+  [[nodiscard]] bool holds(std::size_t frame) const { return shard_of(frame, count) == index; }
   /// Its frames of a sequence of `frames`, in order.
   [[nodiscard]] std::vector<std::size_t> frames_of(std::size_t frames) const;
 };

@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <memory>
 #include <optional>
 
+#include "pencilscan/core/formatted.h"
 #include "pencilscan/core/median.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/geometry/least_squares.h"
@@ -98,12 +98,6 @@ class PriorCost : public ceres::SizedCostFunction<6, 6> {
     return true;
   }
 };
-
-std::string short_number(double value) {
-  std::array<char, 32> text{};
-  std::snprintf(text.data(), text.size(), "%.2g", value);
-  return text.data();
-}
 
 std::vector<PoseCorrection> poses_of(const TrackResidual& residual, const Scales& scales,
                                      const std::vector<Parameters>& parameters) {
@@ -311,8 +305,8 @@ RefineRigResult refine_rig(const Rig& calibrated, std::span<const CrossingTrack>
       refined, definite, unit.asDiagonal() * posterior * unit.asDiagonal(), precision);
   if (report.remaining_error_px > options.max_remaining * report.expected_error_px) {
     report.reason = "the crossings do not determine the devices: of an expected line error of " +
-                    short_number(report.expected_error_px) + " px, " +
-                    short_number(report.remaining_error_px) + " px would remain";
+                    formatted(report.expected_error_px) + " px, " +
+                    formatted(report.remaining_error_px) + " px would remain";
     return result;
   }
   report.refined = true;

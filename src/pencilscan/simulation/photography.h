@@ -35,9 +35,8 @@ struct PhotographyOptions {
 [[nodiscard]] RenderOptions scene_light(const PhotographyOptions& options);
 
 /// What camera `camera` of the rig stores of the rig's patterns on the object: 8U or 16U, RGB, or
-/// one channel of a camera with a mosaic. A
-/// texture camera sees white light instead. `image`: a number of its own for every picture of a
-/// run, which its noise depends on.
+/// one channel of a camera with a mosaic. A texture camera sees white light instead. `image`: a
+/// number of its own for every picture of a run, which its noise depends on.
 [[nodiscard]] cv::Mat photograph(const Rig& rig, std::size_t camera, const SimulatedObject& object,
                                  const PhotographyOptions& options, std::uint32_t image);
 

@@ -49,7 +49,8 @@ std::vector<char> judge_samples(const Rig& rig, const SurfaceOptions& options, S
   }
   if (kept < kLeastSamples && keep.size() >= kLeastSamples) {
     report.warnings.push_back(
-        "hardly any point is supported by another curve: all points are used");
+        {WarningCode::kUnsupported,
+         "hardly any point is supported by another curve: all points are used"});
     keep.assign(keep.size(), 1);
     return keep;
   }
@@ -118,11 +119,18 @@ void note_quality(double area, SurfaceResult& result) {
   if (result.mesh.faces.empty() || report.edges.boundary > 0 || report.edges.non_manifold > 0) {
     report.status = SurfaceStatus::kNotClosed;
     report.warnings.push_back(
-        "the surface is not closed: " + std::to_string(report.edges.boundary) + " boundary and " +
-        std::to_string(report.edges.non_manifold) + " non-manifold edges");
+        {WarningCode::kNotClosed,
+         "the surface is not closed: " + std::to_string(report.edges.boundary) + " boundary and " +
+             std::to_string(report.edges.non_manifold) + " non-manifold edges",
+         {},
+         {{"boundary", static_cast<double>(report.edges.boundary)},
+          {"non_manifold", static_cast<double>(report.edges.non_manifold)}}});
   }
   if (report.measured_share < 0.5) {
-    report.warnings.push_back("less than half of the closed surface was measured");
+    report.warnings.push_back({WarningCode::kLittleMeasured,
+                               "less than half of the closed surface was measured",
+                               {},
+                               {{"share", report.measured_share}}});
   }
 }
 
@@ -151,8 +159,9 @@ SurfaceResult reconstruct_surface(const Rig& rig, std::span<const MeasuredPoint>
   report.samples = set.samples.size();
   for (const std::int32_t s : set.sample_of_point) report.points += s >= 0 ? 1 : 0;
   if (report.points < points.size()) {
-    report.warnings.push_back(std::to_string(points.size() - report.points) +
-                              " points with non-finite or absurd coordinates are left out");
+    report.warnings.push_back({WarningCode::kPointsLeftOut,
+                               std::to_string(points.size() - report.points) +
+                                   " points with non-finite or absurd coordinates are left out"});
   }
 
   std::vector<char> keep;
@@ -167,7 +176,8 @@ SurfaceResult reconstruct_surface(const Rig& rig, std::span<const MeasuredPoint>
   report.seconds_filter = watch.seconds();
   if (kept.size() < kLeastSamples) {
     report.status = SurfaceStatus::kTooFewPoints;
-    report.warnings.push_back("too few points for a surface: " + std::to_string(report.points));
+    report.warnings.push_back({WarningCode::kTooFewPoints,
+                               "too few points for a surface: " + std::to_string(report.points)});
     report.seconds = watch.seconds();
     return result;
   }
@@ -207,7 +217,8 @@ SurfaceResult close_depth(const Rig& rig, std::span<const DepthMap> maps,
   report.samples = report.samples_used = samples.size();
   if (samples.size() < kLeastSamples) {
     report.status = SurfaceStatus::kTooFewPoints;
-    report.warnings.push_back("too few depths for a surface: " + std::to_string(samples.size()));
+    report.warnings.push_back({WarningCode::kTooFewPoints,
+                               "too few depths for a surface: " + std::to_string(samples.size())});
     report.seconds = watch.seconds();
     return result;
   }

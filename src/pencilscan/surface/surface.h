@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "pencilscan/core/progress.h"
+#include "pencilscan/core/warning.h"
 #include "pencilscan/depth/depth_map.h"
 #include "pencilscan/geometry/mesh.h"
 #include "pencilscan/labeling/measured_point.h"
@@ -63,7 +64,7 @@ struct SurfaceReport {
   double seconds_filter = 0;
   double seconds_poisson = 0;
   double seconds = 0;
-  std::vector<std::string> warnings;
+  std::vector<Warning> warnings;
 };
 
 struct SurfaceResult {

@@ -1,0 +1,37 @@
+#include "pencilscan/core/warning.h"
+
+namespace pencilscan {
+
+const char* to_string(WarningCode code) {
+  switch (code) {
+    case WarningCode::kColorsMix:
+      return "colors-mix";
+    case WarningCode::kNoPicture:
+      return "no-picture";
+    case WarningCode::kWrongPicture:
+      return "wrong-picture";
+    case WarningCode::kNoLines:
+      return "no-lines";
+    case WarningCode::kSaturated:
+      return "saturated";
+    case WarningCode::kColorsFilledIn:
+      return "colors-filled-in";
+    case WarningCode::kRigIsOff:
+      return "rig-is-off";
+    case WarningCode::kPointsLeftOut:
+      return "points-left-out";
+    case WarningCode::kTooFewPoints:
+      return "too-few-points";
+    case WarningCode::kUnsupported:
+      return "unsupported";
+    case WarningCode::kCurvesOnly:
+      return "curves-only";
+    case WarningCode::kNotClosed:
+      return "not-closed";
+    case WarningCode::kLittleMeasured:
+      return "little-measured";
+  }
+  return "";
+}
+
+}  // namespace pencilscan

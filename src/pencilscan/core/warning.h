@@ -1,0 +1,37 @@
+#pragma once
+
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace pencilscan {
+
+/// What a warning is about; programs act on this, never on the text.
+enum class WarningCode {
+  kColorsMix,       ///< colours of different projectors cannot be told apart
+  kNoPicture,       ///< of a camera
+  kWrongPicture,    ///< it was left out (pipeline/picture_check.h)
+  kNoLines,         ///< a camera's picture shows none
+  kSaturated,       ///< figure "share": of a camera's pixels
+  kColorsFilledIn,  ///< pictures went through a mosaic and an interpolation
+  kRigIsOff,        ///< figures "median_px", "expected_px": how crossing lines miss each other
+  kPointsLeftOut,   ///< coordinates are not finite or absurd
+  kTooFewPoints,    ///< for a surface
+  kUnsupported,     ///< hardly any point has another curve beside it
+  kCurvesOnly,      ///< dense depth found too little
+  kNotClosed,       ///< figures "boundary", "non_manifold": edges of the surface
+  kLittleMeasured,  ///< figure "share": of the closed surface
+};
+
+/// The word for files: "saturated", "rig-is-off" and so on.
+[[nodiscard]] const char* to_string(WarningCode code);
+
+/// Something that a user should know of a result.
+struct Warning {
+  WarningCode code = WarningCode::kNoLines;
+  std::string text = {};    ///< one sentence in plain words
+  std::string device = {};  ///< name of the camera or projector it is about; empty: none alone
+  std::vector<std::pair<std::string, double>> figures = {};
+};
+
+}  // namespace pencilscan

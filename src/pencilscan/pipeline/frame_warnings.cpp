@@ -1,0 +1,88 @@
+#include "pencilscan/pipeline/frame_warnings.h"
+
+#include <string>
+
+#include "pencilscan/core/formatted.h"
+#include "pencilscan/core/parallel.h"
+#include "pencilscan/detection/mosaic_trace.h"
+
+namespace pencilscan {
+namespace {
+
+void add_name(std::string& names, const std::string& name, const char* separator) {
+  names += (names.empty() ? "" : separator) + name;
+}
+
+}  // namespace
+
+std::vector<Warning> detection_warnings(const Rig& rig, const Frame& frame,
+                                        std::span<const ColorFamily> families,
+                                        std::span<const CameraDetection> detections) {
+  std::vector<Warning> warnings;
+  for (const ColorFamily& family : families) {
+    if (family.leakage <= 0.1) continue;
+    std::string names;
+    for (const PatternColor& color : family.colors) add_name(names, color.text(), "/");
+    warnings.push_back({WarningCode::kColorsMix, "the colours " + names +
+                                                     " cannot be told apart from those of other "
+                                                     "projectors"});
+  }
+  for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
+    const Camera& camera = rig.cameras[c];
+    if (camera.sees_texture_only) continue;
+    const std::string who = "camera " + camera.name;
+    if (frame.images[c].empty()) {
+      warnings.push_back(
+          {WarningCode::kNoPicture,
+           who + " has no image in frame " + frame.name + ": reconstructed without it",
+           camera.name});
+      continue;
+    }
+    if (detections[c].curves.empty())
+      warnings.push_back(
+          {WarningCode::kNoLines, who + ": no projected line was found in its image", camera.name});
+    const double saturated = static_cast<double>(detections[c].saturated_pixels) /
+                             static_cast<double>(frame.images[c].total());
+    if (saturated > 0.01) {
+      warnings.push_back({WarningCode::kSaturated,
+                          who + ": " + std::to_string(static_cast<int>(100 * saturated)) +
+                              " % of its pixels are saturated; lower exposure or gain",
+                          camera.name,
+                          {{"share", saturated}}});
+    }
+  }
+  return warnings;
+}
+
+std::optional<Warning> interpolation_warning(const Rig& rig, const Frame& frame) {
+  std::vector<char> filled(rig.cameras.size(), 0);
+  parallel_for(rig.cameras.size(), [&](std::size_t c) {
+    filled[c] = !frame.images[c].empty() && !rig.cameras[c].mosaic &&
+                !rig.cameras[c].sees_texture_only && looks_interpolated(frame.images[c]);
+  });
+  std::string names;
+  for (std::size_t c = 0; c < filled.size(); ++c) {
+    if (filled[c] != 0) add_name(names, rig.cameras[c].name, ", ");
+  }
+  if (names.empty()) return std::nullopt;
+  return Warning{WarningCode::kColorsFilledIn,
+                 "the colours of " + names +
+                     " were filled in behind a mosaic: raw pictures, with \"mosaic\" in the rig, "
+                     "are more accurate"};
+}
+
+Warning rig_warning(const CrossingDisagreement& crossings, bool is_corrected) {
+  return {WarningCode::kRigIsOff,
+          "crossing lines miss each other by " + formatted(crossings.median_px, "%.2f") +
+              " projector pixels (median) where image noise explains " +
+              formatted(crossings.expected_px, "%.2f") + ": the rig's calibration is off. " +
+              (is_corrected
+                   ? "Lines were named with the devices as this frame corrects them, points lie "
+                     "where the rig as given puts them; --refine-rig can correct the points too"
+                   : "This frame does not say how, many lines may be named wrong; --refine-rig can "
+                     "correct it from several frames"),
+          {},
+          {{"median_px", crossings.median_px}, {"expected_px", crossings.expected_px}}};
+}
+
+}  // namespace pencilscan

@@ -1,0 +1,24 @@
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "pencilscan/core/warning.h"
+#include "pencilscan/pipeline/frame.h"
+
+namespace pencilscan {
+
+/// What detection says of a frame's pictures: colours that mix, no picture, no lines, saturation.
+[[nodiscard]] std::vector<Warning> detection_warnings(const Rig& rig, const Frame& frame,
+                                                      std::span<const ColorFamily> families,
+                                                      std::span<const CameraDetection> detections);
+
+/// Which cameras' colours were filled in behind a mosaic, if any.
+[[nodiscard]] std::optional<Warning> interpolation_warning(const Rig& rig, const Frame& frame);
+
+/// Crossings miss each other by more than noise. `is_corrected`: lines were named with the devices
+/// as the frame corrects them.
+[[nodiscard]] Warning rig_warning(const CrossingDisagreement& crossings, bool is_corrected);
+
+}  // namespace pencilscan
