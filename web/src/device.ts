@@ -11,9 +11,11 @@ export interface DeviceJson {
   t: number[];
 }
 
-function distort([k1, k2, p1, p2, k3]: number[], x: number, y: number): [number, number] {
+/** OpenCV's rational model; rigs state 5 coefficients where the denominator is 1. */
+function distort(coefficients: number[], x: number, y: number): [number, number] {
+  const [k1, k2, p1, p2, k3, k4 = 0, k5 = 0, k6 = 0] = coefficients;
   const r2 = x * x + y * y;
-  const radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3));
+  const radial = (1 + r2 * (k1 + r2 * (k2 + r2 * k3))) / (1 + r2 * (k4 + r2 * (k5 + r2 * k6)));
   return [
     x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x),
     y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y,

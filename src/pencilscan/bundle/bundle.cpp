@@ -79,7 +79,8 @@ class ProblemBuilder {
     for (const BoardView& seen : from_.board_views) {
       BundleDevice& device = from_.devices[seen.view.device];
       if (!device.present) continue;
-      auto* cost = new Cost(new BoardCost{{seen.view.pixel, sigma(seen.view)}, seen.position_mm});
+      auto* cost = new Cost(
+          new BoardCost{{seen.view.pixel, sigma(seen.view), device.denominator}, seen.position_mm});
       add(cost, loss_.get(), seen.view.device, from_.board_poses[seen.board].data());
       ordering_->AddElementToGroup(from_.board_poses[seen.board].data(), 1);
     }
@@ -163,11 +164,12 @@ class ProblemBuilder {
   void add_track(std::size_t t) {
     using Cost = ceres::AutoDiffCostFunction<ReprojectionCost, 2, 6, kIntrinsics, 3>;
     for (const TrackView& view : from_.tracks[t].views) {
-      if (!from_.devices[view.device].present) continue;
+      const BundleDevice& device = from_.devices[view.device];
+      if (!device.present) continue;
       const bool is_hub = &view == from_.tracks[t].views.data();
       const double deviation = is_hub ? view.sigma_px : sigma(view);
       // The hub's pixel is no measurement but the place where the others were taken.
-      add(new Cost(new ReprojectionCost{view.pixel, deviation}),
+      add(new Cost(new ReprojectionCost{view.pixel, deviation, device.denominator}),
           is_hub ? nullptr : track_loss_.get(), view.device, from_.points[t].data());
     }
     ordering_->AddElementToGroup(from_.points[t].data(), 0);
@@ -212,7 +214,8 @@ std::size_t present_devices(const BundleProblem& problem) {
 std::optional<Vec2> view_error(const BundleDevice& device, const Vec3& point,
                                const TrackView& view) {
   Vec2 pixel;
-  if (!project_point(device.pose.data(), device.inner.data(), point.data(), pixel.data()))
+  if (!project_point(device.pose.data(), device.inner.data(), device.denominator, point.data(),
+                     pixel.data()))
     return std::nullopt;
   return pixel - view.pixel;
 }
@@ -220,7 +223,8 @@ std::optional<Vec2> view_error(const BundleDevice& device, const Vec3& point,
 ViewLinearization linearize(const BundleDevice& device, const Vec3& point, const TrackView& view,
                             double extra_sigma_px) {
   const ceres::AutoDiffCostFunction<ReprojectionCost, 2, 6, kIntrinsics, 3> cost(
-      new ReprojectionCost{view.pixel, std::hypot(view.sigma_px, extra_sigma_px)});
+      new ReprojectionCost{view.pixel, std::hypot(view.sigma_px, extra_sigma_px),
+                           device.denominator});
   ViewLinearization result;
   const std::array<const double*, 3> parameters{device.pose.data(), device.inner.data(),
                                                 point.data()};

@@ -12,9 +12,10 @@ BundleDevice bundle_device(const Device& device) {
   ceres::RotationMatrixToAngleAxis(R.data(), result.pose.data());  // Eigen is column major, too
   for (Eigen::Index i = 0; i < 3; ++i)
     result.pose[static_cast<std::size_t>(3 + i)] = device.device_from_world.translation[i];
-  result.inner = {device.K(0, 0),       device.K(1, 1),       device.K(0, 2),
-                  device.K(1, 2),       device.distortion[0], device.distortion[1],
-                  device.distortion[2], device.distortion[3], device.distortion[4]};
+  const auto& k = device.distortion;
+  result.inner = {
+      device.K(0, 0), device.K(1, 1), device.K(0, 2), device.K(1, 2), k[0], k[1], k[2], k[3], k[4]};
+  result.denominator = {k[5], k[6], k[7]};
   result.prior = result.inner;
   result.prior[kFy] = result.inner[kFy] / result.inner[kFx];
   return result;
@@ -32,8 +33,7 @@ void set_device(const BundleDevice& from, Device& device) {
   device.K(1, 1) = from.inner[kFy];
   device.K(0, 2) = from.inner[kCx];
   device.K(1, 2) = from.inner[kCy];
-  device.distortion = {from.inner[kK1], from.inner[kK2], from.inner[kP1], from.inner[kP2],
-                       from.inner[kK3]};
+  device.distortion = {lens_coefficients(from.inner.data(), from.denominator)};
   ceres::AngleAxisToRotationMatrix(from.pose.data(), device.device_from_world.rotation.data());
   device.device_from_world.translation = Vec3(from.pose[3], from.pose[4], from.pose[5]);
 }
@@ -61,9 +61,8 @@ Vec3 center_of(const BundleDevice& device) {
 Vec3 device_ray(const BundleDevice& device, const Vec2& pixel) {
   const Vec2 bent((pixel.x() - device.inner[kCx]) / device.inner[kFx],
                   (pixel.y() - device.inner[kCy]) / device.inner[kFy]);
-  const std::array<double, 5> distortion{device.inner[kK1], device.inner[kK2], device.inner[kP1],
-                                         device.inner[kP2], device.inner[kK3]};
-  const Vec2 straight = undistort(distortion, bent);
+  const Vec2 straight =
+      undistort({lens_coefficients(device.inner.data(), device.denominator)}, bent);
   return straight.allFinite() && straight.norm() < 10 ? straight.homogeneous() : bent.homogeneous();
 }
 

@@ -19,6 +19,8 @@ struct BundleDevice {
   /// infinity: nothing known). fy's is on fy / fx.
   std::array<double, kIntrinsics> prior{};
   std::array<double, kIntrinsics> prior_sigma{};
+  /// k4, k5, k6 of the lens (geometry/distortion.h): held as given, never adjusted.
+  std::array<double, 3> denominator{};
   bool present = false;  ///< has a pose and takes part
 };
 
@@ -28,6 +30,14 @@ void set_device(const BundleDevice& from, Device& device);
 
 /// device_from_world.
 void set_pose(BundleDevice& device, const Mat3& rotation, const Vec3& translation);
+
+/// The lens of inner parameters and a denominator; T is double or a Ceres jet.
+template <typename T>
+[[nodiscard]] std::array<T, Distortion::kCoefficients> lens_coefficients(
+    const T* inner, const std::array<double, 3>& denominator) {
+  return {inner[kK1], inner[kK2],        inner[kP1],        inner[kP2],
+          inner[kK3], T(denominator[0]), T(denominator[1]), T(denominator[2])};
+}
 
 /// Direction (z = 1) of a pixel in the device's frame.
 [[nodiscard]] Vec3 device_ray(const BundleDevice& device, const Vec2& pixel);

@@ -6,22 +6,20 @@
 
 namespace pencilscan {
 
-/// Pixel of a point in world; T is double or a Ceres jet. Brown-Conrady distortion as in
-/// geometry/device.h. A point at or behind the pinhole gives no sensible pixel: `ok` is false.
+/// Pixel of a point in world; T is double or a Ceres jet. False at or behind the pinhole, where
+/// there is no sensible pixel.
 template <typename T>
-bool project_point(const T* pose, const T* inner, const T* point, T* pixel) {
+bool project_point(const T* pose, const T* inner, const std::array<double, 3>& denominator,
+                   const T* point, T* pixel) {
   T x[3];
   ceres::AngleAxisRotatePoint(pose, point, x);
   for (int i = 0; i < 3; ++i) x[i] += pose[3 + i];
   if (!(x[2] > T(1e-6))) return false;
-  const T a = x[0] / x[2];
-  const T b = x[1] / x[2];
-  const T r2 = a * a + b * b;
-  const T radial = T(1) + r2 * (inner[kK1] + r2 * (inner[kK2] + r2 * inner[kK3]));
-  const T u = a * radial + T(2) * inner[kP1] * a * b + inner[kP2] * (r2 + T(2) * a * a);
-  const T v = b * radial + inner[kP1] * (r2 + T(2) * b * b) + T(2) * inner[kP2] * a * b;
-  pixel[0] = inner[kFx] * u + inner[kCx];
-  pixel[1] = inner[kFy] * v + inner[kCy];
+  const auto k = lens_coefficients(inner, denominator);
+  T shown[2];
+  distort_coordinates(k.data(), T(x[0] / x[2]), T(x[1] / x[2]), shown);
+  pixel[0] = inner[kFx] * shown[0] + inner[kCx];
+  pixel[1] = inner[kFy] * shown[1] + inner[kCy];
   return true;
 }
 
@@ -29,11 +27,12 @@ bool project_point(const T* pose, const T* inner, const T* point, T* pixel) {
 struct ReprojectionCost {
   Vec2 pixel;
   double sigma;
+  std::array<double, 3> denominator;  ///< of the device's lens
 
   template <typename T>
   bool operator()(const T* pose, const T* inner, const T* point, T* residual) const {
     T projected[2];
-    if (!project_point(pose, inner, point, projected)) return false;
+    if (!project_point(pose, inner, denominator, point, projected)) return false;
     residual[0] = (projected[0] - T(pixel.x())) / T(sigma);
     residual[1] = (projected[1] - T(pixel.y())) / T(sigma);
     return true;

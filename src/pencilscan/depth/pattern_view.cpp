@@ -40,22 +40,10 @@ WindowLines PatternView::lines(const Vec2& m, const Eigen::Matrix2d& jacobian, d
   if (!ok) return lines;
   const Vec2 ideal(x.x() / x.z(), x.y() / x.z());
   const auto axis = static_cast<Eigen::Index>(pattern_->axis);
-  // Pixel = c + J . (ideal - ideal0), J along the pattern's axis.
-  double c = 0;
-  Vec2 J;
-  if (projector_->has_distortion()) {
-    const auto at = [&](const Vec2& p) {
-      return (projector_->K * distort(projector_->distortion, p).homogeneous())[axis];
-    };
-    constexpr double kStep = 1e-5;
-    c = at(ideal);
-    J[0] = (at(ideal + Vec2(kStep, 0)) - at(ideal - Vec2(kStep, 0))) / (2 * kStep);
-    J[1] = (at(ideal + Vec2(0, kStep)) - at(ideal - Vec2(0, kStep))) / (2 * kStep);
-  } else {
-    J = projector_->K.row(axis).head<2>().transpose();
-    c = J.dot(ideal) + projector_->K(axis, 2);
-  }
-  const double line = pattern_->coordinate(c);
+  // Pixel = panel + J . (ideal - ideal0), J along the pattern's axis.
+  const Vec2 panel = projector_->pixel_from_device(ideal.homogeneous());
+  Vec2 J = projector_->pixel_slope(ideal).row(axis).transpose();
+  const double line = pattern_->coordinate(panel[axis]);
   ok = line > -0.5 && line < line_count_ - 0.5;
   J /= pattern_->pitch_px;
   const Eigen::RowVector4d numerator =
@@ -65,9 +53,7 @@ WindowLines PatternView::lines(const Vec2& m, const Eigen::Matrix2d& jacobian, d
   lines.d = (scale * rows.row(2).transpose()).cast<float>();
   // The other panel axis bounds the light too.
   const auto other = 1 - axis;
-  const double along = (projector_->has_distortion()
-                            ? (projector_->K * distort(projector_->distortion, ideal).homogeneous())
-                            : Vec3(projector_->K * ideal.homogeneous()))[other];
+  const double along = panel[other];
   const int extent = other == 0 ? projector_->width : projector_->height;
   ok = ok && along > -0.5 && along < extent - 0.5;
   return lines;

@@ -389,15 +389,7 @@ std::optional<WindowFit> WindowFitter::fit(const Vec2& pixel, const Quadric& sta
   const int v = static_cast<int>(std::lround(pixel[1]));
   if (!gather(u, v)) return std::nullopt;
   const Vec2 m = light_->camera->normalized_from_pixel(pixel);
-  Eigen::Matrix2d jacobian;
-  if (light_->camera->has_distortion()) {
-    jacobian.col(0) = light_->camera->normalized_from_pixel(pixel + Vec2(0.5, 0)) -
-                      light_->camera->normalized_from_pixel(pixel - Vec2(0.5, 0));
-    jacobian.col(1) = light_->camera->normalized_from_pixel(pixel + Vec2(0, 0.5)) -
-                      light_->camera->normalized_from_pixel(pixel - Vec2(0, 0.5));
-  } else {
-    jacobian = light_->camera->K.topLeftCorner<2, 2>().inverse();
-  }
+  const Eigen::Matrix2d jacobian = light_->camera->pixel_slope(m).inverse();
   Quadric q = start;
   choose_patterns(m, jacobian, q);
   if (lit_.empty()) return std::nullopt;

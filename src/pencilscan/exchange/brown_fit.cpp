@@ -58,23 +58,20 @@ BrownFit fit_brown(const Device& device, const LensModel& lens) {
   }
   const Eigen::MatrixXd found = solve_symmetric(normal, right);
   BrownFit fit;
-  std::copy_n(found.data(), 5, fit.distortion.begin());
+  std::copy_n(found.data(), 5, fit.distortion.k.begin());
   for (const Vec2& x : places)
     fit.worst_px = std::max(fit.worst_px,
                             (focal.asDiagonal() * (lens(x) - distort(fit.distortion, x))).norm());
   return fit;
 }
 
-LensModel rational_lens(const std::array<double, 12>& coefficients) {
-  return [c = coefficients](const Vec2& x) -> Vec2 {
+LensModel thin_prism_lens(const std::array<double, 12>& coefficients) {
+  Distortion rational;
+  std::copy_n(coefficients.begin(), rational.k.size(), rational.k.begin());
+  return [rational, s1 = coefficients[8], s2 = coefficients[9], s3 = coefficients[10],
+          s4 = coefficients[11]](const Vec2& x) -> Vec2 {
     const double r2 = x.squaredNorm();
-    const double radial =
-        (1 + r2 * (c[0] + r2 * (c[1] + r2 * c[4]))) / (1 + r2 * (c[5] + r2 * (c[6] + r2 * c[7])));
-    const double cross = 2 * x.x() * x.y();
-    return {
-        x.x() * radial + c[2] * cross + c[3] * (r2 + 2 * x.x() * x.x()) + r2 * (c[8] + r2 * c[9]),
-        x.y() * radial + c[2] * (r2 + 2 * x.y() * x.y()) + c[3] * cross +
-            r2 * (c[10] + r2 * c[11])};
+    return distort(rational, x) + r2 * Vec2(s1 + r2 * s2, s3 + r2 * s4);
   };
 }
 

@@ -21,14 +21,15 @@ void write_camera(const Device& device, std::ostream& text) {
   if (device.K(0, 1) != 0)
     throw InputError("rig", "K of " + device.name, std::to_string(device.K(0, 1)),
                      "COLMAP knows no skew: K[0][1] must be 0");
-  const auto& k = device.distortion;
-  const char* model = k[4] != 0 ? "FULL_OPENCV" : device.has_distortion() ? "OPENCV" : "PINHOLE";
+  const Distortion& k = device.distortion;
+  const bool is_full = k[Distortion::kK3] != 0 || k.is_rational();
+  const char* model = is_full ? "FULL_OPENCV" : device.has_distortion() ? "OPENCV" : "PINHOLE";
   text << model << " " << device.width << " " << device.height << " " << device.K(0, 0) << " "
        << device.K(1, 1) << " " << device.K(0, 2) + kColmapHalfPixel << " "
        << device.K(1, 2) + kColmapHalfPixel;
-  if (device.has_distortion())
-    for (std::size_t i = 0; i < 4; ++i) text << " " << k[i];
-  if (k[4] != 0) text << " " << k[4] << " 0 0 0";
+  constexpr std::size_t kOfOpencvModel = 4;
+  const std::size_t count = is_full ? k.k.size() : device.has_distortion() ? kOfOpencvModel : 0;
+  for (std::size_t i = 0; i < count; ++i) text << " " << k[i];
   text << "\n";
 }
 

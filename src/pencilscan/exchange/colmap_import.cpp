@@ -70,7 +70,7 @@ struct ModelLayout {
   const char* name;
   std::size_t count;
   int fx, fy, cx, cy;
-  std::array<int, 8> distortion;  ///< k1 k2 p1 p2 k3 k4 k5 k6
+  std::array<int, Distortion::kCoefficients> distortion;  ///< in its order
 };
 constexpr std::array<ModelLayout, 6> kLayouts{{
     {"SIMPLE_PINHOLE", 3, 0, 0, 1, 2, {-1, -1, -1, -1, -1, -1, -1, -1}},
@@ -107,11 +107,8 @@ ExchangedDevice parse_camera_line(const ModelFile& file) {
   d.device.K(1, 2) = parameter(layout->cy) - kColmapHalfPixel;
   if (!(d.device.K(0, 0) > 0) || !(d.device.K(1, 1) > 0))
     file.fail(words[kHead], "focal lengths must be > 0");
-  std::array<double, 12> all{};
   for (std::size_t i = 0; i < layout->distortion.size(); ++i)
-    all[i] = parameter(layout->distortion[i]);
-  std::copy_n(all.begin(), 5, d.device.distortion.begin());
-  if (all[5] != 0 || all[6] != 0 || all[7] != 0) d.lens = rational_lens(all);
+    d.device.distortion[i] = parameter(layout->distortion[i]);
   d.given = {true, true, false};
   return d;
 }

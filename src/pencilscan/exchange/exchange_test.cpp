@@ -192,9 +192,21 @@ TEST_F(Exchange, BaseKeepsPatternsAndTakesValuesOver) {
   expect_bad([&] { (void)join_rig(files, base); }, "must be that of --base, 320 x 480");
 }
 
-TEST_F(Exchange, RationalLensBecomesTheNearestBrownOne) {
+TEST_F(Exchange, ARationalLensComesBackWhole) {
+  rig_.cameras[0].distortion = {-0.3, 0.1, 1e-3, -2e-3, 0.02, 0.25, -0.04, 0.01};
+  ExchangedRig files;
+  read_opencv(write("lens.yml", opencv_text(rig_.cameras[0], OpencvSyntax::kYaml)), {}, files);
+  EXPECT_EQ(files.devices[0].device.distortion, rig_.cameras[0].distortion);
+  write_rig(rig_, folder_ / "rational.json");
+  EXPECT_EQ(read_rig(folder_ / "rational.json").cameras[0].distortion, rig_.cameras[0].distortion);
+  write_colmap(rig_, {}, folder_ / "model");
+  const ExchangedRig model = read_colmap(folder_ / "model");
+  EXPECT_EQ(model.devices[0].device.distortion, rig_.cameras[0].distortion);
+}
+
+TEST_F(Exchange, AThinPrismBecomesTheNearestBrownLens) {
   Device device = rig_.cameras[0];
-  const LensModel mild = rational_lens({-0.1, 0.05, 1e-3, 0, 0, 0.02, -0.01, 0, 0, 0, 0, 0});
+  const LensModel mild = thin_prism_lens({-0.1, 0.05, 1e-3, 0, 0, 0.02, -0.01, 0, 0, 0, 0, 0});
   const BrownFit fit = fit_brown(device, mild);
   EXPECT_LT(fit.worst_px, 0.05);
   EXPECT_GT(fit.worst_px, 0);
@@ -203,9 +215,10 @@ TEST_F(Exchange, RationalLensBecomesTheNearestBrownOne) {
   ExchangedRig files;
   std::string text = opencv_text(device, OpencvSyntax::kYaml);
   const auto at = text.find("cols: 5");
-  text.replace(at, 7, "cols: 8");
+  text.replace(at, 7, "cols: 12");
   const auto data = text.find("data: [", at);
-  text.replace(data, text.find(']', data) - data, "data: [ 0., 0., 0., 0., 0., 90., 0., 0. ");
+  text.replace(data, text.find(']', data) - data,
+               "data: [ 0., 0., 0., 0., 0., 0., 0., 0., 9., 0., 0., 0. ");
   read_opencv(write("wild.yml", text), {}, files);
   expect_bad([&] { (void)joined(files); }, "must reproduce its lens");
 }

@@ -24,7 +24,8 @@ cv::Mat camera_matrix(const Device& device) {
 }
 
 cv::Mat coefficients(const Device& device) {
-  return cv::Mat(1, 5, CV_64F, const_cast<double*>(device.distortion.data())).clone();
+  const std::vector<double> stated = device.distortion.stated();
+  return cv::Mat(stated, true).reshape(1, 1);
 }
 
 void write_pose(const RigidTransform& pose, cv::FileStorage& storage) {

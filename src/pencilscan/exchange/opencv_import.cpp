@@ -93,9 +93,10 @@ class OpencvReader {
       fail(node.name(), "tilted sensor", "tx and ty must be 0");
     std::array<double, 12> all{};
     std::copy_n(D.data(), std::min<Eigen::Index>(count, 12), all.begin());
-    std::copy_n(all.begin(), 5, d.device.distortion.begin());
-    if (std::any_of(all.begin() + 5, all.end(), [](double c) { return c != 0; }))
-      d.lens = rational_lens(all);
+    auto& k = d.device.distortion.k;
+    std::copy_n(all.begin(), k.size(), k.begin());
+    if (std::any_of(all.begin() + k.size(), all.end(), [](double c) { return c != 0; }))
+      d.lens = thin_prism_lens(all);
     d.given.distortion = true;
   }
 

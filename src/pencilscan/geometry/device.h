@@ -1,24 +1,24 @@
 #pragma once
 
-#include <array>
 #include <optional>
 #include <string>
 
+#include "pencilscan/geometry/distortion.h"
 #include "pencilscan/geometry/types.h"
 
 namespace pencilscan {
 
-/// A camera or a projector: a pinhole with Brown-Conrady distortion (OpenCV's model and axes:
+/// A camera or a projector: a pinhole with lens distortion (OpenCV's model and axes:
 /// x right, y down, z forward; pixel centres at integers). A projector is a camera that shines.
 struct Device {
   std::string name;
-  int width = 0;                       ///< px, >= 1
-  int height = 0;                      ///< px, >= 1
-  Mat3 K = Mat3::Identity();           ///< upper triangular, K(2,2) = 1, focal > 0
-  std::array<double, 5> distortion{};  ///< k1, k2, p1, p2, k3
+  int width = 0;              ///< px, >= 1
+  int height = 0;             ///< px, >= 1
+  Mat3 K = Mat3::Identity();  ///< upper triangular, K(2,2) = 1, focal > 0
+  Distortion distortion;
   RigidTransform device_from_world;
 
-  [[nodiscard]] bool has_distortion() const;
+  [[nodiscard]] bool has_distortion() const { return !distortion.is_none(); }
   [[nodiscard]] Vec3 center() const;  ///< in world, mm
   [[nodiscard]] Vec3 forward() const { return device_from_world.rotation.row(2).transpose(); }
   /// Pixel of a world point; nothing when the point is not in front of the device.
@@ -27,6 +27,8 @@ struct Device {
   [[nodiscard]] Vec2 pixel_from_device(const Vec3& x_in_device) const;
   /// Undistorted normalised coordinates (z = 1) of a pixel.
   [[nodiscard]] Vec2 normalized_from_pixel(const Vec2& pixel) const;
+  /// Derivative of pixel_from_device(): d pixel / d undistorted normalised coordinates.
+  [[nodiscard]] Eigen::Matrix2d pixel_slope(const Vec2& normalized) const;
   /// World ray through a pixel, from the centre.
   [[nodiscard]] Ray ray(const Vec2& pixel) const;
   /// World point at camera z = depth on the ray of a pixel.
@@ -34,14 +36,6 @@ struct Device {
   /// True inside [-0.5, width - 0.5] x [-0.5, height - 0.5].
   [[nodiscard]] bool contains(const Vec2& pixel) const;
 };
-
-/// Applies Brown-Conrady distortion to normalised coordinates. OpenCV, "Camera Calibration and 3D
-/// Reconstruction": x' = x (1 + k1 r^2 + k2 r^4 + k3 r^6) + 2 p1 x y + p2 (r^2 + 2 x^2), y'
-/// likewise.
-[[nodiscard]] Vec2 distort(const std::array<double, 5>& distortion, const Vec2& normalized);
-
-/// Inverse of distort() by Newton's method, to 1e-12 in normalised units where it converges.
-[[nodiscard]] Vec2 undistort(const std::array<double, 5>& distortion, const Vec2& distorted);
 
 /// Pose of a device at `eye` that looks at `target`, its image upright for world z = up, then
 /// rolled clockwise by roll_rad as seen in the image.

@@ -98,14 +98,9 @@ class PatternOnSurface {
     if (!(h.z() > 0)) return std::nullopt;
     Eigen::Matrix<double, 2, 3> distorted = Eigen::Matrix<double, 2, 3>::Identity();
     if (projector_.has_distortion()) {
-      constexpr double kStep = 1e-3;
       const Vec2 n = (h.head<2>() / h.z()).cast<double>();
-      const auto value = [&](double dx, double dy) {
-        return distort(projector_.distortion, (n + Vec2(dx, dy)).eval());
-      };
-      distorted.col(0) = (value(kStep, 0) - value(-kStep, 0)) / (2 * kStep);
-      distorted.col(1) = (value(0, kStep) - value(0, -kStep)) / (2 * kStep);
-      distorted.col(2) = value(0, 0) - distorted.leftCols<2>() * n;
+      distorted.leftCols<2>() = distortion_slope(projector_.distortion, n);
+      distorted.col(2) = distort(projector_.distortion, n) - distorted.leftCols<2>() * n;
     }
     const auto axis = static_cast<Eigen::Index>(pattern_.axis);
     const auto panel = [&](Eigen::Index row) -> Vec3 {

@@ -42,19 +42,7 @@ Eigen::Matrix<double, 2, 3> projection_jacobian(const Device& device, const Vec3
   const double y = x_in_device.y() * w;
   Eigen::Matrix<double, 2, 3> normalized;
   normalized << w, 0, -x * w, 0, w, -y * w;
-  Eigen::Matrix2d K;
-  K << device.K(0, 0), device.K(0, 1), 0, device.K(1, 1);
-  if (!device.has_distortion()) return K * normalized;
-  // Derivative of distort() (geometry/device.h).
-  const auto [k1, k2, p1, p2, k3] = device.distortion;
-  const double r2 = x * x + y * y;
-  const double radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3));
-  const double radial_slope = k1 + r2 * (2 * k2 + 3 * k3 * r2);
-  Eigen::Matrix2d distorted;
-  distorted(0, 0) = radial + 2 * x * x * radial_slope + 2 * p1 * y + 6 * p2 * x;
-  distorted(0, 1) = distorted(1, 0) = 2 * x * y * radial_slope + 2 * p1 * x + 2 * p2 * y;
-  distorted(1, 1) = radial + 2 * y * y * radial_slope + 6 * p1 * y + 2 * p2 * x;
-  return K * distorted * normalized;
+  return device.pixel_slope({x, y}) * normalized;
 }
 
 Eigen::Matrix<double, 3, 6> pose_jacobian(const Device& device, const PoseCorrection& correction,

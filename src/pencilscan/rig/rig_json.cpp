@@ -75,8 +75,11 @@ void parse_device(const JsonField& field, Device& device, GivenCalibration* give
   }
   if (given == nullptr || given->K) device.K = parse_camera_matrix(field.at("K"));
   if (given == nullptr || given->distortion) {
-    const auto distortion = field.at("distortion").entries(5);
-    for (std::size_t k = 0; k < 5; ++k) device.distortion[k] = distortion[k].number();
+    const auto distortion = field.at("distortion").entries();
+    if (distortion.size() != Distortion::kBrown && distortion.size() != Distortion::kCoefficients)
+      field.at("distortion").fail("must be a list of 5 or 8");
+    for (std::size_t k = 0; k < distortion.size(); ++k)
+      device.distortion[k] = distortion[k].number();
   }
   if (given == nullptr || given->pose)
     device.device_from_world = {parse_rotation(field.at("R")), field.at("t").vector3()};
@@ -328,7 +331,7 @@ Json device_to_json(const Device& device, const GivenCalibration& given) {
   json["width"] = device.width;
   json["height"] = device.height;
   if (given.K) json["K"] = to_json(device.K);
-  if (given.distortion) json["distortion"] = device.distortion;
+  if (given.distortion) json["distortion"] = device.distortion.stated();
   if (given.pose) {
     json["R"] = to_json(device.device_from_world.rotation);
     json["t"] = to_json(device.device_from_world.translation);

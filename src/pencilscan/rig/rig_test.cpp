@@ -242,7 +242,7 @@ TEST_F(RigFile, StructureErrorsNameTheField) {
   EXPECT_THAT(error_after([&](auto& j) {
                 at(j, "/cameras/0/distortion") = {0, 0};
               }),
-              HasSubstr("cameras[0].distortion = [0,0]: must be a list of 5"));
+              HasSubstr("cameras[0].distortion = [0,0]: must be a list of 5 or 8"));
   EXPECT_THAT(error_after([&](auto& j) { at(j, "/cameras/0/width") = 0; }),
               HasSubstr("cameras[0].width = 0: must be an integer"));
   EXPECT_THAT(error_after([&](auto& j) { at(j, "/cameras/0/width") = 12.5; }),
