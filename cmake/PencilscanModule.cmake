@@ -62,6 +62,6 @@ function(pencilscan_module name)
       set(serial TRUE)
     endif()
     gtest_discover_tests(${name}_test TEST_PREFIX "${name}." DISCOVERY_TIMEOUT 60
-                         PROPERTIES TIMEOUT 300 RUN_SERIAL ${serial})
+                         PROPERTIES TIMEOUT 300 RUN_SERIAL ${serial} LABELS unit)
   endif()
 endfunction()

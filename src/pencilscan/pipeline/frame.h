@@ -14,6 +14,7 @@
 #include "pencilscan/guided/second_look.h"
 #include "pencilscan/labeling/measured_point.h"
 #include "pencilscan/pipeline/method.h"
+#include "pencilscan/pipeline/stage_clock.h"
 #include "pencilscan/points/settle.h"
 #include "pencilscan/points/triangulate.h"
 #include "pencilscan/refinement/crossing_tracks.h"
@@ -54,12 +55,6 @@ struct ShapeOptions {
   FusionOptions fusion;    ///< of dense depth
   SurfaceOptions surface;  ///< of the curves alone, where dense depth is off or finds nothing
   Progress progress;       ///< as in PointOptions
-};
-
-/// Seconds of one stage, wall clock.
-struct StageTime {
-  std::string stage;
-  double seconds = 0;
 };
 
 /// Labelled points of one frame and everything that led to them.

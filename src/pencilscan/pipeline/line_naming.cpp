@@ -33,9 +33,7 @@ LineNaming name_lines(const Rig& rig, const std::vector<ColorFamily>& families,
   constexpr double kAsWell = 1.2;       // crossings' misses, of those before
   constexpr double kClearlyLess = 0.8;  // the same
   LineNaming result;
-  const SolutionMethod& method = solution_method(options.method);
   result.labeling = std::move(labeling);
-  if (!method.capabilities.corrects_rig) return result;
   judge(rig, graphs, result);
   const bool is_off = disagrees(result.crossings);
   const auto points = static_cast<double>(labelled_points(result.labeling));

@@ -16,10 +16,10 @@ struct LineNaming {
   std::optional<Warning> warning;
 };
 
-/// Keeps the names that the solution gave with the rig as given. Where their crossings then miss
-/// each other, or many curves stay without a name, with the rig as the crossings correct it
-/// (refine_rig_on_frames), if its own crossings agree, or agree better, or clearly more curves have
-/// a name.
+/// Of a method that may correct the rig (MethodCapabilities). Keeps the names that the solution
+/// gave with the rig as given. Where their crossings then miss each other, or many curves stay
+/// without a name, with the rig as the crossings correct it (refine_rig_on_frames), if its own
+/// crossings agree, or agree better, or clearly more curves have a name.
 [[nodiscard]] LineNaming name_lines(const Rig& rig, const std::vector<ColorFamily>& families,
                                     const std::vector<GridGraph>& graphs, Labeling labeling,
                                     const PointOptions& options);

@@ -1,0 +1,150 @@
+#include <algorithm>
+#include <cmath>
+#include <functional>
+
+#include "pencilscan/core/check.h"
+#include "pencilscan/core/parallel.h"
+#include "pencilscan/pipeline/frame.h"
+#include "pencilscan/rig/camera_light.h"
+#include "pencilscan/surface/vertex_color.h"
+
+namespace pencilscan {
+namespace {
+
+/// `linear` with NaN where the image as read is overexposed.
+cv::Mat without_overexposed(const cv::Mat& linear, const cv::Mat& values) {
+  cv::Mat image = linear.clone();
+  image.setTo(cv::Scalar::all(std::nan("")), overexposed(values));
+  return image;
+}
+
+/// What camera c sees in the light of the projectors, or in plain light where it is a texture
+/// camera.
+ColorView lit_view(const Rig& rig, const Frame& frame, std::size_t c, const PointResult& points,
+                   const DepthReport& depth) {
+  const Camera& camera = rig.cameras[c];
+  ColorView view;
+  view.camera = static_cast<int>(c);
+  view.is_plain = camera.sees_texture_only;
+  const cv::Mat linear = linear_light(camera, frame.images[c]);
+  view.image = view.is_plain ? registered(camera, linear)
+                             : projector_light(camera, linear, points.detections[c].unmixing);
+  view.image = without_overexposed(view.image, frame.images[c]);
+  for (const CameraDepthReport& of_camera : depth.cameras) {
+    if (of_camera.camera == view.camera) view.blur_px = of_camera.blur_px;
+  }
+  return view;
+}
+
+ColorView plain_view(const Rig& rig, const Frame& frame, std::size_t c) {
+  const Camera& camera = rig.cameras[c];
+  ColorView view;
+  view.camera = static_cast<int>(c);
+  view.is_plain = true;
+  view.image =
+      without_overexposed(registered(camera, linear_light(camera, frame.plain[c])), frame.plain[c]);
+  return view;
+}
+
+/// Images as vertex_colors() wants them.
+std::vector<ColorView> color_views(const Rig& rig, const Frame& frame, const PointResult& points,
+                                   const DepthReport& depth) {
+  std::vector<std::function<ColorView()>> makers;
+  for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
+    if (!frame.images[c].empty())
+      makers.push_back([&, c] { return lit_view(rig, frame, c, points, depth); });
+  }
+  for (std::size_t c = 0; c < frame.plain.size(); ++c) {
+    if (!frame.plain[c].empty()) makers.push_back([&, c] { return plain_view(rig, frame, c); });
+  }
+  std::vector<ColorView> views(makers.size());
+  parallel_for(views.size(), [&](std::size_t i) { views[i] = makers[i](); });
+  return views;
+}
+
+/// Of the cameras that see the projectors' light.
+std::vector<Silhouette> silhouettes_of(const Rig& rig, const std::vector<ColorView>& views) {
+  std::vector<const ColorView*> lit;
+  for (const ColorView& view : views) {
+    if (!view.is_plain) lit.push_back(&view);
+  }
+  std::vector<Silhouette> silhouettes(lit.size());
+  parallel_for(lit.size(), [&](std::size_t i) {
+    const Camera& camera = rig.camera(lit[i]->camera);
+    silhouettes[i] = silhouette(lit[i]->camera, lit[i]->image, line_reach_px(rig, camera));
+  });
+  return silhouettes;
+}
+
+/// The measured mesh has vertices of the closed one, in the same order.
+void copy_colors(const TriangleMesh& mesh, TriangleMesh& measured) {
+  std::size_t v = 0;
+  for (const Vec3& x : measured.vertices) {
+    while (v < mesh.vertices.size() && mesh.vertices[v] != x) ++v;
+    if (v == mesh.vertices.size()) break;
+    measured.color.push_back(mesh.color[v]);
+  }
+  PENCILSCAN_CHECK(measured.color.size() == measured.vertices.size());
+}
+
+/// Dense depth of all cameras.
+DepthResult depth_of(const Rig& rig, const Frame& frame, const PointResult& points,
+                     const DepthStageOptions& options) {
+  std::vector<Unmixing> unmixings;
+  for (const CameraDetection& detection : points.detections)
+    unmixings.push_back(detection.unmixing);
+  return measure_depth(rig, points.families, frame.images, unmixings, points.points, options);
+}
+
+/// The depth maps become one closed surface, which lets depth be completed where it was missing and
+/// then follows it.
+void fuse(const Rig& rig, const PointResult& points, const std::vector<ColorView>& views,
+          const ShapeOptions& options, ShapeResult& result) {
+  result.surface = close_depth(rig, result.depth.maps, options.fusion, silhouettes_of(rig, views));
+  complete_depth(rig, RayScene(result.surface.mesh), options.depth, result.depth);
+  result.depth.lights.clear();
+  follow_depth(rig, points.points, result.depth.maps, options.fusion, result.surface);
+}
+
+void mark_holes(const Rig& rig, ShapeResult& result) {
+  result.scene = std::make_shared<RayScene>(result.surface.mesh);
+  result.holes = explain_holes(rig, *result.scene, result.depth.maps);
+  for (const HoleReason reason : result.holes.vertices)
+    result.surface.mesh.hole.push_back(static_cast<std::uint8_t>(reason));
+}
+
+}  // namespace
+
+ShapeResult measure_shape(const Rig& stated, const Frame& frame, const PointResult& points,
+                          const ShapeOptions& options) {
+  const Rig rig = with_registered_patterns(stated);
+  ShapeResult result;
+  const StageClock clock(options.progress, result.times);
+  if (options.depth.enabled) {
+    clock("depth", [&] { result.depth = depth_of(rig, frame, points, options.depth); });
+    std::vector<ColorView> views;
+    clock("surface", [&] {
+      views = color_views(rig, frame, points, result.depth.report);
+      fuse(rig, points, views, options, result);
+    });
+    if (result.surface.report.status != SurfaceStatus::kTooFewPoints) {
+      clock("holes", [&] { mark_holes(rig, result); });
+      clock("color", [&] {
+        TriangleMesh& mesh = result.surface.mesh;
+        mesh.color = vertex_colors(rig, *result.scene, views);
+        if (!mesh.color.empty()) copy_colors(mesh, result.surface.measured);
+      });
+      return result;
+    }
+  }
+  clock("surface",
+        [&] { result.surface = reconstruct_surface(rig, points.points, options.surface); });
+  if (options.depth.enabled) {
+    Warning& warning = result.surface.report.warnings.emplace_back();
+    warning.code = WarningCode::kCurvesOnly;
+    warning.text = "dense depth found too little: the surface rests on the labelled curves alone";
+  }
+  return result;
+}
+
+}  // namespace pencilscan
