@@ -1,9 +1,12 @@
 // From the images of one frame to labelled points, and with --shape on to the mesh, stage by stage,
-// as blur ratios (reference_blur.h).
+// as blur ratios (reference_blur.h); how busy the threads are, memory, and frames made at once.
+
+#include <sys/resource.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
+#include <ctime>
 #include <exception>
 #include <filesystem>
 #include <map>
@@ -26,23 +29,82 @@ namespace {
 Frame read_frame(const Rig& rig, const std::filesystem::path& folder) {
   Frame frame;
   frame.name = folder.filename().string();
-  for (const Camera& camera : rig.cameras) {
+  frame.images.resize(rig.cameras.size());
+  parallel_for(rig.cameras.size(), [&](std::size_t c) {
+    const Camera& camera = rig.cameras[c];
     const auto path = find_image(folder, camera.name);
-    frame.images.push_back(path ? read_camera_image(camera, *path) : cv::Mat());
-  }
+    if (path) frame.images[c] = read_camera_image(camera, *path);
+  });
   return frame;
 }
+
+/// Of all threads of the process, s.
+double cpu_seconds() {
+  timespec now{};
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+/// Largest memory of the process so far, GB.
+double peak_memory_gb() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<double>(usage.ru_maxrss) / (1 << 20);
+}
+
+/// Wall and processor time of something that is done several times.
+class Times {
+ public:
+  template <class Work>
+  void measure(Work&& work) {
+    const double cpu = cpu_seconds();
+    const Stopwatch watch;
+    work();
+    wall_.push_back(watch.seconds());
+    busy_.push_back((cpu_seconds() - cpu) / wall_.back());
+  }
+  void forget_warm_up() {
+    wall_.erase(wall_.begin());
+    busy_.erase(busy_.begin());
+  }
+  [[nodiscard]] double wall() const { return median(wall_); }
+  /// How many processors work, on average.
+  [[nodiscard]] double busy() const { return median(busy_); }
+
+ private:
+  static double median(std::vector<double> values) {
+    std::sort(values.begin(), values.end());
+    return values[values.size() / 2];
+  }
+  std::vector<double> wall_;
+  std::vector<double> busy_;
+};
 
 double median(std::vector<double> values) {
   std::sort(values.begin(), values.end());
   return values[values.size() / 2];
 }
 
-void print_row(const std::string& stage, double seconds, double blur_seconds) {
-  std::printf("%-24s %9.1f %9.1f\n", stage.c_str(), 1e3 * seconds, seconds / blur_seconds);
+/// `share`: of the whole; negative: nothing to say.
+void print_row(const std::string& stage, double seconds, double blur_seconds, double share) {
+  std::printf("%-24s %9.1f %9.1f", stage.c_str(), 1e3 * seconds, seconds / blur_seconds);
+  if (share >= 0) std::printf(" %8.1f %%", 100 * share);
+  std::printf("\n");
 }
 
-void run(const Rig& stated, const Frame& frame, int threads, int runs, bool with_shape) {
+/// Seconds a frame when several are made at once, as a sequence makes them.
+double seconds_at_once(const Rig& rig, const Frame& frame, bool with_shape) {
+  constexpr std::size_t kFrames = 8;
+  const auto at_once = static_cast<std::size_t>((thread_count() + 2) / 2);
+  const Stopwatch watch;
+  run_at_once(kFrames, at_once, [&](std::size_t) {
+    static_cast<void>(reconstruct_frame(rig, frame, {}, {}, with_shape));
+  });
+  return watch.seconds() / kFrames;
+}
+
+void run(const Rig& stated, const std::filesystem::path& folder, int threads, int runs,
+         bool with_shape) {
   const ThreadLimit limit(threads);
   const Rig rig = scaled(stated, 1 / footprint(stated));
   cv::setNumThreads(1);  // the cameras share the threads
@@ -51,43 +113,53 @@ void run(const Rig& stated, const Frame& frame, int threads, int runs, bool with
   const double blur_before = reference_blur_seconds();
   std::vector<std::string> stages;  // in the order in which they run
   std::map<std::string, std::vector<double>> seconds_by_stage;
-  std::vector<double> total_seconds;
-  std::vector<double> shape_seconds;  // depth to mesh
-  std::size_t points = 0;
+  Times reading;
+  Times points;
+  Times shape;  // depth to mesh
+  std::size_t point_count = 0;
+  Frame frame;
   for (int i = 0; i <= runs; ++i) {  // the first run warms up
-    const Stopwatch watch;
-    PointResult result = measure_points(rig, frame);
-    const double seconds = watch.seconds();
-    const Stopwatch shape_watch;
+    reading.measure([&] { frame = read_frame(rig, folder); });
+    PointResult result;
+    points.measure([&] { result = measure_points(rig, frame); });
     std::vector<StageTime> times = result.times;
-    if (with_shape) {
-      ShapeResult shape = measure_shape(rig, frame, result);
-      look_again(rig, {}, result, shape);
-      times.insert(times.end(), shape.times.begin(), shape.times.end());
+    shape.measure([&] {
+      if (!with_shape) return;
+      ShapeResult made = measure_shape(rig, frame, result);
+      look_again(rig, {}, result, made);
+      times.insert(times.end(), made.times.begin(), made.times.end());
       times.push_back(result.times.back());
-    }
+    });
     if (i == 0) {
       for (const StageTime& time : times) stages.push_back(time.stage);
-      points = result.points.size();
+      point_count = result.points.size();
       continue;
     }
-    total_seconds.push_back(seconds);
-    shape_seconds.push_back(shape_watch.seconds());
     for (const StageTime& time : times) seconds_by_stage[time.stage].push_back(time.seconds);
   }
+  for (Times* of : {&reading, &points, &shape}) of->forget_warm_up();
+  const double memory = peak_memory_gb();
+  const double alone = points.wall() + (with_shape ? shape.wall() : 0);
+  const double at_once = seconds_at_once(stated, frame, with_shape);
   const double blur_after = reference_blur_seconds();
   const double blur = std::min(blur_before, blur_after);
 
   std::printf("%zu cameras, %zu projectors, %zu points; %d threads, medians of %d runs\n",
-              rig.cameras.size(), rig.projectors.size(), points, thread_count(), runs);
+              rig.cameras.size(), rig.projectors.size(), point_count, thread_count(), runs);
   std::printf("reference blur %.1f ms before, %.1f ms after; the smaller counts\n\n",
               1e3 * blur_before, 1e3 * blur_after);
-  std::printf("%-24s %9s %9s\n", "", "ms", "ratio");
+  std::printf("%-24s %9s %9s %10s\n", "", "ms", "ratio", "share");
   for (const std::string& stage : stages) {
-    print_row(stage, median(seconds_by_stage[stage]), blur);
+    const double seconds = median(seconds_by_stage[stage]);
+    print_row(stage, seconds, blur, seconds / alone);
   }
-  print_row("images to points", median(total_seconds), blur);
-  if (with_shape) print_row("points to colored mesh", median(shape_seconds), blur);
+  print_row("pictures read", reading.wall(), blur, -1);
+  print_row("images to points", points.wall(), blur, -1);
+  if (with_shape) print_row("points to colored mesh", shape.wall(), blur, -1);
+  print_row("a frame of several", at_once, blur, -1);
+  std::printf("\nprocessors at work: %.2f to points", points.busy());
+  if (with_shape) std::printf(", %.2f to the mesh", shape.busy());
+  std::printf("; memory %.2f GB at most, one frame at a time\n", memory);
 }
 
 }  // namespace
@@ -110,7 +182,7 @@ int main(int argc, char** argv) {
   CLI11_PARSE(app, argc, argv);
   try {
     const Rig rig = read_rig(rig_path);
-    run(rig, read_frame(rig, frame_folder), threads, runs, with_shape);
+    run(rig, frame_folder, threads, runs, with_shape);
   } catch (const std::exception& error) {
     std::fprintf(stderr, "frame_benchmark: %s\n", error.what());
     return 1;

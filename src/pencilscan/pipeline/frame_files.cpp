@@ -4,6 +4,7 @@
 
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/lower_case.h"
+#include "pencilscan/core/parallel.h"
 #include "pencilscan/io/file.h"
 #include "pencilscan/io/found_files.h"
 #include "pencilscan/io/hash.h"
@@ -64,10 +65,10 @@ std::vector<FrameFiles> find_frames(const Rig& rig, const std::filesystem::path&
 }
 
 std::vector<cv::Mat> read_images(const Rig& rig, const FrameFiles& files) {
-  std::vector<cv::Mat> images;
-  for (std::size_t c = 0; c < files.images.size(); ++c)
-    images.push_back(files.images[c] ? read_camera_image(rig.cameras[c], *files.images[c])
-                                     : cv::Mat());
+  std::vector<cv::Mat> images(files.images.size());
+  run_at_once(images.size(), static_cast<std::size_t>(thread_count()), [&](std::size_t c) {
+    if (files.images[c]) images[c] = read_camera_image(rig.cameras[c], *files.images[c]);
+  });
   return images;
 }
 
