@@ -4,15 +4,12 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "pencilscan/capture/gray_capture.h"
-#include "pencilscan/capture/lab_file.h"
 #include "pencilscan/capture/projector_tests.h"
-#include "pencilscan/capture/record.h"
 #include "pencilscan/cli/command.h"
 #include "pencilscan/cli/interruption.h"
+#include "pencilscan/cli/lab_devices.h"
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/parallel.h"
-#include "pencilscan/display/x_screen.h"
 
 namespace pencilscan::cli {
 namespace {
@@ -76,17 +73,6 @@ void end_with(const std::vector<Fault>& faults) {
   if (!faults.empty()) throw StageError(to_string(faults.front()));
 }
 
-std::unique_ptr<ProjectorScreen> open_lab_screen(const Rig& rig, const Lab& lab,
-                                                 const std::string& source) {
-  const auto outputs = XScreen().outputs();
-  std::vector<Projector> projectors;
-  for (const OutputUse& use : uses_of(rig, outputs, lab.outputs, source)) {
-    projectors.push_back(*use.projector);
-    projectors.back().output = use.output->name;
-  }
-  return open_screen(std::move(projectors));
-}
-
 /// Cameras that are opened, set and running.
 struct Running {
   Rig rig;
@@ -101,15 +87,7 @@ Running start(const CaptureCommand& command) {
   running.rig = read_devices(command.rig_path).rig;
   running.lab = lab_of(command);
   const std::string source = command.lab_path.empty() ? "command line" : command.lab_path;
-  running.cameras =
-      std::make_unique<LiveCameras>(open_lab_cameras(running.lab, running.rig, source));
-  for (std::size_t c = 0; c < running.rig.cameras.size(); ++c) {
-    running.cameras->group().configure(c, settings_for(running.lab, running.rig.cameras[c]));
-    const auto exposure = running.cameras->group().settings(c).exposure_us;
-    LabCamera& camera = running.lab.cameras[running.rig.cameras[c].name];
-    if (exposure && !camera.exposure_ms) camera.exposure_ms = *exposure / 1000;
-  }
-  running.cameras->start();
+  running.cameras = start_lab_cameras(running.rig, running.lab, source);
   return running;
 }
 
@@ -138,14 +116,9 @@ void record_frames(const CaptureCommand& command, Interruption& interruption) {
     screen = open_lab_screen(running.rig, running.lab, command.rig_path);
     screen->show_all({ProjectorPicture::Kind::kLines, 0, {}});
   }
-  RecordOptions options;
-  options.rate_hz = running.lab.rate_hz;
+  RecordOptions options = record_options(running.lab, command.still);
   options.seconds = command.seconds;
   options.frames = command.frames;
-  options.max_spread_ms = command.still ? 0 : spread_limit_ms(running.lab);
-  options.one_clock = running.lab.trigger == Trigger::kPtp;
-  options.one_trigger = running.lab.trigger == Trigger::kWire;
-  options.software_trigger = running.lab.trigger == Trigger::kSoftware;
   options.keep_partial = !command.whole_only;
   const Progress progress = stderr_progress();
   RecordReport report =
@@ -167,12 +140,8 @@ void record_frames(const CaptureCommand& command, Interruption& interruption) {
 void capture_gray(const CaptureCommand& command, Interruption& interruption) {
   Running running = start(command);
   const auto screen = open_lab_screen(running.rig, running.lab, command.rig_path);
-  GrayCaptureOptions options;
+  GrayCaptureOptions options = gray_options(running.rig, running.lab);
   options.solids = command.solids;
-  for (const Projector& projector : running.rig.projectors) {
-    const auto delay = running.lab.delay_ms.find(projector.name);
-    options.delay_ms.push_back(delay == running.lab.delay_ms.end() ? 0 : delay->second);
-  }
   const Progress progress = stderr_progress();
   const GrayCaptureReport report =
       capture_gray_codes(*running.cameras, *screen, running.rig, command.out, options,

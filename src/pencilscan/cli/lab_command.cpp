@@ -2,35 +2,99 @@
 
 #include "pencilscan/cli/command.h"
 #include "pencilscan/cli/interruption.h"
+#include "pencilscan/cli/lab_desk.h"
 #include "pencilscan/cli/virtual_lab_run.h"
 #include "pencilscan/core/error.h"
+#include "pencilscan/core/parallel.h"
 
 namespace pencilscan::cli {
+namespace {
+
+struct LabCommand {
+  VirtualLabCommand virtual_lab;
+  bool is_virtual = false;
+  bool page = false;
+  std::string lab_path;
+  std::vector<std::string> known_distance;
+  int port = 0;
+};
+
+/// What only one of the two kinds of laboratories has.
+void check_kind(const LabCommand& command) {
+  const VirtualLabCommand& made = command.virtual_lab;
+  const auto require = [](bool holds, const char* option, const char* rule) {
+    if (!holds) throw InputError("command line", option, "", rule);
+  };
+  if (command.is_virtual) {
+    require(command.lab_path.empty(), "--lab", "is for real devices: not with --virtual");
+    require(command.known_distance.empty(), "--known-distance",
+            "is for real devices: not with --virtual");
+    return;
+  }
+  require(!made.rig_path.empty(), "--rig", "is required, but for --virtual");
+  require(!command.lab_path.empty(), "--lab", "is required, but for --virtual");
+  for (const auto& [given, option] : {std::pair{!made.mesh_path.empty(), "--mesh"},
+                                      {made.poses > 0, "--poses"},
+                                      {made.small, "--small"}})
+    require(!given, option, "needs --virtual");
+}
+
+void run_lab(const LabCommand& command) {
+  check_kind(command);
+  Interruption interruption;  // before any thread
+  const VirtualLabCommand& made = command.virtual_lab;
+  if (command.is_virtual && !command.page) return run_virtual_lab(made, interruption);
+  LabServer server(command.port);
+  if (command.is_virtual) return serve_virtual_lab(made, server, interruption);
+  const ThreadLimit threads(made.common.threads);
+  serve_lab({made.rig_path,
+             read_lab(command.lab_path),
+             command.lab_path,
+             made.out,
+             command.known_distance,
+             made.common.threads,
+             {}},
+            server, interruption);
+}
+
+}  // namespace
 
 void add_lab_command(CLI::App& app) {
-  auto options = std::make_shared<VirtualLabCommand>();
-  auto is_virtual = std::make_shared<bool>(false);
+  auto options = std::make_shared<LabCommand>();
+  VirtualLabCommand& made = options->virtual_lab;
   CLI::App* command = app.add_subcommand(
-      "lab", "From nothing to a mesh in a laboratory without devices (--virtual)");
-  command->add_flag("--virtual", *is_virtual,
+      "lab",
+      "A page that helps to set up, calibrate and take frames (Ctrl-C stops); with --virtual a "
+      "laboratory without devices, from nothing to a mesh");
+  command->add_option("--out", made.out, "Folder for poses, rig, frames and logs")->required();
+  command->add_option("--rig", made.rig_path,
+                      "The devices (rig.json; K, distortion, R and t may be missing); with "
+                      "--virtual the rig to build (default: a ring of 6 cameras and 6 projectors)");
+  command->add_option("--lab", options->lab_path,
+                      "Which device each camera is, and how it is set (lab.json)");
+  command
+      ->add_option("--known-distance", options->known_distance,
+                   "Two devices and the distance of their centres in mm: cam0 cam1 850")
+      ->expected(3);
+  command->add_option("--port", options->port, "Of the page; 0: any free one")
+      ->check(between(0, 65535))
+      ->capture_default_str();
+  command->add_flag("--virtual", options->is_virtual,
                     "An X server without hardware, cameras that are programs, simulated light");
-  command->add_option("--out", options->out, "New folder for all of it")->required();
-  command->add_option("--rig", options->rig_path,
-                      "The rig to build (rig.json; default: a ring of 6 cameras and 6 projectors)");
-  command->add_option("--mesh", options->mesh_path,
-                      "The object (PLY, OBJ, STL or OFF), fitted into the rig's volume");
-  command->add_option("--poses", options->poses, "Captures to calibrate with (default 3, small: 2)")
+  command->add_flag("--page", options->page, "With --virtual: the page, instead of all at once");
+  command->add_option("--mesh", made.mesh_path,
+                      "With --virtual: the object (PLY, OBJ, STL or OFF), fitted into the volume");
+  command
+      ->add_option("--poses", made.poses,
+                   "With --virtual: captures to calibrate with (default 3, small: 2)")
       ->check(between(1, 20));
-  command->add_option("--noise", options->noise, "Sensor preset, as of simulate")
+  command->add_option("--noise", made.noise, "With --virtual: sensor preset, as of simulate")
       ->check(one_of({"none", "low", "medium", "high"}))
       ->capture_default_str();
-  command->add_flag("--small", options->small, "Few devices with few pixels: half a minute");
-  add_common_options(*command, options->common, "pencilscan lab --virtual --small --out trial");
-  command->callback([options, is_virtual] {
-    if (!*is_virtual) throw InputError("command line", "--virtual", "", "is required");
-    Interruption interruption;  // before any thread
-    run_virtual_lab(*options, interruption);
-  });
+  command->add_flag("--small", made.small,
+                    "With --virtual: few devices with few pixels, half a minute");
+  add_common_options(*command, made.common, "pencilscan lab --virtual --small --out trial");
+  command->callback([options] { run_lab(*options); });
 }
 
 }  // namespace pencilscan::cli

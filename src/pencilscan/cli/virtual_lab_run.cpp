@@ -2,20 +2,19 @@
 
 #include <Eigen/Geometry>
 #include <filesystem>
-#include <fstream>
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
 #include "pencilscan/cli/interruption.h"
-#include "pencilscan/core/child_process.h"
+#include "pencilscan/cli/lab_desk.h"
+#include "pencilscan/cli/own_command.h"
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/core/private_network.h"
 #include "pencilscan/core/random.h"
 #include "pencilscan/core/stopwatch.h"
-#include "pencilscan/io/file.h"
 #include "pencilscan/io/mesh_file.h"
 #include "pencilscan/lab/virtual_lab.h"
 #include "pencilscan/lab/virtual_objects.h"
@@ -33,7 +32,7 @@ constexpr double kFocalError = 1e-3;
 constexpr double kCenterErrorPx = 1;
 /// Three frames: more than the X server and its watch ever need.
 constexpr double kSmallDelayMs = 50;
-constexpr double kTurn = 0.05;  ///< s between looks at a command that runs
+constexpr int kMostCameras = 64;  ///< addresses of the network
 
 /// Five devices on a third of a circle, with a seventh of the usual pixels: for quick tries.
 Rig small_ring() {
@@ -103,10 +102,59 @@ RigidTransform calibrated_from_true(const Rig& truth, const Rig& calibrated) {
   return {moved.topLeftCorner<3, 3>(), moved.topRightCorner<3, 1>()};
 }
 
+/// A virtual laboratory with its things.
+struct VirtualPlace {
+  Rig rig;
+  TriangleMesh object;
+  std::unique_ptr<VirtualLab> lab;
+  std::uint64_t seed = 1;
+
+  /// Writes what is true, and what an owner would know, to `out`.
+  VirtualPlace(const VirtualLabCommand& command, const fs::path& out);
+  /// A heap for a pose, from 1; 0: the object.
+  void arrange(int pose) {
+    const TriangleMesh heap =
+        pose == 0 ? TriangleMesh()
+                  : make_heap(working_volume(rig), seed + static_cast<std::uint64_t>(pose));
+    lab->room().place(SimulatedObject(pose == 0 ? object : heap));
+  }
+  /// Of two cameras, as by a tape.
+  [[nodiscard]] std::vector<std::string> known_distance() const {
+    if (rig.cameras.size() < 2) return {};
+    return {rig.cameras[0].name, rig.cameras[1].name,
+            digits((rig.cameras[0].center() - rig.cameras[1].center()).norm())};
+  }
+};
+
+VirtualPlace::VirtualPlace(const VirtualLabCommand& command, const fs::path& out)
+    : rig(!command.rig_path.empty() ? read_rig(command.rig_path)
+          : command.small           ? small_ring()
+                                    : make_ring()),
+      seed(command.common.seed) {
+  const Sphere volume = working_volume(rig);
+  object = command.mesh_path.empty() ? make_pebble(volume)
+                                     : fitted(read_mesh(command.mesh_path), volume);
+  for (const char* folder : {"logs", "screen", "truth"}) fs::create_directories(out / folder);
+  write_rig(rig, out / "truth" / "rig.json");
+  write_mesh(out / "truth" / "object.ply", object);
+  write_devices(devices_of(rig, seed), out / "devices.json");
+  PhotographyOptions photo;
+  photo.noise = command.noise;
+  photo.seed = seed;
+  lab = std::make_unique<VirtualLab>(rig, out / "screen", photo);
+  Lab file = lab->lab_file();
+  if (command.small)  // nobody measures it
+    for (const Projector& projector : rig.projectors) file.delay_ms[projector.name] = kSmallDelayMs;
+  write_lab(file, out / "lab.json");
+}
+
 class VirtualRun {
  public:
   VirtualRun(const VirtualLabCommand& command, Interruption& interruption)
-      : command_(command), interruption_(interruption), out_(fs::absolute(command.out)) {}
+      : command_(command),
+        interruption_(interruption),
+        out_(fs::absolute(command.out)),
+        place_(command, out_) {}
   void run();
 
  private:
@@ -114,90 +162,38 @@ class VirtualRun {
   /// Runs a command of this program; its words go to logs/NAME.txt, its figures are returned.
   /// StageError with its complaint when it fails.
   Json step(const std::string& name, const Words& words);
-  void prepare();
   void calibrate();
   void record();
   [[nodiscard]] Json judge(const std::string& name, const fs::path& rig, const fs::path& frames,
                            const fs::path& truth);
   [[nodiscard]] Json plain_frame();
-  void place(const TriangleMesh& mesh) { lab_->room().place(SimulatedObject(mesh)); }
   [[nodiscard]] std::string at(const std::string& file) const { return (out_ / file).string(); }
 
   const VirtualLabCommand& command_;
   Interruption& interruption_;
   fs::path out_;
-  Rig rig_;
-  TriangleMesh object_;
-  std::unique_ptr<VirtualLab> lab_;
+  VirtualPlace place_;
   Json figures_;
 };
-
-/// The last thing a command said of itself, without its name.
-std::string complaint_in(const fs::path& log) {
-  const std::string own = "pencilscan: ";
-  std::ifstream file(log);
-  std::string last;
-  for (std::string line; std::getline(file, line);) {
-    // Progress ends in carriage returns where it is no line of its own.
-    line.erase(0, line.find_last_of('\r') == std::string::npos ? 0 : line.find_last_of('\r') + 1);
-    if (line.starts_with(own)) last = line.substr(own.size());
-  }
-  return last;
-}
 
 Json VirtualRun::step(const std::string& name, const Words& words) {
   std::cerr << "$ pencilscan";
   for (const std::string& word : words) std::cerr << " " << word;
   std::cerr << std::endl;
-  const fs::path log = out_ / "logs" / (name + ".txt");
-  const fs::path json = out_ / "logs" / (name + ".json");
-  Words all{fs::read_symlink("/proc/self/exe").string()};
-  all.insert(all.end(), words.begin(), words.end());
-  all.insert(all.end(), {"--json", json.string()});
-  if (command_.common.threads > 0)
-    all.insert(all.end(), {"--threads", std::to_string(command_.common.threads)});
-  ChildProcess::Options options;
-  options.error_file = log.string();
   const Stopwatch watch;
-  ChildProcess child(all, options);
-  std::optional<int> code;
-  while (!(code = child.wait(ChildProcess::Seconds(kTurn)))) {
-    if (interruption_.within(0)) throw StageError("stopped");
-  }
+  Json figures = run_own_command({words, out_ / "logs" / (name + ".txt"),
+                                  out_ / "logs" / (name + ".json"), command_.common.threads},
+                                 [&] { return !interruption_.within(0); });
   figures_["seconds"][name] = watch.seconds();
-  if (*code != 0)
-    throw StageError(name + " failed: " + complaint_in(log) + " (" + log.string() + ")");
-  return fs::exists(json) ? Json(read_json(json)) : Json();
-}
-
-void VirtualRun::prepare() {
-  rig_ = !command_.rig_path.empty() ? read_rig(command_.rig_path)
-         : command_.small           ? small_ring()
-                                    : make_ring();
-  const Sphere volume = working_volume(rig_);
-  object_ = command_.mesh_path.empty() ? make_pebble(volume)
-                                       : fitted(read_mesh(command_.mesh_path), volume);
-  for (const char* folder : {"logs", "screen", "truth"}) fs::create_directories(out_ / folder);
-  write_rig(rig_, out_ / "truth" / "rig.json");
-  write_mesh(out_ / "truth" / "object.ply", object_);
-  write_devices(devices_of(rig_, command_.common.seed), out_ / "devices.json");
-  PhotographyOptions photo;
-  photo.noise = command_.noise;
-  photo.seed = command_.common.seed;
-  lab_ = std::make_unique<VirtualLab>(rig_, out_ / "screen", photo);
-  Lab lab = lab_->lab_file();
-  if (command_.small)  // nobody measures it
-    for (const Projector& projector : rig_.projectors) lab.delay_ms[projector.name] = kSmallDelayMs;
-  write_lab(lab, out_ / "lab.json");
+  return figures;
 }
 
 void VirtualRun::calibrate() {
-  const auto volume = working_volume(rig_);
   Words words{"calibrate", "--devices", at("devices.json"), "--out", at("rig.json")};
   const int poses = command_.poses > 0 ? command_.poses : command_.small ? 2 : 3;
   for (int i = 1; i <= poses; ++i) {
     const std::string pose = "pose" + std::to_string(i);
-    place(make_heap(volume, command_.common.seed + static_cast<std::uint64_t>(i)));
+    place_.arrange(i);
     if (i == 1 && !command_.small)
       step("test", {"capture", "--rig", at("devices.json"), "--lab", at("lab.json"), "--test",
                     at("lab.json"), "--overwrite"});
@@ -210,16 +206,17 @@ void VirtualRun::calibrate() {
                                   {"seconds", taken["seconds"]}};
     words.insert(words.end(), {"--captures", at(pose)});
   }
-  const double distance = (rig_.cameras[0].center() - rig_.cameras[1].center()).norm();
-  words.insert(words.end(),
-               {"--known-distance", rig_.cameras[0].name, rig_.cameras[1].name, digits(distance)});
+  if (const auto distance = place_.known_distance(); !distance.empty()) {
+    words.emplace_back("--known-distance");
+    words.insert(words.end(), distance.begin(), distance.end());
+  }
   const Json found = step("calibrate", words);
   for (const char* key : {"verdict", "rms_px", "held_out_rms_px"})
     figures_["calibration"][key] = found[key];
 }
 
 void VirtualRun::record() {
-  place(object_);
+  place_.arrange(0);
   step("record", {"capture", "--rig", at("rig.json"), "--lab", at("lab.json"), "--show", "--frames",
                   "1", "--still", "--rate", "1", "--out", at("frames")});
 }
@@ -249,11 +246,11 @@ Json VirtualRun::plain_frame() {
 
 void VirtualRun::run() {
   const Stopwatch watch;
-  prepare();
   calibrate();
   record();
   const fs::path truth = out_ / "truth" / "mesh.ply";
-  write_mesh(truth, transformed(object_, calibrated_from_true(rig_, read_rig(out_ / "rig.json"))));
+  write_mesh(truth, transformed(place_.object,
+                                calibrated_from_true(place_.rig, read_rig(out_ / "rig.json"))));
   figures_["laboratory"] = judge("", out_ / "rig.json", out_ / "frames", truth);
   figures_["simulated"] = plain_frame();
   figures_["seconds"]["all"] = watch.seconds();
@@ -262,14 +259,37 @@ void VirtualRun::run() {
 
 }  // namespace
 
-void run_virtual_lab(const VirtualLabCommand& command, Interruption& interruption) {
+void check_virtual_folder(const VirtualLabCommand& command) {
   std::error_code ignored;
   if (fs::exists(command.out, ignored) &&
       (!fs::is_directory(command.out, ignored) || !fs::is_empty(command.out, ignored)))
     throw InputError("command line", "--out", command.out, "must be a new or empty folder");
-  enter_private_network(16);
+}
+
+void run_virtual_lab(const VirtualLabCommand& command, Interruption& interruption) {
+  check_virtual_folder(command);
+  enter_private_network(kMostCameras);
   const ThreadLimit threads(command.common.threads);
   VirtualRun(command, interruption).run();
+}
+
+void serve_virtual_lab(const VirtualLabCommand& command, LabServer& server,
+                       Interruption& interruption) {
+  check_virtual_folder(command);
+  enter_private_network(kMostCameras);
+  const ThreadLimit threads(command.common.threads);
+  const fs::path out = fs::absolute(command.out);
+  VirtualPlace place(command, out);
+  place.arrange(1);
+  LabDeskOptions options;
+  options.rig = out / "devices.json";
+  options.lab = read_lab(out / "lab.json");
+  options.lab_source = (out / "lab.json").string();
+  options.out = out;
+  options.known_distance = place.known_distance();
+  options.threads = command.common.threads;
+  options.arrange = [&place](int pose) { place.arrange(pose); };
+  serve_lab(std::move(options), server, interruption);
 }
 
 }  // namespace pencilscan::cli

@@ -4,6 +4,10 @@
 
 #include "pencilscan/cli/command.h"
 
+namespace pencilscan {
+class LabServer;
+}
+
 namespace pencilscan::cli {
 
 class Interruption;
@@ -25,5 +29,10 @@ struct VirtualLabCommand {
 /// command line and the figures. To be called before any other thread is there. InputError for an
 /// --out that is not empty; StageError when a command fails, with what it said.
 void run_virtual_lab(const VirtualLabCommand& command, Interruption& interruption);
+
+/// The same laboratory for somebody who works in it with its page, until interrupted. Other things
+/// lie there for every pose. `server` listens outside of the laboratory's network.
+void serve_virtual_lab(const VirtualLabCommand& command, LabServer& server,
+                       Interruption& interruption);
 
 }  // namespace pencilscan::cli

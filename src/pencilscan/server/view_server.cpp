@@ -1,10 +1,5 @@
 #include "pencilscan/server/view_server.h"
 
-#include <arpa/inet.h>
-#include <sys/random.h>
-#include <sys/socket.h>
-
-#include <array>
 #include <fstream>
 #include <list>
 #include <map>
@@ -12,6 +7,7 @@
 #include <string>
 
 #include "pencilscan/core/error.h"
+#include "pencilscan/server/gate.h"
 #include "pencilscan/server/limited_server.h"
 #include "pencilscan/server/served_files.h"
 
@@ -20,22 +16,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kLoopback = "127.0.0.1";
-constexpr const char* kPolicy =
-    "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
-    "img-src 'self' data: blob:; media-src blob:; connect-src 'self'; base-uri 'none'; "
-    "form-action 'none'; frame-ancestors 'none'";
 constexpr int kRequestThreads = 8;
 constexpr std::size_t kOpenReaders = 4;
 constexpr std::size_t kPlayFaces = 20'000;  ///< of a mesh while a sequence plays
-
-/// One address, not all: requests have to name it.
-void check_address(const std::string& address) {
-  in_addr parsed{};
-  if (::inet_pton(AF_INET, address.c_str(), &parsed) != 1 || parsed.s_addr == INADDR_ANY)
-    throw InputError("--listen", "", address,
-                     "must be one IPv4 address of this computer, as 192.168.0.7");
-}
 
 Detail full_detail(std::size_t results) {
   Detail detail;
@@ -44,35 +27,6 @@ Detail full_detail(std::size_t results) {
   detail.image_quality = 92;
   detail.evaluate = results <= 8;
   return detail;
-}
-
-/// Only an exclusive port: the library's default would share it with other programs.
-void exclusive_port(int socket) {
-  const int yes = 1;
-  static_cast<void>(::setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes));
-}
-
-/// 128 random bits: nobody guesses them.
-std::string random_token() {
-  std::array<unsigned char, 16> bytes{};
-  if (::getrandom(bytes.data(), bytes.size(), 0) != static_cast<ssize_t>(bytes.size()))
-    throw StageError("the system gives no random numbers");
-  constexpr const char* kDigits = "0123456789abcdef";
-  std::string text;
-  for (const unsigned char byte : bytes) {
-    text.push_back(kDigits[byte >> 4]);
-    text.push_back(kDigits[byte & 15]);
-  }
-  return text;
-}
-
-/// Takes as long for any two texts of equal length, wherever they differ.
-bool equal_in_constant_time(std::string_view a, std::string_view b) {
-  if (a.size() != b.size()) return false;
-  unsigned difference = 0;
-  for (std::size_t i = 0; i < a.size(); ++i)
-    difference |= static_cast<unsigned char>(a[i]) ^ static_cast<unsigned char>(b[i]);
-  return difference == 0;
 }
 
 /// The few readers used last, so that the parts of one result do not read its files again.
@@ -110,16 +64,15 @@ std::string part_type(const std::string& name) {
   return name.starts_with("holes/") ? "image/png" : "application/octet-stream";
 }
 
-void fail(httplib::Response& response, int status, const std::string& why) {
-  response.status = status;
-  response.set_content(why + "\n", "text/plain");
-}
-
 }  // namespace
 
 struct ViewServer::State {
-  State(const fs::path& folder, const PageOptions& options)
-      : root(folder), data(folder, options), readers(data), experiment(data.experiment({})) {}
+  State(const fs::path& folder, const ViewOptions& options)
+      : gate(options.address),
+        root(folder),
+        data(folder, options.page),
+        readers(data),
+        experiment(data.experiment({})) {}
 
   void add_routes();
   void answer_part(const httplib::Request& request, httplib::Response& response);
@@ -127,19 +80,15 @@ struct ViewServer::State {
   void answer_picture(const httplib::Request& request, httplib::Response& response);
   void answer_file(const httplib::Request& request, httplib::Response& response);
   std::string make_page() const;
-  bool names_this_host(const httplib::Request& request) const;
-  bool knows_token(const httplib::Request& request) const;
   /// The number in the first group of a route; nothing when there is no such result.
   std::optional<std::size_t> result_of(const httplib::Request& request) const;
 
+  Gate gate;
   fs::path root;
   PageData data;
   Readers readers;
   std::optional<ExperimentPage> experiment;
   LimitedServer server;
-  std::string address;
-  int port = 0;
-  std::string token = random_token();
   std::string page;
 };
 
@@ -153,18 +102,6 @@ std::string ViewServer::State::make_page() const {
                                 experiment ? experiment->json : nlohmann::ordered_json()));
 }
 
-bool ViewServer::State::names_this_host(const httplib::Request& request) const {
-  const std::string host = request.get_header_value("Host");
-  const std::string end = ":" + std::to_string(port);
-  return host == address + end || (address == kLoopback && host == "localhost" + end);
-}
-
-bool ViewServer::State::knows_token(const httplib::Request& request) const {
-  const std::string_view path = request.path;
-  const std::size_t length = token.size() + 2;
-  return path.size() >= length && equal_in_constant_time(path.substr(0, length), "/" + token + "/");
-}
-
 std::optional<std::size_t> ViewServer::State::result_of(const httplib::Request& request) const {
   const std::string digits = request.matches[1];
   if (digits.size() > 9) return std::nullopt;
@@ -174,7 +111,7 @@ std::optional<std::size_t> ViewServer::State::result_of(const httplib::Request& 
 
 void ViewServer::State::answer_part(const httplib::Request& request, httplib::Response& response) {
   const auto result = result_of(request);
-  if (!result) return fail(response, 404, "no such result");
+  if (!result) return refuse(response, 404, "no such result");
   const std::string name = request.matches[2];
   const bool playing = name == "play" || (name == "thumb" && data.size() > 1);
   const auto reader = readers.get(*result, playing);
@@ -184,14 +121,14 @@ void ViewServer::State::answer_part(const httplib::Request& request, httplib::Re
     for (const auto& missing : reader->missing()) {
       if (missing.what == name || missing.what.starts_with(name + ".")) why = missing.why;
     }
-    return fail(response, 404, why);
+    return refuse(response, 404, why);
   }
   response.set_content(std::move(*bytes), part_type(name));
 }
 
 void ViewServer::State::answer_list(const httplib::Request& request, httplib::Response& response) {
   const auto result = result_of(request);
-  if (!result) return fail(response, 404, "no such result");
+  if (!result) return refuse(response, 404, "no such result");
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
   for (const ServedFile& file : files_below(root, data.folder().results[*result].folder))
     list.push_back({{"path", file.path}, {"bytes", file.bytes}});
@@ -204,17 +141,17 @@ void ViewServer::State::answer_picture(const httplib::Request& request,
   const std::string digits = request.matches[1];
   const std::size_t count = experiment ? experiment->pictures.size() : 0;
   const std::size_t index = digits.size() > 9 ? count : std::stoul(digits);
-  if (index >= count) return fail(response, 404, "no such picture");
+  if (index >= count) return refuse(response, 404, "no such picture");
   response.set_content(experiment->pictures[index], "application/octet-stream");
 }
 
 void ViewServer::State::answer_file(const httplib::Request& request, httplib::Response& response) {
   const auto file = file_inside(root, request.matches[1]);
-  if (!file) return fail(response, 404, "no such file in this folder");
+  if (!file) return refuse(response, 404, "no such file in this folder");
   auto stream = std::make_shared<std::ifstream>(*file, std::ios::binary);
   std::error_code error;
   const auto size = fs::file_size(*file, error);
-  if (!*stream || error) return fail(response, 404, "the file cannot be read");
+  if (!*stream || error) return refuse(response, 404, "the file cannot be read");
   if (size == 0) return response.set_content("", content_type(*file).c_str());
   response.set_content_provider(
       static_cast<std::size_t>(size), content_type(*file).c_str(),
@@ -228,20 +165,7 @@ void ViewServer::State::answer_file(const httplib::Request& request, httplib::Re
 }
 
 void ViewServer::State::add_routes() {
-  server.set_default_headers({{"Content-Security-Policy", kPolicy},
-                              {"X-Content-Type-Options", "nosniff"},
-                              {"X-Frame-Options", "DENY"},
-                              {"Referrer-Policy", "no-referrer"},
-                              {"Cross-Origin-Resource-Policy", "same-origin"},
-                              {"Cache-Control", "no-cache"}});
-  server.set_pre_routing_handler(
-      [this](const httplib::Request& request, httplib::Response& response) {
-        if (names_this_host(request) && knows_token(request))
-          return httplib::Server::HandlerResponse::Unhandled;
-        fail(response, 403, "only by the link that pencilscan view prints");
-        return httplib::Server::HandlerResponse::Handled;
-      });
-  const std::string root_path = "/" + token + "/";
+  const std::string root_path = gate.path();
   server.Get(root_path, [this](const httplib::Request&, httplib::Response& response) {
     response.set_content(page, "text/html; charset=utf-8");
   });
@@ -256,34 +180,20 @@ void ViewServer::State::add_routes() {
 }
 
 ViewServer::ViewServer(const fs::path& root, const ViewOptions& options)
-    : state_(std::make_unique<State>(root, options.page)) {
+    : state_(std::make_unique<State>(root, options)) {
   State& state = *state_;
-  check_address(options.address);
-  state.address = options.address;
-  state.server.set_socket_options(exclusive_port);
-  state.server.set_payload_max_length(0);
   state.server.new_task_queue = [] {
     return new httplib::ThreadPool(kRequestThreads);  // NOLINT: the server takes it
   };
-  if (options.port == 0) {
-    state.port = state.server.bind_to_any_port(state.address);
-  } else {
-    state.port = state.server.bind_to_port(state.address, options.port) ? options.port : -1;
-  }
-  if (state.port <= 0)
-    throw StageError("port " + std::to_string(options.port) + " on " + state.address +
-                     " is not free, or that is no address of this computer");
+  state.gate.guard(state.server, options.port, "only by the link that pencilscan view prints");
   state.page = state.make_page();
   state.add_routes();
 }
 
 ViewServer::~ViewServer() = default;
 
-int ViewServer::port() const { return state_->port; }
-std::string ViewServer::link() const {
-  return "http://" + state_->address + ":" + std::to_string(state_->port) + "/" + state_->token +
-         "/";
-}
+int ViewServer::port() const { return state_->gate.port(); }
+std::string ViewServer::link() const { return state_->gate.link(); }
 std::string ViewServer::answer(const std::string& request) {
   return state_->server.answer(request);
 }

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+namespace pencilscan::cli {
+
+/// A command of this program, to run as a process of its own: what it takes and breaks ends with
+/// it.
+struct OwnCommand {
+  std::vector<std::string> words;  ///< "calibrate", "--devices", ...
+  std::filesystem::path log;       ///< for all that it says
+  std::filesystem::path json;      ///< for its figures
+  int threads = 0;                 ///< 0: all cores
+};
+
+/// Its figures (null where it wrote none). `go_on` is asked several times a second; false ends it.
+/// StageError with its complaint when it fails, or "stopped". Call it from a thread that lives as
+/// long (core/child_process.h).
+[[nodiscard]] nlohmann::ordered_json run_own_command(const OwnCommand& command,
+                                                     const std::function<bool()>& go_on);
+
+/// The last whole line that it said: how far it is.
+[[nodiscard]] std::string last_line(const std::filesystem::path& log);
+
+}  // namespace pencilscan::cli

@@ -1,0 +1,80 @@
+"""The page of a laboratory, on a virtual one: pictures, figures and buttons. Left out where screens or
+cameras were not built, or no network of its own can be had."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import urllib.error
+import urllib.request
+
+SKIPPED = 77
+NOT_HERE = ("built without", "no network of its own", "without hardware did not start")
+PATIENCE = 60
+
+
+def get(link, path, post=False):
+    request = urllib.request.Request(link + path, method="POST" if post else "GET")
+    with urllib.request.urlopen(request, timeout=PATIENCE) as answer:
+        return answer.read()
+
+
+def wait_for(link, what):
+    """The first status for which what() holds."""
+    end = time.monotonic() + PATIENCE
+    while time.monotonic() < end:
+        status = json.loads(get(link, "status"))
+        if what(status):
+            return status
+        time.sleep(0.2)
+    raise AssertionError(status)
+
+
+def look_at(link):
+    assert b"<title>Laboratory" in get(link, "")
+    ready = wait_for(link, lambda s: all(c["whole"] > 0 for c in s["cameras"]))
+    assert [c["name"] for c in ready["cameras"]] == ["cam0", "cam1", "cam2"]
+    assert get(link, "preview/2")[:2] == b"\xff\xd8"  # JPEG
+    get(link, "act/show?what=lines", post=True)
+    lit = wait_for(link, lambda s: min(c["figures"]["brightest"] for c in s["cameras"]) > 0.4)
+    assert lit["showing"] == "lines"
+    assert all(1 < c["figures"]["edge_px"] < 3 for c in lit["cameras"]), lit["cameras"]
+    assert all(c["advice"] == [] for c in lit["cameras"]), lit["cameras"]
+    wait_for(link, lambda s: not s["job"]["running"])
+    get(link, "act/set?camera=1&exposure_ms=4&gain=0", post=True)
+    dim = wait_for(link, lambda s: s["cameras"][1]["figures"]["brightest"] < 0.25)
+    assert "open the iris" in dim["cameras"][1]["advice"][0]
+    assert abs(dim["cameras"][1]["exposure_ms"] - 4) < 0.01
+    for nonsense in ("act/shell", "act/show?what=%2Fetc%2Fpasswd", "act/set?camera=9&exposure_ms=1",
+                     "act/set?camera=0&exposure_ms=-1"):
+        try:
+            get(link, nonsense, post=True)
+        except urllib.error.HTTPError as error:
+            assert error.code == 409, (nonsense, error.code)
+        else:
+            raise AssertionError(nonsense)
+
+
+def main():
+    with tempfile.TemporaryDirectory() as folder:
+        lab = subprocess.Popen(
+            [os.environ["PENCILSCAN_PROGRAM"], "lab", "--virtual", "--small", "--page", "--out",
+             os.path.join(folder, "lab")], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        try:
+            first = lab.stdout.readline()
+            if not first:
+                said = lab.stderr.read()
+                sys.stderr.write(said)
+                return SKIPPED if any(words in said for words in NOT_HERE) else 1
+            look_at(first.split()[1])
+        finally:
+            lab.send_signal(signal.SIGINT)
+            code = lab.wait(PATIENCE)
+        assert code == 0, code
+    return 0
+
+
+sys.exit(main())
