@@ -35,6 +35,7 @@ void check_kind(const LabCommand& command) {
   require(!command.lab_path.empty(), "--lab", "is required, but for --virtual");
   for (const auto& [given, option] : {std::pair{!made.mesh_path.empty(), "--mesh"},
                                       {made.poses > 0, "--poses"},
+                                      {!made.fault.empty(), "--fault"},
                                       {made.small, "--small"}})
     require(!given, option, "needs --virtual");
 }
@@ -91,6 +92,9 @@ void add_lab_command(CLI::App& app) {
   command->add_option("--noise", made.noise, "With --virtual: sensor preset, as of simulate")
       ->check(one_of({"none", "low", "medium", "high"}))
       ->capture_default_str();
+  command
+      ->add_option("--fault", made.fault, "With --virtual: make this go wrong, to see what is said")
+      ->check(one_of(virtual_faults()));
   command->add_flag("--small", made.small,
                     "With --virtual: few devices with few pixels, half a minute");
   add_common_options(*command, made.common, "pencilscan lab --virtual --small --out trial");

@@ -15,6 +15,7 @@
 #include "pencilscan/core/private_network.h"
 #include "pencilscan/core/random.h"
 #include "pencilscan/core/stopwatch.h"
+#include "pencilscan/display/screen_faults.h"
 #include "pencilscan/io/mesh_file.h"
 #include "pencilscan/lab/virtual_lab.h"
 #include "pencilscan/lab/virtual_objects.h"
@@ -32,7 +33,9 @@ constexpr double kFocalError = 1e-3;
 constexpr double kCenterErrorPx = 1;
 /// Three frames: more than the X server and its watch ever need.
 constexpr double kSmallDelayMs = 50;
-constexpr int kMostCameras = 64;  ///< addresses of the network
+constexpr double kLostPackets = 2e-4;  ///< share: of 370 of a small picture, every 14th lacks one
+constexpr double kMeanwhile = 4;       ///< s in which a capture has begun and is not over
+constexpr int kMostCameras = 64;       ///< addresses of the network
 
 /// Five devices on a third of a circle, with a seventh of the usual pixels: for quick tries.
 Rig small_ring() {
@@ -167,23 +170,55 @@ class VirtualRun {
   [[nodiscard]] Json judge(const std::string& name, const fs::path& rig, const fs::path& frames,
                            const fs::path& truth);
   [[nodiscard]] Json plain_frame();
+  /// Makes go wrong what was asked for, before and while a step runs.
+  void break_things(const std::string& step, double seconds);
   [[nodiscard]] std::string at(const std::string& file) const { return (out_ / file).string(); }
 
   const VirtualLabCommand& command_;
   Interruption& interruption_;
   fs::path out_;
   VirtualPlace place_;
+  std::unique_ptr<XScreen> x_;
+  std::unique_ptr<ForeignWindow> window_;
+  bool broken_ = false;
   Json figures_;
 };
 
+void VirtualRun::break_things(const std::string& step, double seconds) {
+  const auto asked = [&](const char* fault) { return !broken_ && command_.fault == fault; };
+  const bool begin = step == "test" || step == "pose1";
+  if (begin && asked("late-projector")) {
+    place_.lab->room().set_delay(0, 3 * kRoomExposureMs);
+  } else if (begin && asked("enlarged-picture")) {
+    place_.lab->room().set_zoom(0, 1.05);
+  } else if (begin && asked("lost-packets")) {
+    place_.lab->camera(0).set_lost_packets(kLostPackets);
+  } else if (step == "pose1" && asked("window-on-top")) {
+    x_ = std::make_unique<XScreen>();
+    const auto outputs = x_->outputs();
+    window_ = std::make_unique<ForeignWindow>(*x_, outputs[0], cv::Rect(100, 100, 90, 60), "Mail");
+  } else if (step == "pose2" && seconds > kMeanwhile && asked("dead-camera")) {
+    place_.lab->pull_cable(1);
+  } else if (step == "record" && asked("exchanged-cables")) {
+    place_.lab->room().swap_cables(0, 1);
+  } else {
+    return;
+  }
+  broken_ = true;
+}
+
 Json VirtualRun::step(const std::string& name, const Words& words) {
+  break_things(name, 0);
   std::cerr << "$ pencilscan";
   for (const std::string& word : words) std::cerr << " " << word;
   std::cerr << std::endl;
   const Stopwatch watch;
   Json figures = run_own_command({words, out_ / "logs" / (name + ".txt"),
                                   out_ / "logs" / (name + ".json"), command_.common.threads},
-                                 [&] { return !interruption_.within(0); });
+                                 [&] {
+                                   break_things(name, watch.seconds());
+                                   return !interruption_.within(0);
+                                 });
   figures_["seconds"][name] = watch.seconds();
   return figures;
 }
@@ -258,6 +293,13 @@ void VirtualRun::run() {
 }
 
 }  // namespace
+
+const std::vector<std::string>& virtual_faults() {
+  static const std::vector<std::string> names{"late-projector", "enlarged-picture",
+                                              "window-on-top",  "lost-packets",
+                                              "dead-camera",    "exchanged-cables"};
+  return names;
+}
 
 void check_virtual_folder(const VirtualLabCommand& command) {
   std::error_code ignored;

@@ -19,9 +19,13 @@ struct VirtualLabCommand {
   std::string rig_path;   ///< the true rig; empty: a ring
   std::string mesh_path;  ///< the object; empty: a pebble
   std::string noise = "low";
-  int poses = 0;  ///< 0: two in the small setting, else three
+  std::string fault;  ///< one of virtual_faults(); empty: none
+  int poses = 0;      ///< 0: two in the small setting, else three
   bool small = false;
 };
+
+/// What can be made to go wrong.
+[[nodiscard]] const std::vector<std::string>& virtual_faults();
 
 /// Builds a virtual laboratory and goes all the way in it with this program's own commands, each a
 /// process of its own: flashes (not in the small setting), captures, calibration, a frame, its
