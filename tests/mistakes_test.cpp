@@ -224,7 +224,10 @@ TEST_F(Newcomer, WhoInterruptsIsToldHowFarItWas) {
   EXPECT_NE(outcome.code, 0);
   EXPECT_THAT(outcome.error, HasSubstr("rendering frames: image 0 of 6, 0 %\n"));
   EXPECT_THAT(outcome.error, HasSubstr("pencilscan: interrupted at rendering frames: image "));
-  EXPECT_THAT(outcome.error, ::testing::EndsWith("start again with --overwrite\n"));
+  EXPECT_THAT(outcome.error, ::testing::EndsWith("nothing of the scene is kept, start again\n"));
+  // Nothing that is in the way of the same command.
+  EXPECT_TRUE(fs::is_empty(folder_ / "scene") || fs::exists(folder_ / "scene" / ".making"));
+  EXPECT_FALSE(fs::exists(folder_ / "scene" / "rig.json"));
 }
 
 }  // namespace

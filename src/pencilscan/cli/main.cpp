@@ -2,9 +2,7 @@
 #include <exception>
 #include <iostream>
 #include <memory>
-#include <new>
 #include <string>
-#include <string_view>
 
 #include "pencilscan/cli/command.h"
 #include "pencilscan/cli/complaint.h"
@@ -18,12 +16,6 @@ namespace {
 enum ExitCode { kDone = 0, kStageFailed = 1, kBadInput = 2 };
 
 void complain(const std::string& message) { std::cerr << "pencilscan: " << message << std::endl; }
-
-/// Also OpenCV's own way to say it.
-bool is_of_memory(const std::exception& error) {
-  return dynamic_cast<const std::bad_alloc*>(&error) != nullptr ||
-         std::string_view(error.what()).find("Insufficient memory") != std::string_view::npos;
-}
 
 int run(int argc, char** argv) {
   CLI::App app("One frame of a ring of cameras and projectors in, an entire 3-D shape out.",
@@ -65,9 +57,7 @@ int main(int argc, char** argv) {
     cli::complain(error.what());
     return cli::kBadInput;
   } catch (const std::exception& error) {
-    cli::complain(cli::is_of_memory(error)
-                      ? "there is not enough memory for images or results of this size"
-                      : error.what());
+    cli::complain(in_plain_words(error));
     return cli::kStageFailed;
   }
 }

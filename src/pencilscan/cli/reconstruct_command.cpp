@@ -60,13 +60,15 @@ void reconstruct(const ReconstructOptions& options) {
   if (!options.plain_frames.empty()) sequence.description += " plain=yes";
   for (const std::string& format : options.mesh_formats) sequence.description += " " + format;
   warn_of(volume_unit_warning(read_rig(options.rig)));
-  const auto [outcomes, refinement] =
+  const auto [outcomes, refinement, warnings] =
       reconstruct_sequence(options.rig, options.frames, options.out, sequence,
                            stderr_progress("frames that are done are kept, and the same command "
                                            "goes on with the others"));
   nlohmann::ordered_json figures;
   if (refinement) print_refinement(*refinement, figures);
   std::size_t failed = 0;
+  for (const std::string& warning : warnings)
+    std::cerr << "pencilscan: warning: " << warning << "\n";
   for (const FrameOutcome& outcome : outcomes) {
     for (const std::string& warning : outcome.warnings) {
       std::cerr << "pencilscan: warning: frame " << outcome.name << ": " << warning << "\n";

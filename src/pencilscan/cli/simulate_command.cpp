@@ -13,6 +13,7 @@
 #include "pencilscan/io/file.h"
 #include "pencilscan/io/image.h"
 #include "pencilscan/io/mesh_file.h"
+#include "pencilscan/io/partial_folder.h"
 #include "pencilscan/planning/units.h"
 #include "pencilscan/recording/pack.h"
 #include "pencilscan/simulation/photography.h"
@@ -69,21 +70,34 @@ TriangleMesh placed_mesh(const SimulateOptions& options, const Rig& rig) {
   return mesh;
 }
 
-/// Refuses, or with --overwrite clears, what an earlier run left.
-void prepare_output(const SimulateOptions& options) {
+/// Below --out: the scene until it is whole. What an interrupted run left there is no result.
+constexpr const char* kMakingFolder = ".making";
+
+/// Refuses to replace anything but an earlier scene, and that without --overwrite.
+void check_output(const SimulateOptions& options) {
   const fs::path out(options.out);
   std::error_code ignored;
   if (!fs::exists(out, ignored)) return;
   if (!fs::is_directory(out, ignored)) {
     throw InputError("--out", "", options.out, "must be a folder, not a file");
   }
-  if (fs::is_empty(out, ignored)) return;
-  if (!options.overwrite) {
+  const bool holds_any =
+      std::any_of(fs::directory_iterator(out), fs::directory_iterator(),
+                  [](const auto& entry) { return entry.path().filename() != kMakingFolder; });
+  if (holds_any && !options.overwrite) {
     throw InputError("--out", "", options.out,
                      "must be new or empty: choose another folder, or give --overwrite to replace "
                      "the scene in it");
   }
-  for (const char* name : {"frames", "truth", "captures", "povray"}) fs::remove_all(out / name);
+}
+
+/// Puts a whole scene where it belongs, instead of an earlier one; the rig last.
+void publish(const fs::path& made, const fs::path& out) {
+  for (const char* name : {"frames", "truth", "captures", "povray"}) {
+    fs::remove_all(out / name);
+    if (fs::exists(made / name)) fs::rename(made / name, out / name);
+  }
+  fs::rename(made / "rig.json", out / "rig.json");
 }
 
 cv::Mat as_float(const cv::Mat& map) {
@@ -196,10 +210,12 @@ void run_simulate(SimulateOptions options) {
   warn_of(volume_unit_warning(rig));
   const TriangleMesh mesh = placed_mesh(options, rig);
   if (options.export_povray) check_povray_can_show(rig, options.surface, options.rig_path);
-  const std::string rig_text = read_file(options.rig_path);  // before an --overwrite may touch it
-  prepare_output(options);
-  write_text(fs::path(options.out) / "rig.json", rig_text);
-  const Progress progress = stderr_progress("the scene is not whole: start again with --overwrite");
+  check_output(options);
+  const fs::path out = options.out;
+  const PartialFolder making(out / kMakingFolder);
+  options.out = making.path();
+  write_text(making.path() / "rig.json", read_file(options.rig_path));
+  const Progress progress = stderr_progress("nothing of the scene is kept, start again");
   write_frames(options, rig, mesh, progress);
   nlohmann::ordered_json figures;
   figures["frames"] = options.frame_count;
@@ -207,6 +223,7 @@ void run_simulate(SimulateOptions options) {
   figures["projectors"] = rig.projectors.size();
   figures["mesh_faces"] = mesh.faces.size();
   if (options.gray_code) figures["capture_pairs"] = write_captures(options, rig, mesh, progress);
+  publish(making.path(), out);
   figures["seconds"] = watch.seconds();
   print_figures(options.common, figures);
 }

@@ -2,14 +2,19 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cerrno>
 #include <cmath>
+#include <new>
 #include <numeric>
 #include <stdexcept>
+#include <string>
+#include <system_error>
 #include <vector>
 
 #include "pencilscan/core/cancellation.h"
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/lanes.h"
+#include "pencilscan/core/memory.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/core/random.h"
 
@@ -126,6 +131,21 @@ TEST(InputError, NamesFileFieldValueAndRule) {
 }
 
 // Where single precision holds x itself to 5e-6 of a unit.
+TEST(Memory, LackOfItIsToldInPlainWordsWhoeverLacksIt) {
+  const std::system_error no_thread(EAGAIN, std::generic_category());
+  const std::system_error no_memory(ENOMEM, std::generic_category());
+  const std::runtime_error of_opencv("OpenCV(4.6.0) alloc.cpp:73: error: (-4:Insufficient memory)");
+  for (const std::exception* error : {static_cast<const std::exception*>(&no_thread),
+                                      static_cast<const std::exception*>(&no_memory),
+                                      static_cast<const std::exception*>(&of_opencv)}) {
+    EXPECT_TRUE(is_of_memory(*error)) << error->what();
+    EXPECT_NE(in_plain_words(*error).find("not enough memory"), std::string::npos);
+  }
+  EXPECT_TRUE(is_of_memory(std::bad_alloc()));
+  EXPECT_EQ(in_plain_words(StageError("no curve")), "no curve");
+  EXPECT_FALSE(is_of_memory(std::system_error(ENOSPC, std::generic_category())));
+}
+
 TEST(Lanes, ExponentialIsThatOfTheLibrary) {
   constexpr double kTolerance = 1e-5;
   for (float x = -78; x < 78; x += 0.37F) {

@@ -6,7 +6,10 @@
 #include <cstdlib>
 #include <fstream>
 #include <limits>
+#include <new>
 #include <string>
+#include <string_view>
+#include <system_error>
 #ifdef __GLIBC__
 #include <malloc.h>
 #endif
@@ -44,6 +47,23 @@ double available_memory() {
     available = std::min(available, std::max(0.0, static_cast<double>(limit.rlim_cur) - taken));
   }
   return available;
+}
+
+bool is_of_memory(const std::exception& error) {
+  if (dynamic_cast<const std::bad_alloc*>(&error) != nullptr) return true;
+  if (const auto* system = dynamic_cast<const std::system_error*>(&error)) {
+    return system->code() == std::errc::not_enough_memory ||
+           system->code() == std::errc::resource_unavailable_try_again;
+  }
+  // OpenCV's way, and oneTBB's where the system refuses a thread.
+  const std::string_view text = error.what();
+  return text.find("Insufficient memory") != std::string_view::npos ||
+         text.find("Resource temporarily unavailable") != std::string_view::npos;
+}
+
+std::string in_plain_words(const std::exception& error) {
+  return is_of_memory(error) ? "there is not enough memory for images or results of this size"
+                             : error.what();
 }
 
 }  // namespace pencilscan

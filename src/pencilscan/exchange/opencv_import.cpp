@@ -20,6 +20,9 @@ class OpencvReader {
  public:
   explicit OpencvReader(const std::filesystem::path& path) : path_(path.string()) {
     std::string text = read_file(path);
+    // OpenCV's parser of XML runs past its buffer there.
+    if (text.find('\0') != std::string::npos)
+      fail("", "", "must be text: it holds bytes of value 0");
     // YAML of other programs lacks the line that OpenCV asks for.
     const bool has_signature =
         text.starts_with("%YAML") || text.starts_with("<?xml") || text.starts_with("{");

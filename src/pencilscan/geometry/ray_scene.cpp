@@ -4,9 +4,11 @@
 #include <tbb/global_control.h>
 
 #include <cmath>
+#include <new>
+#include <string>
 #include <utility>
 
-#include "pencilscan/core/check.h"
+#include "pencilscan/core/error.h"
 
 namespace pencilscan {
 namespace {
@@ -39,6 +41,15 @@ Vec3 closest_on_triangle(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3
   return a + ab * (vb * scale) + ac * (vc * scale);
 }
 
+/// Embree gives codes for what else would be an exception.
+void throw_if_failed(RTCDevice device) {
+  const RTCError error = rtcGetDeviceError(device);
+  if (error == RTC_ERROR_NONE) return;
+  if (error == RTC_ERROR_OUT_OF_MEMORY) throw std::bad_alloc();
+  throw StageError("rays cannot be traced: Embree gives error " + std::to_string(error) +
+                   ", for lack of memory or threads");
+}
+
 }  // namespace
 
 struct RayScene::State {
@@ -62,7 +73,7 @@ RayScene::RayScene(const TriangleMesh& mesh) : state_(std::make_unique<State>())
   // device's "threads=1", which holds oneTBB's limit for the whole process down while it lives.
   const tbb::global_control one_thread(tbb::global_control::max_allowed_parallelism, 1);
   state_->device = rtcNewDevice(nullptr);
-  PENCILSCAN_CHECK(state_->device != nullptr);
+  throw_if_failed(state_->device);
   state_->scene = rtcNewScene(state_->device);
   rtcSetSceneFlags(state_->scene, RTC_SCENE_FLAG_ROBUST);
   // A tree by Morton codes is made in a fifth of the time of the best one, and our scenes live for
@@ -73,6 +84,7 @@ RayScene::RayScene(const TriangleMesh& mesh) : state_(std::make_unique<State>())
     auto* vertices = static_cast<float*>(
         rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
                                 3 * sizeof(float), mesh.vertices.size()));
+    throw_if_failed(state_->device);
     for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
       for (std::size_t k = 0; k < 3; ++k) {
         vertices[3 * i + k] = static_cast<float>(mesh.vertices[i][static_cast<Eigen::Index>(k)]);
@@ -81,6 +93,7 @@ RayScene::RayScene(const TriangleMesh& mesh) : state_(std::make_unique<State>())
     auto* indices = static_cast<unsigned*>(
         rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
                                 3 * sizeof(unsigned), mesh.faces.size()));
+    throw_if_failed(state_->device);
     for (std::size_t i = 0; i < mesh.faces.size(); ++i) {
       for (std::size_t k = 0; k < 3; ++k) {
         indices[3 * i + k] = static_cast<unsigned>(mesh.faces[i][k]);
@@ -92,6 +105,7 @@ RayScene::RayScene(const TriangleMesh& mesh) : state_(std::make_unique<State>())
     rtcReleaseGeometry(geometry);
   }
   rtcCommitScene(state_->scene);
+  throw_if_failed(state_->device);
 }
 
 RayScene::~RayScene() = default;

@@ -9,8 +9,8 @@
 #include <cstring>
 #include <fstream>
 #include <nlohmann/json.hpp>
-#include <sstream>
 #include <streambuf>
+#include <utility>
 #include <vector>
 
 #include "pencilscan/core/error.h"
@@ -61,44 +61,53 @@ class DescriptorBuffer : public std::streambuf {
   std::vector<char> block_;
 };
 
-/// A temporary neighbour of the target: removed unless it was renamed.
+/// A file beside the target that gets its name when it is whole. Until then it has none where the
+/// file system can do that, so that nothing is left of it when the program is killed; else one of
+/// its own, which is removed unless it became the target.
 class TemporaryFile {
  public:
   explicit TemporaryFile(const std::filesystem::path& target) {
     static std::atomic<unsigned> counter{0};
     path_ = target;
     path_ += ".part" + std::to_string(::getpid()) + "_" + std::to_string(counter++);
+    const std::filesystem::path folder = target.has_parent_path() ? target.parent_path() : ".";
+    if (::access("/proc/self/fd", X_OK) == 0)
+      descriptor_ = ::open(folder.c_str(), O_WRONLY | O_TMPFILE | O_CLOEXEC, 0666);
+    if (descriptor_ >= 0) return;
     descriptor_ = ::open(path_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    named_ = descriptor_ >= 0;
   }
   TemporaryFile(const TemporaryFile&) = delete;
   TemporaryFile& operator=(const TemporaryFile&) = delete;
   ~TemporaryFile() {
     if (descriptor_ >= 0) ::close(descriptor_);
-    if (opened_ok() && !renamed_) ::unlink(path_.c_str());
+    if (named_) ::unlink(path_.c_str());
   }
 
-  [[nodiscard]] bool opened_ok() const { return descriptor_ >= 0 || closed_; }
   [[nodiscard]] int descriptor() const { return descriptor_; }
-  /// Flushes to the disk if asked to and closes; 0 or the errno of what failed.
-  int finish(Durability durability) {
+  /// Flushes to the disk if asked to and becomes the target; 0 or the errno of what failed.
+  int become(const std::filesystem::path& target, Durability durability) {
     const bool flushed = durability == Durability::kProcess || ::fsync(descriptor_) == 0;
-    int error = flushed || errno == EINVAL ? 0 : errno;
-    if (::close(descriptor_) != 0 && error == 0) error = errno;
-    descriptor_ = -1;
-    closed_ = true;
-    return error;
-  }
-  int rename_to(const std::filesystem::path& target) {
-    if (::rename(path_.c_str(), target.c_str()) != 0) return errno;
-    renamed_ = true;
+    if (!flushed && errno != EINVAL) return errno;
+    // A new file needs no other name even for a moment.
+    if (!named_ && link_as(target) == 0) return 0;
+    if (!named_ && (errno != EEXIST || link_as(path_) != 0)) return errno;
+    named_ = true;
+    const int descriptor = std::exchange(descriptor_, -1);
+    if (::close(descriptor) != 0 || ::rename(path_.c_str(), target.c_str()) != 0) return errno;
+    named_ = false;
     return 0;
   }
 
  private:
+  int link_as(const std::filesystem::path& name) const {
+    const std::string unnamed = "/proc/self/fd/" + std::to_string(descriptor_);
+    return ::linkat(AT_FDCWD, unnamed.c_str(), AT_FDCWD, name.c_str(), AT_SYMLINK_FOLLOW);
+  }
+
   std::filesystem::path path_;
   int descriptor_ = -1;
-  bool closed_ = false;
-  bool renamed_ = false;
+  bool named_ = false;
 };
 
 [[noreturn]] void cannot_write(const std::filesystem::path& path, int error) {
@@ -113,15 +122,14 @@ void write_atomically(const std::filesystem::path& path,
   if (path.has_parent_path()) std::filesystem::create_directories(path.parent_path(), made);
   if (made) cannot_write(path, made.value());
   TemporaryFile file(path);
-  if (!file.opened_ok()) cannot_write(path, errno);
+  if (file.descriptor() < 0) cannot_write(path, errno);
   DescriptorBuffer buffer(file.descriptor());
   std::ostream stream(&buffer);
   write(stream);
   stream.flush();
   if (buffer.error() != 0) cannot_write(path, buffer.error());
   if (!stream) throw StageError(path.string() + ": cannot be written: the stream failed");
-  if (const int error = file.finish(durability); error != 0) cannot_write(path, error);
-  if (const int error = file.rename_to(path); error != 0) cannot_write(path, error);
+  if (const int error = file.become(path, durability); error != 0) cannot_write(path, error);
 }
 
 void write_text(const std::filesystem::path& path, const std::string& text, Durability durability) {
@@ -147,11 +155,13 @@ std::string read_file(const std::filesystem::path& path) {
   }
   std::ifstream stream(path, std::ios::binary);
   if (!stream) throw InputError(path.string(), "", "", "cannot be opened: " + reason(errno));
-  std::ostringstream bytes;
-  // An empty file sets the fail bit of `<<`, which is no error here.
-  if (stream.peek() != std::ifstream::traits_type::eof()) bytes << stream.rdbuf();
-  if (stream.bad() || bytes.bad()) throw InputError(path.string(), "", "", "cannot be read");
-  return std::move(bytes).str();
+  // In blocks: `<<` of a stream's buffer takes lack of memory for the end of the file.
+  std::string bytes;
+  std::vector<char> block(std::size_t{1} << 16);
+  while (stream.read(block.data(), static_cast<std::streamsize>(block.size())), stream.gcount() > 0)
+    bytes.append(block.data(), static_cast<std::size_t>(stream.gcount()));
+  if (stream.bad()) throw InputError(path.string(), "", "", "cannot be read");
+  return bytes;
 }
 
 namespace {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cstring>
+#include <limits>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <string>
@@ -115,6 +116,13 @@ cv::Mat read_stored_image(const std::filesystem::path& path) {
     cv::cvtColor(image, image, cv::COLOR_BGR2RGB);
   } else if (image.channels() != 1) {
     throw InputError(path.string(), "", "", "must be grey or colour");
+  }
+  cv::Point wrong;
+  constexpr double kMost = std::numeric_limits<float>::max();
+  if (image.depth() == CV_32F && !cv::checkRange(image, true, &wrong, -kMost, kMost)) {
+    throw InputError(path.string(), "pixel",
+                     std::to_string(wrong.x) + " " + std::to_string(wrong.y),
+                     "must be a finite number");
   }
   return image;
 }

@@ -1,10 +1,13 @@
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
+#include <unistd.h>
 
 #include <cmath>
 #include <csignal>
 #include <fstream>
+#include <new>
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
 
@@ -16,6 +19,7 @@
 #include "pencilscan/io/linear_light.h"
 #include "pencilscan/io/mesh_file.h"
 #include "pencilscan/io/mosaic.h"
+#include "pencilscan/io/partial_folder.h"
 #include "pencilscan/io/ply.h"
 #include "pencilscan/io/temporary_folder.h"
 #include "pencilscan/io/zarr_array.h"
@@ -89,6 +93,41 @@ TEST_F(Io, AtomicWriteKeepsTheOldFileWhenTheWriterThrows) {
   EXPECT_EQ(file_count(), 1U);
 }
 
+TEST_F(Io, AFileInTheMakingHasNoNameThatAKilledProgramCouldLeave) {
+  const int unnamed = ::open(folder_.c_str(), O_WRONLY | O_TMPFILE, 0600);
+  if (unnamed < 0) GTEST_SKIP() << "this file system has no files without names";
+  ::close(unnamed);
+  write_atomically(folder_ / "a.txt", [&](std::ostream& stream) {
+    stream << std::string(1 << 20, 'x');
+    EXPECT_EQ(file_count(), 0U);
+  });
+  EXPECT_EQ(fs::file_size(folder_ / "a.txt"), std::uintmax_t{1} << 20);
+}
+
+TEST_F(Io, APartialFolderStartsEmptyAndLeavesNothing) {
+  const fs::path path = folder_ / "film.partial";
+  write_text(path / "old.txt", "of a killed program");
+  {
+    const PartialFolder making(path);
+    EXPECT_FALSE(fs::exists(path));
+    write_text(making.path() / "new.txt", "whole");
+    fs::rename(making.path() / "new.txt", folder_ / "new.txt");
+  }
+  EXPECT_EQ(file_count(), 1U);
+}
+
+TEST_F(Io, PixelsThatAreNoNumbersAreRefused) {
+  cv::Mat image(4, 6, CV_32FC1, cv::Scalar::all(0.5));  // of three channels OpenCV rounds
+  write_image(folder_ / "a.tiff", image);
+  EXPECT_EQ(error_of([&] { return read_image(folder_ / "a.tiff"); }), "");
+  for (const float wrong : {std::nanf(""), INFINITY, -INFINITY}) {
+    image.at<float>(2, 5) = wrong;
+    write_image(folder_ / "a.tiff", image);
+    EXPECT_THAT(error_of([&] { return read_image(folder_ / "a.tiff"); }),
+                ::testing::HasSubstr("a.tiff: pixel = 5 2: must be a finite number"));
+  }
+}
+
 TEST_F(Io, WhatCannotBeReplacedIsAStageErrorAndLeavesNoTemporary) {
   fs::create_directories(folder_ / "taken" / "x");
   EXPECT_THROW(write_text(folder_ / "taken", "text"), StageError);
@@ -115,6 +154,24 @@ TEST_F(Io, AFullDiskIsAStageErrorAndKeepsTheOldFile) {
   EXPECT_THAT(message, ::testing::HasSubstr("a.png: cannot be written"));
   EXPECT_EQ(read_file(folder_ / "a.png"), "old");
   EXPECT_EQ(file_count(), 1U);
+}
+
+TEST_F(Io, LackOfMemoryIsNotTheEndOfAFile) {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+  GTEST_SKIP() << "the sanitizer itself takes more memory than the limit of this test";
+#endif
+  const fs::path path = put("large.bin", "");
+  fs::resize_file(path, std::uintmax_t{1} << 28);
+  std::size_t pages = 0;
+  std::ifstream("/proc/self/statm") >> pages;
+  rlimit before{};
+  ASSERT_EQ(getrlimit(RLIMIT_AS, &before), 0);
+  const rlimit little{pages * static_cast<std::size_t>(::sysconf(_SC_PAGESIZE)) + (100U << 20),
+                      before.rlim_max};
+  ASSERT_EQ(setrlimit(RLIMIT_AS, &little), 0);
+  EXPECT_THROW((void)read_file(path), std::bad_alloc);
+  setrlimit(RLIMIT_AS, &before);
+  EXPECT_EQ(read_file(path).size(), std::size_t{1} << 28);
 }
 
 TEST_F(Io, JsonErrorsNameTheFileAndThePlace) {

@@ -7,6 +7,7 @@
 #include <assimp/Importer.hpp>
 #include <cmath>
 #include <map>
+#include <new>
 #include <span>
 #include <string>
 
@@ -136,6 +137,7 @@ TriangleMesh read_with_assimp(const std::filesystem::path& path, const std::stri
   if (scene == nullptr) {
     std::string reason = importer.GetErrorString();
     std::replace(reason.begin(), reason.end(), '\n', ' ');
+    if (reason.find("bad_alloc") != std::string::npos) throw std::bad_alloc();
     throw InputError(path.string(), "", "", "cannot be read as a mesh: " + reason);
   }
   TriangleMesh mesh;

@@ -10,6 +10,7 @@
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/io/file.h"
 #include "pencilscan/io/mesh_file.h"
+#include "pencilscan/io/partial_folder.h"
 #include "pencilscan/io/zarr_array.h"
 #include "pencilscan/pipeline/run_folder.h"
 
@@ -168,9 +169,8 @@ void write_film_zarr(const Film& film, const fs::path& folder, const Progress& p
     if (!is_zarr_group(folder) || read_zarr_group(folder).value("format", "") != kFilmFormat)
       throw InputError(folder.string(), "", "", "must be new, empty or an earlier film");
   }
-  fs::path partial = folder;
-  partial += ".partial";
-  fs::remove_all(partial);
+  const PartialFolder making(folder.string() + ".partial");
+  const fs::path& partial = making.path();
   write_zarr_group(partial, {{"format", kFilmFormat}, {"frames", film.frames}});
   const auto at_once = static_cast<std::size_t>(thread_count());
   for (std::size_t first = 0; first < film.frames.size(); first += at_once) {

@@ -1,6 +1,7 @@
 #include "pencilscan/jobs/frame_rows.h"
 
 #include <cmath>
+#include <cstdlib>
 #include <nlohmann/json.hpp>
 #include <utility>
 
@@ -42,6 +43,9 @@ CameraRow camera_row(const json& entry) {
   row.saturated_pixels = figure(entry, "saturated_pixels");
   row.time_offset_us = figure(entry, "time_offset_us");
   row.is_late = entry.value("late", json(false)) == true;
+  const json picture = entry.value("picture", json());
+  if (picture.is_string())
+    row.picture = std::strtoull(picture.get<std::string>().c_str(), nullptr, 16);
   return row;
 }
 
@@ -89,14 +93,18 @@ void read_report(const json& report, const SequenceDevices& devices, FrameRow& r
     row.warnings.push_back(warning.get<std::string>());
 }
 
-/// The report's figures, or what keeps it from being read.
+/// The report's figures; a frame whose report cannot be read is as good as failed.
 void read_row(const fs::path& file, const SequenceDevices& devices, FrameRow& row) {
   FrameRow found = row;
   try {
     read_report(read_json(file), devices, found);
     row = std::move(found);
   } catch (const std::exception& error) {
-    row.warnings = {std::string("its report cannot be read: ") + error.what()};
+    row.status.state = FrameState::kFailed;
+    row.status.failure = {std::string("its report cannot be read; remove the frame's folder and "
+                                      "run reconstruct again: ") +
+                              error.what(),
+                          false};
   }
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <limits>
 #include <string>
@@ -20,6 +21,7 @@ struct CameraRow {
   double saturated_pixels = kUnknownFigure;
   double time_offset_us = kUnknownFigure;
   bool is_late = false;
+  std::uint64_t picture = 0;  ///< hash of its picture's bytes; 0: not known
 };
 
 /// What one frame's folder says.

@@ -260,8 +260,9 @@ TEST_F(Finish, TheTableHasARowAFrame) {
 
 TEST_F(Finish, ABrokenReportIsSaidAndOtherFoldersAreRefused) {
   write_text(out() / "f1000" / "report.json", "{");
-  EXPECT_THAT(summarize_sequence(out()).rows[0].warnings,
-              ElementsAre(HasSubstr("its report cannot be read")));
+  const SequenceSummary summary = summarize_sequence(out());
+  EXPECT_EQ(summary.holes[0].row, 0U);
+  EXPECT_THAT(summary.holes[0].reason, HasSubstr("its report cannot be read"));
   EXPECT_THAT(error_of([&] { (void)summarize_sequence(path()); }),
               HasSubstr("must be an output folder"));
 }

@@ -8,6 +8,7 @@
 
 #include "pencilscan/core/formatted.h"
 #include "pencilscan/jobs/changes.h"
+#include "pencilscan/pipeline/repeated_pictures.h"
 
 namespace pencilscan {
 namespace {
@@ -211,6 +212,24 @@ std::vector<Found> take_together(std::vector<Found>& found) {
   return together;
 }
 
+/// Cameras that hung.
+std::vector<SequenceEvent> repetitions_of(std::span<const FrameRow> rows,
+                                          const SequenceDevices& devices) {
+  std::vector<std::vector<std::uint64_t>> hashes;
+  for (const FrameRow& row : rows) {
+    std::vector<std::uint64_t>& of_frame = hashes.emplace_back();
+    for (const CameraRow& camera : row.cameras) of_frame.push_back(camera.picture);
+  }
+  std::vector<SequenceEvent> events;
+  for (const RepeatedPicture& r : repeated_pictures(hashes)) {
+    const std::string& camera = devices.cameras[r.camera];
+    events.push_back({rows[r.first + 1].name, "repeated", camera, 0,
+                      static_cast<double>(r.last - r.first),
+                      describe_repeated(camera, rows[r.first].name, rows[r.last].name)});
+  }
+  return events;
+}
+
 }  // namespace
 
 WatchReport watch_sequence(std::span<const FrameRow> rows, const SequenceDevices& devices) {
@@ -233,6 +252,8 @@ WatchReport watch_sequence(std::span<const FrameRow> rows, const SequenceDevices
       for (const Found& f : together) report.events.push_back(event_of(rows, devices, f));
     }
   }
+  for (SequenceEvent& event : repetitions_of(rows, devices))
+    report.events.push_back(std::move(event));
   return report;
 }
 

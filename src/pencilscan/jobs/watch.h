@@ -11,7 +11,8 @@ namespace pencilscan {
 /// Something became different and stayed so.
 struct SequenceEvent {
   std::string frame;   ///< the first one that is different
-  std::string kind;    ///< "crossings", "labelled", "width", "height", "level", "projector"
+  std::string kind;    ///< "crossings", "labelled", "width", "height", "level", "projector",
+                       ///< "repeated"
   std::string device;  ///< camera or projector; empty: all of them, or it cannot be told
   double before = 0;
   double after = 0;
@@ -25,13 +26,14 @@ struct OddFrame {
 };
 
 struct WatchReport {
-  std::vector<SequenceEvent> events;  ///< by frame
+  std::vector<SequenceEvent> events;  ///< by frame; at last cameras that hung
   std::vector<OddFrame> odd;
 };
 
 /// Watches every camera's and projector's figures over the frames that are done (changes.h). A
 /// camera that was bumped makes the crossings that it sees miss each other; a projector those of
-/// its lines in all cameras.
+/// its lines in all cameras. A camera that gives one picture again and again hangs: `after` counts
+/// the repetitions.
 [[nodiscard]] WatchReport watch_sequence(std::span<const FrameRow> rows,
                                          const SequenceDevices& devices);
 

@@ -157,6 +157,19 @@ TEST_F(Watch, FocusLampAndProjectorAreToldApart) {
   EXPECT_THAT(found[2].text, HasSubstr("off, covered"));
 }
 
+TEST_F(Watch, ACameraThatHangsIsNamed) {
+  for (std::size_t k = 0; k < kFrames; ++k) {
+    for (std::size_t c = 0; c < 3; ++c) rows_[k].cameras[c].picture = 1 + 3 * k + c;
+  }
+  EXPECT_THAT(events(), IsEmpty());
+  for (const std::size_t k : {50U, 51U, 52U})
+    rows_[k].cameras[1].picture = rows_[49].cameras[1].picture;
+  ASSERT_THAT(events(), SizeIs(1));
+  EXPECT_EQ(events()[0].frame, "50");
+  EXPECT_EQ(events()[0].device, "cam1");
+  EXPECT_EQ(events()[0].after, 3);
+}
+
 TEST_F(Watch, OneBadFrameIsOddAndNoEvent) {
   rows_[50].cameras[0].labelled_share = 0.2;
   rows_[60].status.state = FrameState::kFailed;

@@ -72,11 +72,11 @@ std::vector<cv::Mat> read_images(const Rig& rig, const FrameFiles& files) {
   return images;
 }
 
-std::uint64_t files_hash(const FrameFiles& files, std::uint64_t start) {
-  std::uint64_t hash = start;
+std::vector<std::uint64_t> file_hashes(const FrameFiles& files) {
+  std::vector<std::uint64_t> hashes;
   for (const auto& image : files.images)
-    hash = image ? hash_bytes(read_file(*image), hash) : hash_bytes("missing", hash);
-  return hash;
+    hashes.push_back(image ? hash_bytes(read_file(*image)) : 0);
+  return hashes;
 }
 
 }  // namespace pencilscan

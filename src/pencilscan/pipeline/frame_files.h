@@ -24,8 +24,8 @@ struct FrameFiles {
 /// Reads a frame's images. InputError for a broken file or one of another size than its camera.
 [[nodiscard]] std::vector<cv::Mat> read_images(const Rig& rig, const FrameFiles& files);
 
-/// The hash of the bytes of a frame's files, after `start`.
-[[nodiscard]] std::uint64_t files_hash(const FrameFiles& files, std::uint64_t start);
+/// The hashes of the bytes of a frame's files, one per camera, 0 where there is none.
+[[nodiscard]] std::vector<std::uint64_t> file_hashes(const FrameFiles& files);
 
 /// "cam0, cam1", for messages.
 [[nodiscard]] std::string camera_names(const Rig& rig);

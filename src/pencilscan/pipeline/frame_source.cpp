@@ -21,7 +21,7 @@ struct FrameSource::Storage {
   virtual ~Storage() = default;
   /// One image per camera of the rig, empty where there is none.
   [[nodiscard]] virtual std::vector<cv::Mat> images(const Rig& rig, std::size_t frame) const = 0;
-  [[nodiscard]] virtual std::uint64_t hash(std::size_t frame, std::uint64_t start) const = 0;
+  [[nodiscard]] virtual std::vector<std::uint64_t> hashes(std::size_t frame) const = 0;
   [[nodiscard]] virtual std::optional<FrameTiming> timing(std::size_t frame) const = 0;
 };
 
@@ -31,8 +31,8 @@ struct FrameSource::Folders : Storage {
   std::vector<cv::Mat> images(const Rig& rig, std::size_t frame) const override {
     return read_images(rig, frames[frame]);
   }
-  std::uint64_t hash(std::size_t frame, std::uint64_t start) const override {
-    return files_hash(frames[frame], start);
+  std::vector<std::uint64_t> hashes(std::size_t frame) const override {
+    return file_hashes(frames[frame]);
   }
   std::optional<FrameTiming> timing(std::size_t) const override { return std::nullopt; }
 };
@@ -60,16 +60,15 @@ struct FrameSource::Recorded : Storage {
     }
     return result;
   }
-  std::uint64_t hash(std::size_t frame, std::uint64_t start) const override {
-    std::uint64_t hash = start;
+  std::vector<std::uint64_t> hashes(std::size_t frame) const override {
+    std::vector<std::uint64_t> hashes;
     for (std::size_t c = 0; c < camera_of.size(); ++c) {
       const auto at = row(frame, c);
       const fs::path file = at ? recording.picture_file(*at, *camera_of[c]) : fs::path();
       std::error_code ignored;
-      hash = at && fs::exists(file, ignored) ? hash_bytes(read_file(file), hash)
-                                             : hash_bytes("missing", hash);
+      hashes.push_back(at && fs::exists(file, ignored) ? hash_bytes(read_file(file)) : 0);
     }
-    return hash;
+    return hashes;
   }
   std::optional<FrameTiming> timing(std::size_t frame) const override {
     const FrameSet& set = sets.sets[frame];
@@ -150,9 +149,18 @@ Frame FrameSource::read(const Rig& rig, std::size_t frame) const {
   return result;
 }
 
-std::uint64_t FrameSource::hash(std::size_t frame) const {
-  const std::uint64_t own = storage_->hash(frame, hash_bytes(names_[frame]));
-  return plain_ ? plain_->storage_->hash(plain_of_[frame], own) : own;
+std::vector<std::uint64_t> FrameSource::picture_hashes(std::size_t frame) const {
+  return storage_->hashes(frame);
+}
+
+std::uint64_t FrameSource::hash(std::size_t frame,
+                                const std::vector<std::uint64_t>& pictures) const {
+  std::uint64_t hash = hash_bytes(names_[frame]);
+  for (const std::uint64_t picture : pictures) hash = hash_bytes(hex(picture), hash);
+  if (!plain_) return hash;
+  for (const std::uint64_t picture : plain_->picture_hashes(plain_of_[frame]))
+    hash = hash_bytes(hex(picture), hash);
+  return hash;
 }
 
 }  // namespace pencilscan

@@ -472,6 +472,30 @@ TEST_F(PipelineTest, MissingCameraIsAWarningAndNotAFailure) {
   EXPECT_THAT(outcomes.front().warnings, testing::Contains(testing::HasSubstr("cam1")));
 }
 
+TEST_F(PipelineTest, AFrameWhosePicturesChangeMeanwhileIsAFailedOneAndIsMadeAnew) {
+  const fs::path frames = *folder_ / "changing";
+  fs::create_directories(frames);
+  fs::copy(*folder_ / "frames" / "000000", frames / "000000");
+  SequenceOptions options = quick();
+  options.points.method = LinearOptions{};
+  options.meshes = false;
+  const auto reconstruct = [&](const Progress& progress) {
+    return reconstruct_sequence(*folder_ / "rig.json", frames, *folder_ / "out_changing", options,
+                                progress)
+        .frames.front();
+  };
+  bool changed = false;
+  const FrameOutcome failed = reconstruct([&](std::string_view stage, double) {
+    if (!stage.starts_with("frame 1 of 1") || std::exchange(changed, true)) return;
+    write_image(frames / "000000" / "cam1.png", frame_->images[1], 8);
+  });
+  ASSERT_TRUE(changed);
+  EXPECT_FALSE(failed.done);
+  EXPECT_THAT(failed.failure, testing::HasSubstr("its pictures changed"));
+  const FrameOutcome again = reconstruct({});
+  EXPECT_TRUE(again.done) << again.failure;
+}
+
 /// Expects an InputError whose line has all the given parts, and no output.
 void expect_refused(const fs::path& rig, const fs::path& frames,
                     const std::vector<std::string>& parts) {

@@ -139,7 +139,9 @@ FrameStatus frame_status(const fs::path& out, const std::string& frame, const st
   // A power failure left it empty; or something else made the folder.
   if (!found && fs::exists(folder / kFrameInputFile, ignored)) return {};
   const json input = found.value_or(json());
-  if (text_of(input, "settings") != settings || (images && text_of(input, "images") != *images)) {
+  // Of other pictures, a failure is nothing to keep.
+  if (text_of(input, "settings") != settings ||
+      (has_report && images && text_of(input, "images") != *images)) {
     status.state = FrameState::kOther;
     return status;
   }

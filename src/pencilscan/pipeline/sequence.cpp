@@ -19,6 +19,7 @@
 #include "pencilscan/pipeline/depth_output.h"
 #include "pencilscan/pipeline/frame_output.h"
 #include "pencilscan/pipeline/frame_source.h"
+#include "pencilscan/pipeline/repeated_pictures.h"
 #include "pencilscan/pipeline/rig_refinement.h"
 #include "pencilscan/pipeline/run_folder.h"
 
@@ -56,17 +57,42 @@ RunInputs describe_inputs(const fs::path& rig_path, const FrameSource& frames,
   return inputs;
 }
 
-std::vector<std::string> image_hashes(const FrameSource& frames,
-                                      const std::vector<std::size_t>& own) {
-  std::vector<std::string> hashes(own.size());
-  parallel_for(own.size(), [&](std::size_t i) { hashes[i] = hex(frames.hash(own[i])); });
+/// What tells whether a frame's pictures are the same.
+struct PictureHashes {
+  std::vector<std::uint64_t> of_cameras;  ///< 0: no picture
+  std::string all;
+};
+
+PictureHashes hashes_of(const FrameSource& frames, std::size_t frame) {
+  PictureHashes hashes{frames.picture_hashes(frame), {}};
+  hashes.all = hex(frames.hash(frame, hashes.of_cameras));
   return hashes;
+}
+
+std::vector<PictureHashes> picture_hashes(const FrameSource& frames,
+                                          const std::vector<std::size_t>& own) {
+  std::vector<PictureHashes> hashes(own.size());
+  parallel_for(own.size(), [&](std::size_t i) { hashes[i] = hashes_of(frames, own[i]); });
+  return hashes;
+}
+
+/// Warns of cameras that hung; of a shard's frames, within its chunks.
+std::vector<std::string> repetitions(const Rig& rig, const FrameSource& frames,
+                                     const std::vector<std::size_t>& own,
+                                     const std::vector<PictureHashes>& images) {
+  std::vector<std::vector<std::uint64_t>> of_frames(frames.size());
+  for (std::size_t i = 0; i < own.size(); ++i) of_frames[own[i]] = images[i].of_cameras;
+  std::vector<std::string> warnings;
+  for (const RepeatedPicture& r : repeated_pictures(of_frames))
+    warnings.push_back(
+        describe_repeated(rig.cameras[r.camera].name, frames.name(r.first), frames.name(r.last)));
+  return warnings;
 }
 
 /// Decides which of the frames `own` are there already; refuses the output of other inputs.
 std::vector<char> resumable(const fs::path& out, const RunInputs& inputs,
                             const std::vector<std::size_t>& own,
-                            const std::vector<std::string>& images,
+                            const std::vector<PictureHashes>& images,
                             const SequenceOptions& options) {
   std::vector<char> done(own.size(), 0);
   if (is_new_run(out)) return done;
@@ -90,7 +116,7 @@ std::vector<char> resumable(const fs::path& out, const RunInputs& inputs,
   }
   for (std::size_t i = 0; i < own.size(); ++i) {
     const std::string& name = inputs.frames[own[i]];
-    const FrameState state = frame_status(out, name, inputs.settings(), images[i]).state;
+    const FrameState state = frame_status(out, name, inputs.settings(), images[i].all).state;
     if (state == FrameState::kOther) refuse("holds the output of other images in frame " + name);
     done[i] = state == FrameState::kDone ? 1 : 0;
   }
@@ -111,7 +137,8 @@ void check_images(const Rig& rig, const FrameSource& frames, const Progress& pro
 }
 
 void write_frame(const Rig& rig, const FrameSource& frames, std::size_t index,
-                 const fs::path& folder, const SequenceOptions& options, FrameOutcome& outcome) {
+                 const PictureHashes& images, const fs::path& folder,
+                 const SequenceOptions& options, FrameOutcome& outcome) {
   const Stopwatch total;
   const Frame frame = frames.read(rig, index);
   const double reading = total.seconds();
@@ -140,11 +167,15 @@ void write_frame(const Rig& rig, const FrameSource& frames, std::size_t index,
   for (const StageTime& t : points.times) timing["seconds"][t.stage] = t.seconds;
   timing["seconds"]["total"] = total.seconds();
   write_json(folder / "timing.json", timing);
-  const ordered_json report = frame_report(rig, frame, points, shape);
+  ordered_json report = frame_report(rig, frame, points, shape);
+  for (std::size_t c = 0; c < images.of_cameras.size(); ++c)
+    if (images.of_cameras[c] != 0) report["cameras"][c]["picture"] = hex(images.of_cameras[c]);
   write_json(folder / "report.json", report);
   outcome.points = points.points.size();
   outcome.warnings = report["warnings"].get<std::vector<std::string>>();
   outcome.seconds = total.seconds();
+  if (hashes_of(frames, index).all != images.all)
+    throw StageError("its pictures changed while it was made; run the same command again");
 }
 
 bool is_output_file(const fs::path& rig_path, const fs::path& file) {
@@ -196,13 +227,13 @@ Rig refined_rig(const Rig& rig, const FrameSource& frames, const fs::path& out,
 /// A frame into its folder, or why not.
 FrameOutcome frame_outcome(const Rig& rig, const FrameSource& frames, std::size_t index,
                            const fs::path& out, const std::string& settings,
-                           const std::string& images, const SequenceOptions& options) {
+                           const PictureHashes& images, const SequenceOptions& options) {
   FrameOutcome outcome;
   outcome.name = frames.name(index);
   FrameFailure failure;
   try {
-    FrameFolder folder(out, outcome.name, settings, images);
-    write_frame(rig, frames, index, folder.path(), options, outcome);
+    FrameFolder folder(out, outcome.name, settings, images.all);
+    write_frame(rig, frames, index, images, folder.path(), options, outcome);
     folder.publish();
     outcome.done = true;
     return outcome;
@@ -211,11 +242,11 @@ FrameOutcome frame_outcome(const Rig& rig, const FrameSource& frames, std::size_
   } catch (const NothingFound& error) {
     failure = {error.what(), false};
   } catch (const std::exception& error) {
-    failure = {error.what(), true};
+    failure = {in_plain_words(error), true};
   }
   outcome.failure = failure.reason;
   try {
-    write_failure(out, outcome.name, settings, images, failure);
+    write_failure(out, outcome.name, settings, images.all, failure);
   } catch (const std::exception&) {
     // What keeps the reason from being written is the reason.
   }
@@ -285,7 +316,7 @@ SequenceOutcome reconstruct_sequence(const fs::path& rig_path, const fs::path& f
   if (!options.shard) check_images(rig, frames, progress);
   const std::vector<std::size_t> own = options.shard.value_or(Shard{}).frames_of(frames.size());
   const RunInputs inputs = describe_inputs(rig_path, frames, options);
-  const std::vector<std::string> images = image_hashes(frames, own);
+  const std::vector<PictureHashes> images = picture_hashes(frames, own);
   const std::vector<char> there = resumable(out, inputs, own, images, options);
 
   // From here on the output may change. What is to be made anew goes first.
@@ -298,6 +329,7 @@ SequenceOutcome reconstruct_sequence(const fs::path& rig_path, const fs::path& f
   write_run_inputs(out, inputs);
 
   SequenceOutcome result;
+  result.warnings = repetitions(rig, frames, own, images);
   if (options.refine_rig)
     rig = refined_rig(rig, frames, out, options, progress, result.refinement.emplace());
   // The rig in use, so that the output can be looked at without its input.

@@ -39,6 +39,7 @@ struct FrameOutcome {
 struct SequenceOutcome {
   std::vector<FrameOutcome> frames;
   std::optional<RefinementOutcome> refinement;  ///< with refine_rig
+  std::vector<std::string> warnings;            ///< of cameras over several frames
 };
 
 /// Reconstructs every frame of `frames` (image folders or a recording) into `out`/<frame>:
@@ -49,7 +50,8 @@ struct SequenceOutcome {
 /// from the same rig, images and options is kept; output of anything else is an InputError unless
 /// `overwrite`. With refine_rig the rig is refined from all frames together (of a long sequence,
 /// from frames evenly picked) and written to `out`/rig.json with refinement.json; where the frames
-/// do not determine it, that is the rig as given. Several shards may run at once on one folder.
+/// do not determine it, that is the rig as given. Several shards may run at once on one folder. A
+/// frame whose pictures change while it is made is a failed one.
 [[nodiscard]] SequenceOutcome reconstruct_sequence(const std::filesystem::path& rig_path,
                                                    const std::filesystem::path& frames,
                                                    const std::filesystem::path& out,

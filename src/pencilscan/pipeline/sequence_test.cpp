@@ -5,6 +5,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <array>
 #include <csignal>
 #include <fstream>
 #include <map>
@@ -16,6 +17,7 @@
 #include "pencilscan/io/image.h"
 #include "pencilscan/io/temporary_folder.h"
 #include "pencilscan/pipeline/frame_source.h"
+#include "pencilscan/pipeline/repeated_pictures.h"
 #include "pencilscan/pipeline/run_folder.h"
 #include "pencilscan/recording/pack.h"
 #include "pencilscan/rig/sample_devices.h"
@@ -150,6 +152,12 @@ TEST_F(Run, AFailureSaysWhyAndMakesWayForAResult) {
   EXPECT_EQ(frame_status(out(), "000000", "s", "i").state, FrameState::kDone);
 }
 
+TEST_F(Run, AFailureOfOtherPicturesIsNothingToKeep) {
+  write_failure(out(), "000000", "s", "i", {"no curve", false});
+  EXPECT_EQ(frame_status(out(), "000000", "s", "j").state, FrameState::kFailed);
+  EXPECT_EQ(frame_status(out(), "000000", "t", "i").state, FrameState::kOther);
+}
+
 TEST_F(Run, WhatAKilledProgramLeftIsRemovedAndNothingElse) {
   const pid_t child = ::fork();
   ASSERT_GE(child, 0);
@@ -166,6 +174,24 @@ TEST_F(Run, WhatAKilledProgramLeftIsRemovedAndNothingElse) {
   remove_abandoned(out());
   EXPECT_EQ(folders(), 1);
   EXPECT_TRUE(fs::exists(mine.path()));
+}
+
+// ---- cameras that hang
+
+TEST(RepeatedPictures, ACameraHangsWhereItRepeatsItselfWhileAnotherGoesOn) {
+  using Hashes = std::vector<std::vector<std::uint64_t>>;
+  const auto found = [](const Hashes& hashes) {
+    std::vector<std::array<std::size_t, 3>> runs;
+    for (const RepeatedPicture& r : repeated_pictures(hashes))
+      runs.push_back({r.camera, r.first, r.last});
+    return runs;
+  };
+  using Run = std::array<std::size_t, 3>;
+  EXPECT_THAT(found({{1, 9}, {2, 9}, {3, 9}, {4, 8}}), ElementsAre(Run{1, 0, 2}));
+  EXPECT_THAT(found({{1, 9}, {1, 8}, {2, 7}, {2, 6}}), ElementsAre(Run{0, 0, 1}, Run{0, 2, 3}));
+  EXPECT_THAT(found({{1, 9}, {1, 9}}), ElementsAre());          // nothing changed at all
+  EXPECT_THAT(found({{1, 0}, {2, 0}, {3, 0}}), ElementsAre());  // it has no picture
+  EXPECT_THAT(found({{1, 9}, {}, {2, 9}}), ElementsAre());      // not known of the frame between
 }
 
 // ---- sequences
@@ -250,6 +276,16 @@ TEST_F(Sequence, ShardsInAnyNumberGiveTheSameBytes) {
   EXPECT_THAT(error_of([&] { (void)run(recording(), temporary_.path() / "none", {}); }),
               HasSubstr("60.0.0.0"));
   EXPECT_FALSE(fs::exists(temporary_.path() / "none"));
+}
+
+TEST_F(Sequence, WarnsOfACameraThatHangs) {
+  for (const std::size_t k : {3U, 4U, 5U})
+    write_image(
+        frames() / six_digits(k) / "cam1.png",
+        cv::Mat(rig_.cameras[1].height, rig_.cameras[1].width, CV_8UC3, cv::Scalar(9, 9, 9)));
+  EXPECT_THAT(
+      run(frames(), temporary_.path() / "out", {}).warnings,
+      ElementsAre(HasSubstr("camera cam1 has the same picture in frames 000003 to 000005")));
 }
 
 TEST_F(Sequence, KilledAtAnyMomentAndResumedGivesTheSameBytes) {

@@ -280,7 +280,7 @@ Camera parse_camera(const JsonField& field, const std::vector<Projector>& projec
   }
   for (const auto& [name, entry] : matrix.members()) {
     const bool known = std::any_of(projectors.begin(), projectors.end(),
-                                   [&](const Projector& p) { return p.name == name; });
+                                   [&, &of = name](const Projector& p) { return p.name == of; });
     if (!known) entry.fail("there is no projector of this name");
     camera.color_matrix_by_projector[name] = entry.matrix3();
   }

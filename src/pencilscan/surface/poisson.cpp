@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "pencilscan/core/error.h"
+#include "pencilscan/core/memory.h"
 
 namespace pencilscan {
 
@@ -32,6 +33,7 @@ TriangleMesh poisson_surface(std::span<const SurfaceSample> samples, int depth, 
     mesh.faces.reserve(made.triangles_.size());
     for (const Eigen::Vector3i& t : made.triangles_) mesh.faces.push_back({t[0], t[1], t[2]});
   } catch (const std::runtime_error& error) {
+    if (is_of_memory(error)) throw;
     throw StageError(std::string("surface: Poisson reconstruction failed: ") + error.what());
   }
   return mesh;
