@@ -138,11 +138,10 @@ TEST(DetectCurves, BothLinesSurviveACrossingOfOneColour) {
 TEST(DetectCurves, WideLineIsOneCurveInItsMiddle) {
   const std::vector<TestLine> lines = {{80, 0, 1.5, 8, 1e9, {0, 0, 1}}};
   const CameraDetection found = detect(draw(lines, 160, 100, 0.005));
-  ASSERT_FALSE(found.curves.empty());
-  for (const Curve& curve : found.curves) {
-    for (const CurvePoint& p : curve.points)
-      EXPECT_NEAR(lines[0].distance(p.position.x(), p.position.y()), 0, 0.3);
-  }
+  ASSERT_EQ(found.curves.size(), 1U);
+  EXPECT_GT(found.curves[0].points.size(), 90U);  // of 100 rows
+  for (const CurvePoint& p : found.curves[0].points)
+    EXPECT_NEAR(lines[0].distance(p.position.x(), p.position.y()), 0, 0.3);
 }
 
 TEST(DetectCurves, LinesAtTheEdgeOfADenseFieldAreFoundHoweverSharpTheyAre) {
@@ -150,15 +149,13 @@ TEST(DetectCurves, LinesAtTheEdgeOfADenseFieldAreFoundHoweverSharpTheyAre) {
     std::vector<TestLine> lines;
     for (int i = 0; i < 12; ++i) lines.push_back({20.0 + 4.2 * i, 0, 1.45, 1.4});
     const CameraDetection found = detect(draw(lines, 320, 120, 0.005, blur));
-    std::size_t on_line = 0;
-    for (const Curve& curve : found.curves) {
-      for (const CurvePoint& p : curve.points) {
-        on_line += std::any_of(lines.begin(), lines.end(), [&](const TestLine& line) {
-          return std::abs(line.distance(p.position.x(), p.position.y())) < 0.4;
-        });
-      }
+    for (const TestLine& line : {lines.front(), lines.back()}) {
+      std::size_t of_line = 0;
+      for (const Curve& curve : found.curves)
+        for (const CurvePoint& p : curve.points)
+          of_line += std::abs(line.distance(p.position.x(), p.position.y())) < 0.4;
+      EXPECT_GT(of_line, 110U) << "of 120 rows of the line at " << line.x << ", blur " << blur;
     }
-    EXPECT_GT(on_line, 2 * 110U) << "of 120 rows of each line, blur " << blur;
   }
 }
 
