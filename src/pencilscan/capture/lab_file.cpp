@@ -54,7 +54,8 @@ void parse_trigger(const JsonField& field, Lab& lab) {
 Lab read_lab(const fs::path& path) {
   const nlohmann::json json = read_json(path);
   const JsonField root(path.string(), json);
-  root.check_keys({"format", "cameras"}, {"trigger", "rate_hz", "max_spread_ms", "projectors"});
+  root.check_keys({"format", "cameras"},
+                  {"trigger", "rate_hz", "patience_s", "max_spread_ms", "projectors"});
   if (root.at("format").text() != kFormat)
     root.at("format").fail(std::string("must be \"") + kFormat + "\"");
   Lab lab;
@@ -62,6 +63,7 @@ Lab read_lab(const fs::path& path) {
     lab.cameras[name] = parse_camera(field, path.parent_path());
   if (root.has("trigger")) parse_trigger(root.at("trigger"), lab);
   if (root.has("rate_hz")) lab.rate_hz = root.at("rate_hz").positive();
+  if (root.has("patience_s")) lab.patience_s = root.at("patience_s").positive();
   if (root.has("max_spread_ms")) lab.max_spread_ms = root.at("max_spread_ms").positive();
   if (!root.has("projectors")) return lab;
   for (const auto& [name, field] : root.at("projectors").members()) {
@@ -78,6 +80,7 @@ void write_lab(const Lab& lab, const fs::path& path) {
   json["trigger"] = {{"kind", to_string(lab.trigger)}};
   if (lab.trigger == Trigger::kWire) json["trigger"]["line"] = lab.line;
   json["rate_hz"] = lab.rate_hz;
+  if (lab.patience_s != Lab{}.patience_s) json["patience_s"] = lab.patience_s;
   if (lab.max_spread_ms > 0) json["max_spread_ms"] = lab.max_spread_ms;
   json["cameras"] = Json::object();
   for (const auto& [name, camera] : lab.cameras) {

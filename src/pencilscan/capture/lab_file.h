@@ -28,6 +28,7 @@ struct Lab {
   Trigger trigger = Trigger::kFree;
   double rate_hz = 10;         ///< of frames, > 0
   std::string line = "Line0";  ///< that the trigger's wire is on
+  double patience_s = 3;       ///< for a picture that was asked for, > 0
   double max_spread_ms = 0;    ///< of the pictures of a frame; 0: a quarter of the exposure
   std::map<std::string, LabCamera> cameras;    ///< by name in the rig
   std::map<std::string, std::string> outputs;  ///< by name of the projector, before the rig's own

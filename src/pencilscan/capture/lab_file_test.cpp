@@ -34,6 +34,7 @@ TEST_F(LabFile, ComesBackAsWritten) {
   lab.line = "Line2";
   lab.rate_hz = 12.5;
   lab.max_spread_ms = 1.5;
+  lab.patience_s = 12;
   lab.cameras["cam0"] = {"aravis:Basler-1", {}, 33.25, 2, "BayerRG8"};
   lab.cameras["cam1"] = {"", {"gphoto2", "--filename", "{file}"}, {}, {}, {}};
   lab.outputs["proj0"] = "HDMI-1";

@@ -170,11 +170,11 @@ void test_lab(const CaptureCommand& command, Interruption& interruption) {
   Running running = start(command);
   const auto screen = open_lab_screen(running.rig, running.lab, command.rig_path);
   const Progress progress = stderr_progress();
-  ProjectorTestReport report =
-      test_projectors(*running.cameras, *screen, {}, [&](const std::string& what, double share) {
-        progress("flashing " + what, share);
-        return !interruption.within(0);
-      });
+  ProjectorTestReport report = test_projectors(*running.cameras, *screen, test_options(running.lab),
+                                               [&](const std::string& what, double share) {
+                                                 progress("flashing " + what, share);
+                                                 return !interruption.within(0);
+                                               });
   for (Fault& fault : screen->check()) report.faults.push_back(std::move(fault));
   Json figures;
   for (std::size_t p = 0; p < running.rig.projectors.size(); ++p) {

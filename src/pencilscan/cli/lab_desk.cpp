@@ -360,10 +360,10 @@ std::string Desk::set_camera(const Values& values) {
 }
 
 void Desk::flash() {
-  ProjectorTestReport report =
-      test_projectors(*cameras_, *screen_, {}, [this](const std::string& what, double share) {
-        return progress("flashing " + what, share);
-      });
+  ProjectorTestReport report = test_projectors(*cameras_, *screen_, test_options(options_.lab),
+                                               [this](const std::string& what, double share) {
+                                                 return progress("flashing " + what, share);
+                                               });
   for (Fault& fault : screen_->check()) report.faults.push_back(std::move(fault));
   for (std::size_t p = 0; p < rig_.projectors.size(); ++p) {
     const ProjectorTiming& timing = report.projectors[p];

@@ -30,10 +30,17 @@ std::unique_ptr<LiveCameras> start_lab_cameras(const Rig& rig, Lab& lab,
 
 GrayCaptureOptions gray_options(const Rig& rig, const Lab& lab) {
   GrayCaptureOptions options;
+  options.patience_s = lab.patience_s;
   for (const Projector& projector : rig.projectors) {
     const auto delay = lab.delay_ms.find(projector.name);
     options.delay_ms.push_back(delay == lab.delay_ms.end() ? 0 : delay->second);
   }
+  return options;
+}
+
+ProjectorTestOptions test_options(const Lab& lab) {
+  ProjectorTestOptions options;
+  options.patience_s = lab.patience_s;
   return options;
 }
 

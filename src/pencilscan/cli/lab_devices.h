@@ -5,6 +5,7 @@
 
 #include "pencilscan/capture/gray_capture.h"
 #include "pencilscan/capture/lab_file.h"
+#include "pencilscan/capture/projector_tests.h"
 #include "pencilscan/capture/record.h"
 #include "pencilscan/display/projector_screen.h"
 
@@ -20,8 +21,10 @@ namespace pencilscan::cli {
 [[nodiscard]] std::unique_ptr<LiveCameras> start_lab_cameras(const Rig& rig, Lab& lab,
                                                              const std::string& source);
 
-/// Delays as the laboratory knows them.
+/// Delays and patience as the laboratory has them.
 [[nodiscard]] GrayCaptureOptions gray_options(const Rig& rig, const Lab& lab);
+
+[[nodiscard]] ProjectorTestOptions test_options(const Lab& lab);
 
 /// Rate, trigger and limit of the spread as the laboratory has them; `still`: nothing moves.
 [[nodiscard]] RecordOptions record_options(const Lab& lab, bool still);

@@ -35,7 +35,11 @@ constexpr double kCenterErrorPx = 1;
 constexpr double kSmallDelayMs = 50;
 constexpr double kLostPackets = 2e-4;  ///< share: of 370 of a small picture, every 14th lacks one
 constexpr double kMeanwhile = 4;       ///< s in which a capture has begun and is not over
-constexpr int kMostCameras = 64;       ///< addresses of the network
+/// s for a picture, and for a frame: six cameras of a megapixel are rendered in some seconds on a
+/// computer that does other things, too.
+constexpr double kPatience = 30;
+constexpr const char* kFrameRate = "0.2";  ///< Hz, of the only frame: as patient
+constexpr int kMostCameras = 64;           ///< addresses of the network
 
 /// Five devices on a third of a circle, with a seventh of the usual pixels: for quick tries.
 Rig small_ring() {
@@ -146,6 +150,7 @@ VirtualPlace::VirtualPlace(const VirtualLabCommand& command, const fs::path& out
   photo.seed = seed;
   lab = std::make_unique<VirtualLab>(rig, out / "screen", photo);
   Lab file = lab->lab_file();
+  file.patience_s = kPatience;
   if (command.small)  // nobody measures it
     for (const Projector& projector : rig.projectors) file.delay_ms[projector.name] = kSmallDelayMs;
   write_lab(file, out / "lab.json");
@@ -252,8 +257,9 @@ void VirtualRun::calibrate() {
 
 void VirtualRun::record() {
   place_.arrange(0);
-  step("record", {"capture", "--rig", at("rig.json"), "--lab", at("lab.json"), "--show", "--frames",
-                  "1", "--still", "--rate", "1", "--out", at("frames")});
+  step("record",
+       {"capture", "--rig", at("rig.json"), "--lab", at("lab.json"), "--show", "--frames", "1",
+        "--still", "--rate", command_.small ? "1" : kFrameRate, "--out", at("frames")});
 }
 
 Json VirtualRun::judge(const std::string& name, const fs::path& rig, const fs::path& frames,

@@ -5,6 +5,7 @@
 #include <optional>
 #include <utility>
 
+#include "pencilscan/core/error.h"
 #include "pencilscan/core/median.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/pipeline/frame_warnings.h"
@@ -63,6 +64,14 @@ std::optional<Rig> label_lines(const Rig& rig, const Frame& frame, const PointOp
   };
   result.labeling = solve();
   if (!method.capabilities.corrects_rig) return std::nullopt;
+  if (const auto pair = exchanged_projectors(rig, frame, result.graphs, result.labeling, options)) {
+    const std::string one = rig.projector(pair->first).name;
+    const std::string other = rig.projector(pair->second).name;
+    throw StageError(
+        "projectors " + one + " and " + other +
+        " show each other's patterns: their outputs or cables are exchanged (put them "
+        "back; frames that are taken already fit a rig with the two patterns exchanged)");
+  }
   const std::vector<PictureFinding> misplaced =
       misplaced_pictures(rig, frame, result.graphs, result.labeling, options);
   if (!misplaced.empty()) {

@@ -16,6 +16,13 @@ namespace {
 /// of 20,000 blocks of noise alone, the largest lies 4 above the median.
 constexpr double kBlackDeviations = 6;
 
+// Right pictures have .58 and more named (an object on a lit floor between walls), wrong ones .21
+// and less.
+constexpr double kFew = 0.4;
+constexpr double kFarLess = 0.5;  // of what the other cameras have
+constexpr double kFarMore = 2;    // of what the picture as it is has, alone
+constexpr std::size_t kLeastPoints = 500;
+
 /// Every eighth row, which tells as much of what a whole picture is; shares the pixels.
 cv::Mat some_rows(const cv::Mat& picture) {
   return {picture.rows / 8, picture.cols, picture.type(), picture.data, 8 * picture.step};
@@ -215,12 +222,6 @@ std::vector<PictureFinding> misplaced_pictures(const Rig& rig, const Frame& fram
                                                const std::vector<GridGraph>& graphs,
                                                const Labeling& labeling,
                                                const PointOptions& options) {
-  // Right pictures have .58 and more named (an object on a lit floor between walls), wrong ones .21
-  // and less.
-  constexpr double kFew = 0.4;
-  constexpr double kFarLess = 0.5;  // of what the other cameras have
-  constexpr double kFarMore = 2;    // of what the picture as it is has, alone
-  constexpr std::size_t kLeastPoints = 500;
   std::vector<double> of_others;
   std::vector<Suspect> suspects;
   for (std::size_t c = 0; c < graphs.size(); ++c) {
@@ -272,6 +273,49 @@ std::vector<PictureFinding> misplaced_pictures(const Rig& rig, const Frame& fram
     }
   }
   return findings;
+}
+
+std::optional<std::pair<int, int>> exchanged_projectors(const Rig& rig, const Frame& frame,
+                                                        const std::vector<GridGraph>& graphs,
+                                                        const Labeling& labeling,
+                                                        const PointOptions& options) {
+  // Cameras with few names, those with the longest curves first: these tell most.
+  std::vector<std::size_t> poor;
+  for (std::size_t c = 0; c < graphs.size(); ++c)
+    if (!frame.images[c].empty() && curve_points(graphs[c]) >= kLeastPoints &&
+        named_share(labeling, c) < kFew)
+      poor.push_back(c);
+  if (poor.size() < 2) return std::nullopt;
+  std::sort(poor.begin(), poor.end(), [&](std::size_t a, std::size_t b) {
+    return curve_points(graphs[a]) > curve_points(graphs[b]);
+  });
+  poor.resize(2);
+  // Named by both cameras, with the patterns as they are or those of two projectors exchanged.
+  const auto named = [&](const Rig& trial_rig) {
+    const PictureTrial trial(trial_rig, options);
+    double least = 1;
+    for (const std::size_t c : poor) {
+      least = std::min(least, trial.named(c, linear_light(rig.cameras[c], frame.images[c])));
+      if (least < kFew) break;
+    }
+    return least;
+  };
+  std::optional<std::pair<int, int>> best;
+  double best_named = kFew;
+  for (std::size_t a = 0; a < rig.projectors.size(); ++a) {
+    for (std::size_t b = a + 1; b < rig.projectors.size(); ++b) {
+      Rig trial = rig;
+      Projector& one = trial.projectors[a];
+      Projector& other = trial.projectors[b];
+      if (one.width != other.width || one.height != other.height) continue;
+      std::swap(one.patterns, other.patterns);
+      const double share = named(trial);
+      if (share <= best_named) continue;
+      best_named = share;
+      best = {static_cast<int>(a), static_cast<int>(b)};
+    }
+  }
+  return best;
 }
 
 }  // namespace pencilscan

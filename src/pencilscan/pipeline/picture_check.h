@@ -1,6 +1,8 @@
 #pragma once
 
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "pencilscan/pipeline/frame.h"
@@ -39,5 +41,12 @@ struct PictureFinding {
                                                              const std::vector<GridGraph>& graphs,
                                                              const Labeling& labeling,
                                                              const PointOptions& options);
+
+/// Two projectors that show each other's pictures: where several cameras have few names, and get
+/// many with the patterns of those two exchanged. `labeling` as above; only projectors of one panel
+/// size can be.
+[[nodiscard]] std::optional<std::pair<int, int>> exchanged_projectors(
+    const Rig& rig, const Frame& frame, const std::vector<GridGraph>& graphs,
+    const Labeling& labeling, const PointOptions& options);
 
 }  // namespace pencilscan

@@ -7,6 +7,7 @@
 #include <opencv2/imgproc.hpp>
 #include <utility>
 
+#include "pencilscan/core/error.h"
 #include "pencilscan/planning/ring.h"
 #include "pencilscan/simulation/photography.h"
 #include "pencilscan/simulation/simulated_object.h"
@@ -103,6 +104,17 @@ TEST_F(PictureCheck, ExchangedCamerasAreNamed) {
   std::swap(frame.images[0], frame.images[1]);
   expect_said(frame, {"camera cam0: its picture is that of camera cam1",
                       "camera cam1: its picture is that of camera cam0"});
+}
+
+TEST_F(PictureCheck, ExchangedProjectorsAreNamed) {
+  Rig wrong = *rig_;
+  std::swap(wrong.projectors[0].patterns, wrong.projectors[1].patterns);
+  try {
+    (void)measure_points(wrong, *frame_);
+    FAIL();
+  } catch (const StageError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("projectors proj0 and proj1"));
+  }
 }
 
 TEST_F(PictureCheck, TurnedAndMirroredPicturesAreNamed) {
