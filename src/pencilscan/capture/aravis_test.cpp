@@ -186,7 +186,7 @@ TEST_F(GigE, AWireTriggersAllAtOnce) {
   over = true;
   wire.join();
   EXPECT_GE(report.whole, 6U);  // of 8: a busy machine misses pulses
-  EXPECT_EQ(report.whole == report.frames, report.faults.empty());
+  EXPECT_TRUE(report.whole == report.frames || !report.faults.empty());  // nothing is lost unsaid
   EXPECT_LT(report.spread.median_ms, 40);
 }
 
@@ -197,7 +197,7 @@ TEST_F(GigE, FramesAreOfOneMomentWhateverTheNumbers) {
   const RecordReport report = record_frames(*live, 15);
   // A busy machine may keep a fake camera from taking a picture at all, which is then named.
   EXPECT_GE(report.whole, 10U);
-  EXPECT_EQ(report.whole == report.frames, report.faults.empty());
+  EXPECT_TRUE(report.whole == report.frames || !report.faults.empty());  // nothing is lost unsaid
   // The pictures hold the moment at which they were taken.
   std::size_t compared = 0;
   for (const auto& frame : std::filesystem::directory_iterator(temporary_.path() / "frames")) {
