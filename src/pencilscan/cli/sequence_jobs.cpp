@@ -16,6 +16,7 @@
 #include "pencilscan/jobs/slurm.h"
 #include "pencilscan/jobs/task_queue.h"
 #include "pencilscan/pipeline/frame_source.h"
+#include "pencilscan/pipeline/run_folder.h"
 #include "pencilscan/pipeline/shard.h"
 
 namespace pencilscan::cli {
@@ -186,6 +187,10 @@ void run_submit(const SubmitCommand& submit, const CLI::App& command) {
   for (std::size_t i = 0; i < tasks.size(); ++i) tasks[i] = i;
   if (submit.slurm) return hand_to_slurm(submit.reconstruct.common, job, tasks, submit.retries);
   run_here(job, tasks, interruption);
+  if (!has_run_inputs(job.out)) {
+    throw StageError("no task could begin; the log of the first one ends: " +
+                     last_log_line(job.out, 0));
+  }
   report_sequence(submit.reconstruct.common, job.out);
 }
 
