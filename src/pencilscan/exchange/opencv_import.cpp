@@ -20,9 +20,13 @@ class OpencvReader {
  public:
   explicit OpencvReader(const std::filesystem::path& path) : path_(path.string()) {
     std::string text = read_file(path);
-    // OpenCV's parser of XML runs past its buffer there.
+    // OpenCV's parser of XML follows a null pointer where the text ends, or a byte 0 stands, behind
+    // the = of an attribute.
     if (text.find('\0') != std::string::npos)
       fail("", "", "must be text: it holds bytes of value 0");
+    const auto last =
+        std::find_if(text.rbegin(), text.rend(), [](unsigned char c) { return c > ' '; });
+    if (text.starts_with("<?xml") && *last != '>') fail("", "", "must be XML that ends with a tag");
     // YAML of other programs lacks the line that OpenCV asks for.
     const bool has_signature =
         text.starts_with("%YAML") || text.starts_with("<?xml") || text.starts_with("{");
