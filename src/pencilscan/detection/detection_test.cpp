@@ -144,12 +144,12 @@ TEST(DetectCurves, WideLineIsOneCurveInItsMiddle) {
     EXPECT_NEAR(lines[0].distance(p.position.x(), p.position.y()), 0, 0.3);
 }
 
-TEST(DetectCurves, LinesAtTheEdgeOfADenseFieldAreFoundHoweverSharpTheyAre) {
+TEST(DetectCurves, EveryLineOfADenseFieldIsFoundHoweverSharpItIs) {
   for (const double blur : {0.3, 0.7}) {
     std::vector<TestLine> lines;
     for (int i = 0; i < 12; ++i) lines.push_back({20.0 + 4.2 * i, 0, 1.45, 1.4});
     const CameraDetection found = detect(draw(lines, 320, 120, 0.005, blur));
-    for (const TestLine& line : {lines.front(), lines.back()}) {
+    for (const TestLine& line : lines) {
       std::size_t of_line = 0;
       for (const Curve& curve : found.curves)
         for (const CurvePoint& p : curve.points)

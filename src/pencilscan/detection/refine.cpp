@@ -101,8 +101,16 @@ void fit_batch(const std::vector<CurvePoint>& points, const std::vector<Profile>
     for (std::size_t o = 0; o < kProfileSize; ++o) batch.value[o][k] = mean[o];
     const float width = points[static_cast<std::size_t>(i)].width_px;
     // At first the neighbours are still in the image: a shorter profile sees less of them.
-    const int half = std::clamp(nearest(2.4F * width) + (first_round ? 0 : 1), 4, kMaxHalf);
+    int half = std::clamp(nearest(2.4F * width) + (first_round ? 0 : 1), 4, kMaxHalf);
     const auto at = [&](int o) { return batch.value[static_cast<std::size_t>(kMaxHalf + o)][k]; };
+    if (first_round) {
+      // Where a neighbour's light begins before its end, the profile ends in the valley between.
+      const auto both = [&](int o) { return at(o) + at(-o); };
+      int valley = half;
+      for (int o = half; o >= 3; --o) valley = both(o) < both(valley) ? o : valley;
+      constexpr float kRise = 0.25F;  // of the line's height; noise makes smaller valleys
+      if (both(half) - both(valley) > kRise * (both(0) - both(valley))) half = valley;
+    }
     batch.half[k] = static_cast<float>(half);
     batch.amplitude[k] = at(0) - std::min(at(-half), at(half));
     batch.width[k] = width;
