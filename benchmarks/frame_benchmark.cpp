@@ -11,14 +11,18 @@
 #include <filesystem>
 #include <map>
 #include <opencv2/core/utility.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "pencilscan/core/median.h"
 #include "pencilscan/core/memory.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/core/stopwatch.h"
 #include "pencilscan/io/image.h"
 #include "pencilscan/pipeline/frame.h"
+#include "pencilscan/pipeline/frame_files.h"
+#include "pencilscan/pipeline/sequence.h"
 #include "pencilscan/rig/camera_light.h"
 #include "pencilscan/rig/rig.h"
 #include "reference_blur.h"
@@ -29,12 +33,9 @@ namespace {
 Frame read_frame(const Rig& rig, const std::filesystem::path& folder) {
   Frame frame;
   frame.name = folder.filename().string();
-  frame.images.resize(rig.cameras.size());
-  parallel_for(rig.cameras.size(), [&](std::size_t c) {
-    const Camera& camera = rig.cameras[c];
-    const auto path = find_image(folder, camera.name);
-    if (path) frame.images[c] = read_camera_image(camera, *path);
-  });
+  FrameFiles files{frame.name, {}};
+  for (const Camera& camera : rig.cameras) files.images.push_back(find_image(folder, camera.name));
+  frame.images = read_images(rig, files);
   return frame;
 }
 
@@ -67,37 +68,28 @@ class Times {
     wall_.erase(wall_.begin());
     busy_.erase(busy_.begin());
   }
-  [[nodiscard]] double wall() const { return median(wall_); }
+  [[nodiscard]] double wall() const { return upper_median(wall_); }
   /// How many processors work, on average.
-  [[nodiscard]] double busy() const { return median(busy_); }
+  [[nodiscard]] double busy() const { return upper_median(busy_); }
 
  private:
-  static double median(std::vector<double> values) {
-    std::sort(values.begin(), values.end());
-    return values[values.size() / 2];
-  }
   std::vector<double> wall_;
   std::vector<double> busy_;
 };
 
-double median(std::vector<double> values) {
-  std::sort(values.begin(), values.end());
-  return values[values.size() / 2];
-}
-
-/// `share`: of the whole; negative: nothing to say.
-void print_row(const std::string& stage, double seconds, double blur_seconds, double share) {
+/// `share`: of the whole, where that says something.
+void print_row(const std::string& stage, double seconds, double blur_seconds,
+               std::optional<double> share = std::nullopt) {
   std::printf("%-24s %9.1f %9.1f", stage.c_str(), 1e3 * seconds, seconds / blur_seconds);
-  if (share >= 0) std::printf(" %8.1f %%", 100 * share);
+  if (share) std::printf(" %8.1f %%", 100 * *share);
   std::printf("\n");
 }
 
 /// Seconds a frame when several are made at once, as a sequence makes them.
 double seconds_at_once(const Rig& rig, const Frame& frame, bool with_shape) {
   constexpr std::size_t kFrames = 8;
-  const auto at_once = static_cast<std::size_t>((thread_count() + 2) / 2);
   const Stopwatch watch;
-  run_at_once(kFrames, at_once, [&](std::size_t) {
+  run_at_once(kFrames, frames_at_once(rig), [&](std::size_t) {
     static_cast<void>(reconstruct_frame(rig, frame, {}, {}, with_shape));
   });
   return watch.seconds() / kFrames;
@@ -150,13 +142,13 @@ void run(const Rig& stated, const std::filesystem::path& folder, int threads, in
               1e3 * blur_before, 1e3 * blur_after);
   std::printf("%-24s %9s %9s %10s\n", "", "ms", "ratio", "share");
   for (const std::string& stage : stages) {
-    const double seconds = median(seconds_by_stage[stage]);
+    const double seconds = upper_median(seconds_by_stage[stage]);
     print_row(stage, seconds, blur, seconds / alone);
   }
-  print_row("pictures read", reading.wall(), blur, -1);
-  print_row("images to points", points.wall(), blur, -1);
-  if (with_shape) print_row("points to colored mesh", shape.wall(), blur, -1);
-  print_row("a frame of several", at_once, blur, -1);
+  print_row("pictures read", reading.wall(), blur);
+  print_row("images to points", points.wall(), blur);
+  if (with_shape) print_row("points to colored mesh", shape.wall(), blur);
+  print_row("a frame of several", at_once, blur);
   std::printf("\nprocessors at work: %.2f to points", points.busy());
   if (with_shape) std::printf(", %.2f to the mesh", shape.busy());
   std::printf("; memory %.2f GB at most, one frame at a time\n", memory);

@@ -3,7 +3,6 @@ Slurm with a node that dies (where Slurm is installed: script/bootstrap --cluste
 there, and every byte is that of one process."""
 
 import csv
-import hashlib
 import json
 import os
 import shutil
@@ -16,47 +15,20 @@ import unittest
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 import one_machine_slurm
+from files import sums, turn_camera, write_ball, write_png
 
 PROGRAM = os.environ["PENCILSCAN_PROGRAM"]
 FRAMES = 310  # seven chunks of 50 frames
 SEEN = 62     # every so many frames there is something to see
 RECONSTRUCT = ["--no-pictures", "--no-mesh"]
+DARK = [bytes(3 * 320)] * 240
+FINISHED = ("sequence.csv", "sequence.json")  # what sequence finish writes
 
 
 def run(*arguments, code=0, **options):
     done = subprocess.run([PROGRAM, *arguments], capture_output=True, text=True, **options)
     assert done.returncode == code, (arguments, done.returncode, done.stdout, done.stderr)
     return done
-
-
-def write_ball(path, radius=90):
-    """An OBJ of a sphere about the origin."""
-    from math import cos, pi, sin
-    rings, sectors = 24, 48
-    points = [(radius * sin(pi * r / rings) * cos(2 * pi * s / sectors),
-               radius * sin(pi * r / rings) * sin(2 * pi * s / sectors),
-               radius * cos(pi * r / rings)) for r in range(rings + 1) for s in range(sectors)]
-    with open(path, "w") as f:
-        for p in points:
-            f.write("v %f %f %f\n" % p)
-        for r in range(rings):
-            for s in range(sectors):
-                a, b = r * sectors + s, r * sectors + (s + 1) % sectors
-                c, d = a + sectors, b + sectors
-                f.write(f"f {a + 1} {c + 1} {d + 1}\nf {a + 1} {d + 1} {b + 1}\n")
-
-
-def sums(folder):
-    """What every output file holds, but for what says how long it took, and what finish writes."""
-    found = {}
-    for root, _, files in os.walk(folder):
-        for name in files:
-            path = os.path.join(root, name)
-            if name == "timing.json" or name.startswith("sequence."):
-                continue
-            with open(path, "rb") as f:
-                found[os.path.relpath(path, folder)] = hashlib.sha256(f.read()).hexdigest()
-    return found
 
 
 class Sequence(unittest.TestCase):
@@ -72,7 +44,7 @@ class Sequence(unittest.TestCase):
         run("simulate", "--rig", at("ring.json"), "--mesh", at("ball.obj"), "--out", at("scene"))
         with open(at("scene/rig.json")) as f:
             names = [camera["name"] for camera in json.load(f)["cameras"]]
-        cls.write_dark(at("dark.png"), 320, 240)
+        write_png(at("dark.png"), DARK)
         for k in range(FRAMES):
             os.makedirs(at(f"frames/{k:06d}"))
             for name in names if k % SEEN == 0 else names[:1]:
@@ -81,19 +53,7 @@ class Sequence(unittest.TestCase):
         cls.rig, cls.frames = at("scene/rig.json"), at("frames")
         cls.input = ["--rig", cls.rig, "--frames", cls.frames, *RECONSTRUCT]
         run("reconstruct", *cls.input, "--out", at("one"), "--shard", "0/1", code=1)
-        cls.one = sums(at("one"))
-
-    @staticmethod
-    def write_dark(path, width, height):
-        import struct
-        import zlib
-        chunk = lambda kind, data: (struct.pack(">I", len(data)) + kind + data +
-                                    struct.pack(">I", zlib.crc32(kind + data)))
-        rows = (b"\0" + bytes(3 * width)) * height
-        with open(path, "wb") as f:
-            f.write(b"\x89PNG\r\n\x1a\n" +
-                    chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)) +
-                    chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b""))
+        cls.one = sums(at("one"), FINISHED)
 
     @classmethod
     def tearDownClass(cls):
@@ -103,7 +63,7 @@ class Sequence(unittest.TestCase):
         return os.path.join(self.folder, name)
 
     def assert_whole(self, out):
-        self.assertEqual(sums(out), self.one)
+        self.assertEqual(sums(out, FINISHED), self.one)
         with open(os.path.join(out, "sequence.csv")) as f:
             rows = list(csv.DictReader(f))
         self.assertEqual(len(rows), FRAMES)
@@ -220,20 +180,6 @@ class Sequence(unittest.TestCase):
             slurm.stop()
 
 
-def turned(rig, name, px):
-    """The rig with a camera turned about its x axis, so that its picture moves by so many pixels."""
-    from math import cos, sin
-    rig = json.loads(json.dumps(rig))
-    camera = next(c for c in rig["cameras"] if c["name"] == name)
-    angle = px / camera["K"][1][1]
-    for rows in (camera["R"], camera["t"]):
-        y, z = rows[1], rows[2]
-        mixed = lambda a, b: ([a * p + b * q for p, q in zip(y, z)] if isinstance(y, list)
-                              else a * y + b * z)
-        rows[1], rows[2] = mixed(cos(angle), -sin(angle)), mixed(sin(angle), cos(angle))
-    return rig
-
-
 class BumpedCamera(unittest.TestCase):
     """A ball that moves by half a millimetre a frame; from the 12th frame on the second of two
     cameras stands where it was bumped to by half a pixel."""
@@ -248,8 +194,9 @@ class BumpedCamera(unittest.TestCase):
         write_ball(at("ball.obj"))
         with open(at("ring.json")) as f:
             ring = json.load(f)
+        turn_camera(ring, "cam1", 0.5)
         with open(at("bumped.json"), "w") as f:
-            json.dump(turned(ring, "cam1", 0.5), f)
+            json.dump(ring, f)
         for rig, scene, frames in ("ring", "before", "12"), ("bumped", "after", "16"):
             run("simulate", "--rig", at(f"{rig}.json"), "--mesh", at("ball.obj"), "--noise",
                 "medium", "--translate-mm", "0.5", "0", "0", "--samples", "2", "--frame-count",
@@ -299,7 +246,7 @@ class BumpedCamera(unittest.TestCase):
         dark = self.at("dark/000000")
         os.makedirs(dark)
         for name in ("cam0", "cam1"):
-            Sequence.write_dark(f"{dark}/{name}.png", 320, 240)
+            write_png(f"{dark}/{name}.png", DARK)
         fit = self.check(self.at("ring.json"), self.at("dark"), 1)
         self.assertEqual(fit["verdict"], "unknown")
 

@@ -22,8 +22,10 @@ import sys
 import time
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from scene import HEIGHT, WIDTH, Scene, read_png, write_png, write_tiff
-from whole import Broken, check_whole, sums
+from scene import HEIGHT, WIDTH, Scene
+from whole import Broken, check_whole
+
+from files import read_png, sums, turn_camera, write_png, write_tiff
 
 MARK = "PENCILSCAN_FAULTS_NAMESPACE"  # set in a process that may mount what nobody else sees
 
@@ -404,16 +406,9 @@ def frozen(inputs, camera, other, rng):
 
 def moved(inputs, camera, other, rng):
     """The rig says that the camera looks elsewhere, by 3 to 60 px."""
-    from math import cos, sin
     with open(f"{inputs}/rig.json") as f:
         rig = json.load(f)
-    device = next(d for d in rig["cameras"] if d["name"] == camera)
-    angle = rng.uniform(3, 60) * rng.choice((-1, 1)) / device["K"][1][1]
-    (_, *rows), (x, y, z) = device["R"], device["t"]
-    c, s = cos(angle), sin(angle)
-    device["R"][1] = [c * a - s * b for a, b in zip(*rows)]
-    device["R"][2] = [s * a + c * b for a, b in zip(*rows)]
-    device["t"] = [x, c * y - s * z, s * y + c * z]
+    turn_camera(rig, camera, rng.uniform(3, 60) * rng.choice((-1, 1)))
     os.remove(f"{inputs}/rig.json")
     with open(f"{inputs}/rig.json", "w") as f:
         json.dump(rig, f)

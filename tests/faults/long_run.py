@@ -13,7 +13,8 @@ import time
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from scene import Scene
-from whole import sums
+
+from files import sums
 
 MOTION = 12  # frames of the moving ball, which are seen over and over
 FIRST = 0.1  # of the frames, in which what is kept for the next ones grows to its size

@@ -4,22 +4,23 @@
 #include <atomic>
 #include <charconv>
 #include <cmath>
-#include <deque>
 #include <fstream>
 #include <functional>
 #include <iostream>
 #include <mutex>
 #include <nlohmann/json.hpp>
-#include <opencv2/imgproc.hpp>
 #include <thread>
 
 #include "pencilscan/capture/live_figures.h"
 #include "pencilscan/capture/projector_tests.h"
 #include "pencilscan/cli/interruption.h"
 #include "pencilscan/cli/lab_devices.h"
+#include "pencilscan/cli/lab_work.h"
 #include "pencilscan/cli/own_command.h"
+#include "pencilscan/cli/pose_cover.h"
 #include "pencilscan/core/error.h"
 #include "pencilscan/io/file.h"
+#include "pencilscan/report/labelled_share.h"
 
 namespace pencilscan::cli {
 namespace {
@@ -32,9 +33,6 @@ constexpr int kPreviewWidth = 640;                       ///< px
 constexpr auto kPulse = std::chrono::milliseconds(250);  ///< between previews that we trigger
 /// One picture that is told to be taken may take its time.
 constexpr double kCalmRateHz = 1;
-constexpr std::size_t kSaidLines = 40;  ///< kept for the page
-const cv::Size kCoverCells(4, 3);       ///< of a camera's picture
-constexpr double kCovered = 0.5;        ///< of a cell
 
 const std::vector<std::string>& shown_names() {
   static const std::vector<std::string> names{"black", "white",   "lines", "identify",
@@ -70,20 +68,14 @@ class Desk final : public LabDesk {
   };
 
   [[nodiscard]] Json camera_status(std::size_t camera);
-  [[nodiscard]] Json cover_status() const;
   [[nodiscard]] std::string next_step() const;
-  std::string begin(const std::string& what, std::function<void()> work);
   void pulse();
-  void say(const std::string& text, bool fault = false);
-  void say_faults(const std::vector<Fault>& faults);
-  bool progress(const std::string& what, double share);
   void show(const ProjectorPicture& picture, const std::string& projector);
   std::string set_camera(const Values& values);
   void flash();
   void capture();
   void calibrate();
   void record();
-  void add_cover(const std::vector<std::vector<LitView>>& views);
   [[nodiscard]] Json run(const std::vector<std::string>& words, const std::string& name);
   [[nodiscard]] std::string at(const std::string& file) const {
     return (options_.out / file).string();
@@ -98,28 +90,22 @@ class Desk final : public LabDesk {
 
   mutable std::mutex mutex_;  ///< of what follows
   std::string showing_;
-  std::string what_;
-  double share_ = 0;
-  bool running_ = false;
-  std::deque<std::pair<std::string, bool>> said_;  ///< newest first; true: a fault
   int poses_ = 0;
-  std::vector<cv::Mat> cover_;  ///< per camera, coarse pictures: lit in a pose
+  PoseCover cover_;
   Json calibration_;
   Json frame_;
 
-  std::atomic<bool> stopping_ = false;
+  LabWork work_;
   std::atomic<bool> ending_ = false;
-  std::thread work_;
   std::thread pulse_;
 };
 
 Desk::Desk(LabDeskOptions options)
-    : options_(std::move(options)), rig_(read_devices(options_.rig).rig) {
+    : options_(std::move(options)), rig_(read_devices(options_.rig).rig), cover_(rig_.cameras) {
   fs::create_directories(options_.out / "logs");
   cameras_ = start_lab_cameras(rig_, options_.lab, options_.lab_source);
   screen_ = open_lab_screen(rig_, options_.lab, options_.rig.string());
   figured_.resize(rig_.cameras.size());
-  cover_.resize(rig_.cameras.size());
   calibration_ = {{"verdict", ""}, {"rms_px", 0}, {"poses", 0}, {"reasons", Json::array()}};
   frame_ = {{"points", 0}, {"labelled_share", 0}, {"folder", ""}};
   while (fs::exists(options_.out / ("pose" + std::to_string(poses_ + 1)))) ++poses_;
@@ -128,8 +114,8 @@ Desk::Desk(LabDeskOptions options)
 }
 
 Desk::~Desk() {
-  stopping_ = ending_ = true;
-  if (work_.joinable()) work_.join();
+  ending_ = true;
+  work_.end();
   if (pulse_.joinable()) pulse_.join();
 }
 
@@ -137,32 +123,9 @@ Desk::~Desk() {
 /// them.
 void Desk::pulse() {
   while (!ending_) {
-    bool idle = false;
-    {
-      const std::lock_guard lock(mutex_);
-      idle = !running_;
-    }
-    if (idle) cameras_->group().trigger();
+    if (!work_.running()) cameras_->group().trigger();
     std::this_thread::sleep_for(kPulse);
   }
-}
-
-void Desk::say(const std::string& text, bool fault) {
-  const std::lock_guard lock(mutex_);
-  said_.emplace_front(text, fault);
-  if (said_.size() > kSaidLines) said_.pop_back();
-}
-
-void Desk::say_faults(const std::vector<Fault>& faults) {
-  for (const Fault& fault : faults)
-    say(to_string(fault) + (fault.advice.empty() ? "" : "\n  what to do: " + fault.advice), true);
-}
-
-bool Desk::progress(const std::string& what, double share) {
-  const std::lock_guard lock(mutex_);
-  what_ = what;
-  share_ = share;
-  return !stopping_;
 }
 
 void Desk::show(const ProjectorPicture& picture, const std::string& projector) {
@@ -213,53 +176,14 @@ Json Desk::camera_status(std::size_t camera) {
           {"advice", advice}};
 }
 
-Json Desk::cover_status() const {
-  Json all = Json::array();
-  for (std::size_t c = 0; c < cover_.size(); ++c) {
-    if (cover_[c].empty()) continue;
-    cv::Mat cells;
-    cover_[c].convertTo(cells, CV_32F, 1.0 / 255);
-    cv::resize(cells, cells, kCoverCells, 0, 0, cv::INTER_AREA);
-    Json rows = Json::array();
-    for (int y = 0; y < cells.rows; ++y) {
-      Json row = Json::array();
-      for (int x = 0; x < cells.cols; ++x) row.push_back(cells.at<float>(y, x));
-      rows.push_back(std::move(row));
-    }
-    all.push_back({{"camera", rig_.cameras[c].name},
-                   {"share", cv::mean(cover_[c])[0] / 255},
-                   {"rows", std::move(rows)}});
-  }
-  return all;
-}
-
-/// Where the next pose should have something: the emptiest cell of all.
 std::string Desk::next_step() const {
-  static const char* const kAcross[] = {"left", "left of the middle", "right of the middle",
-                                        "right"};
-  static const char* const kDown[] = {"at the top", "in the middle", "at the bottom"};
   if (poses_ == 0)
     return "Put something with depth into the volume (a heap of matt light things), and capture "
-           "it. "
-           "Nothing may move meanwhile.";
-  double least = kCovered;
-  std::string where;
-  for (std::size_t c = 0; c < cover_.size(); ++c) {
-    if (cover_[c].empty()) continue;
-    cv::Mat cells;
-    cover_[c].convertTo(cells, CV_32F, 1.0 / 255);
-    cv::resize(cells, cells, kCoverCells, 0, 0, cv::INTER_AREA);
-    for (int y = 0; y < cells.rows; ++y) {
-      for (int x = 0; x < cells.cols; ++x) {
-        if (cells.at<float>(y, x) >= least) continue;
-        least = cells.at<float>(y, x);
-        where = rig_.cameras[c].name + " has seen least " + kDown[y] + ", " + kAcross[x];
-      }
-    }
-  }
+           "it. Nothing may move meanwhile.";
+  const std::string cell = cover_.emptiest_cell();
   return "Move and turn the object" +
-         (where.empty() ? std::string(": every camera has seen something everywhere.")
-                        : "; " + where + " of its picture.");
+         (cell.empty() ? std::string(": every camera has seen something everywhere.")
+                       : "; " + cell + " of its picture.");
 }
 
 Json Desk::status() {
@@ -272,15 +196,13 @@ Json Desk::status() {
   status["pictures"] = shown_names();
   const std::lock_guard lock(mutex_);
   status["showing"] = showing_;
-  status["job"] = {{"running", running_}, {"what", what_}, {"share", share_}};
+  status["job"] = work_.json();
   status["poses"] = poses_;
   status["next"] = next_step();
-  status["cover"] = cover_status();
+  status["cover"] = cover_.json();
   status["calibration"] = calibration_;
   status["frame"] = frame_;
-  status["said"] = Json::array();
-  for (const auto& [text, fault] : said_)
-    status["said"].push_back({{"text", text}, {"fault", fault}});
+  status["said"] = work_.said();
   return status;
 }
 
@@ -291,35 +213,13 @@ std::string Desk::preview(std::size_t camera) {
   return preview_jpeg(*latest.frame, kPreviewWidth);
 }
 
-std::string Desk::begin(const std::string& what, std::function<void()> work) {
-  {
-    const std::lock_guard lock(mutex_);
-    if (running_) return "something is being done: stop it first";
-    running_ = true;
-    what_ = what;
-    share_ = 0;
-    stopping_ = false;
-  }
-  if (work_.joinable()) work_.join();
-  work_ = std::thread([this, work = std::move(work)] {
-    try {
-      work();
-    } catch (const std::exception& error) {
-      say(error.what(), true);
-    }
-    const std::lock_guard lock(mutex_);
-    running_ = false;
-  });
-  return "";
-}
-
 std::string Desk::act(const std::string& action, const Values& values) {
   const auto value = [&](const char* name) {
     const auto found = values.find(name);
     return found == values.end() ? std::string() : found->second;
   };
   if (action == "stop") {
-    stopping_ = true;
+    work_.stop();
     return "";
   }
   if (action == "set") return set_camera(values);
@@ -330,12 +230,13 @@ std::string Desk::act(const std::string& action, const Values& values) {
         projector.empty() || std::any_of(rig_.projectors.begin(), rig_.projectors.end(),
                                          [&](const Projector& p) { return p.name == projector; });
     if (!picture || !known) return "no such picture or projector";
-    return begin("showing", [this, picture = *picture, projector] { show(picture, projector); });
+    return work_.begin("showing",
+                       [this, picture = *picture, projector] { show(picture, projector); });
   }
-  if (action == "test") return begin("flashing", [this] { flash(); });
-  if (action == "capture") return begin("capturing", [this] { capture(); });
-  if (action == "calibrate") return begin("calibrating", [this] { calibrate(); });
-  if (action == "record") return begin("recording", [this] { record(); });
+  if (action == "test") return work_.begin("flashing", [this] { flash(); });
+  if (action == "capture") return work_.begin("capturing", [this] { capture(); });
+  if (action == "calibrate") return work_.begin("calibrating", [this] { calibrate(); });
+  if (action == "record") return work_.begin("recording", [this] { record(); });
   return "no such button";
 }
 
@@ -347,7 +248,7 @@ std::string Desk::set_camera(const Values& values) {
     return "an exposure is a number of milliseconds above zero";
   const auto index = static_cast<std::size_t>(*camera);
   LabCamera& wanted = options_.lab.cameras[rig_.cameras[index].name];
-  return begin("setting", [this, index, &wanted, exposure, gain = number_in(values, "gain")] {
+  return work_.begin("setting", [this, index, &wanted, exposure, gain = number_in(values, "gain")] {
     LabCamera changed = wanted;
     changed.exposure_ms = *exposure;
     if (gain) changed.gain = *gain;
@@ -362,7 +263,7 @@ std::string Desk::set_camera(const Values& values) {
 void Desk::flash() {
   ProjectorTestReport report = test_projectors(*cameras_, *screen_, test_options(options_.lab),
                                                [this](const std::string& what, double share) {
-                                                 return progress("flashing " + what, share);
+                                                 return work_.progress("flashing " + what, share);
                                                });
   for (Fault& fault : screen_->check()) report.faults.push_back(std::move(fault));
   for (std::size_t p = 0; p < rig_.projectors.size(); ++p) {
@@ -375,21 +276,12 @@ void Desk::flash() {
       if (timing.views[c].share > 0)
         seen += (seen.empty() ? "" : ", ") + rig_.cameras[c].name + " " +
                 std::to_string(std::lround(100 * timing.views[c].share)) + " %";
-    say(name + ": its light comes after " + std::to_string(std::lround(timing.most_ms)) +
-        " ms; of their pictures it lights: " + seen);
+    work_.say(name + ": its light comes after " + std::to_string(std::lround(timing.most_ms)) +
+              " ms; of their pictures it lights: " + seen);
   }
   write_lab(options_.lab, at("lab.json"));
-  say_faults(report.faults);
+  work_.say(report.faults);
   show({}, "");
-}
-
-void Desk::add_cover(const std::vector<std::vector<LitView>>& views) {
-  const std::lock_guard lock(mutex_);
-  for (const auto& of_projector : views)
-    for (std::size_t c = 0; c < of_projector.size(); ++c) {
-      const cv::Mat& lit = of_projector[c].lit;
-      if (!lit.empty()) cover_[c] = cover_[c].empty() ? lit.clone() : cv::Mat(cover_[c] | lit);
-    }
 }
 
 void Desk::capture() {
@@ -401,33 +293,33 @@ void Desk::capture() {
   const fs::path part = options_.out / (pose + ".part");
   const GrayCaptureReport report = capture_gray_codes(
       *cameras_, *screen_, rig_, part, options, [&](const std::string& what, double share) {
-        return progress("capturing " + pose + ", " + what, share);
+        return work_.progress("capturing " + pose + ", " + what, share);
       });
-  say_faults(report.faults);
+  work_.say(report.faults);
   const bool whole = std::all_of(rig_.projectors.begin(), rig_.projectors.end(),
                                  [&](const Projector& p) { return fs::exists(part / p.name); });
   show({}, "");
-  if (!whole) return say(pose + " is not whole: press the button again to go on", true);
+  if (!whole) return work_.say(pose + " is not whole: press the button again to go on", true);
   if (!report.faults.empty()) {
     fs::remove_all(part);
-    return say(pose + " was not kept: capture it again", true);
+    return work_.say(pose + " was not kept: capture it again", true);
   }
   fs::rename(part, options_.out / pose);
-  add_cover(report.views);
   {
     const std::lock_guard lock(mutex_);
+    cover_.add(report.views);
     ++poses_;
   }
-  say(pose + ": " + std::to_string(report.pictures) + " pictures in " +
-      std::to_string(std::lround(report.seconds)) + " s, " + std::to_string(report.retaken) +
-      " of them taken again");
+  work_.say(pose + ": " + std::to_string(report.pictures) + " pictures in " +
+            std::to_string(std::lround(report.seconds)) + " s, " + std::to_string(report.retaken) +
+            " of them taken again");
   calibrate();
 }
 
 Json Desk::run(const std::vector<std::string>& words, const std::string& name) {
   const OwnCommand command{words, options_.out / "logs" / (name + ".txt"),
                            options_.out / "logs" / (name + ".json"), options_.threads};
-  return run_own_command(command, [&] { return progress(last_line(command.log), 0); });
+  return run_own_command(command, [&] { return work_.progress(last_line(command.log), 0); });
 }
 
 void Desk::calibrate() {
@@ -445,7 +337,7 @@ void Desk::calibrate() {
     found = run(words, "calibrate");
   } catch (const StageError& error) {
     failure = error.what();
-    if (stopping_ || !fs::exists(at("logs/calibrate.json"))) throw;
+    if (work_.stopping() || !fs::exists(at("logs/calibrate.json"))) throw;
     found = Json(read_json(at("logs/calibrate.json")));  // an unusable rig has figures, too
   }
   Json reasons = Json::array();
@@ -476,24 +368,18 @@ void Desk::record() {
   if (options.software_trigger) options.rate_hz = std::min(options.rate_hz, kCalmRateHz);
   RecordReport report =
       pencilscan::record(*cameras_, options_.out / name, options,
-                         [&](const RecordReport&) { return progress("taking a frame", 0); });
+                         [&](const RecordReport&) { return work_.progress("taking a frame", 0); });
   for (Fault& fault : screen_->check()) report.faults.push_back(std::move(fault));
-  say_faults(report.faults);
+  work_.say(report.faults);
   if (report.frames == 0) throw StageError("not a single frame came");
   static_cast<void>(run({"reconstruct", "--rig", rig.string(), "--frames", at(name), "--out",
                          at(name + "_points"), "--no-mesh", "--no-pictures"},
                         name));
   const auto result = read_json(options_.out / (name + "_points") / "000000" / "report.json");
-  double labelled = 0;
-  double points = 0;
-  for (const auto& camera : result.at("cameras")) {
-    points += camera.value("curve_points", 0.0);
-    labelled += camera.value("labelled_curve_points", 0.0);
-  }
-  for (const auto& warning : result.at("warnings")) say(warning.get<std::string>(), true);
+  for (const auto& warning : result.at("warnings")) work_.say(warning.get<std::string>(), true);
   const std::lock_guard lock(mutex_);
   frame_ = {{"points", result.at("points")},
-            {"labelled_share", points > 0 ? labelled / points : 0},
+            {"labelled_share", labelled_share(result).value_or(0)},
             {"folder", name + "_points"}};
 }
 

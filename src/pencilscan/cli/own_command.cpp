@@ -25,14 +25,6 @@ std::string complaint_in(const fs::path& log) {
 
 }  // namespace
 
-std::string last_line(const fs::path& log) {
-  std::ifstream file(log);
-  std::string last;
-  for (std::string line; std::getline(file, line);)
-    if (!line.empty()) last = line;
-  return last;
-}
-
 nlohmann::ordered_json run_own_command(const OwnCommand& command,
                                        const std::function<bool()>& go_on) {
   std::vector<std::string> words{fs::read_symlink("/proc/self/exe").string()};

@@ -23,7 +23,4 @@ struct OwnCommand {
 [[nodiscard]] nlohmann::ordered_json run_own_command(const OwnCommand& command,
                                                      const std::function<bool()>& go_on);
 
-/// The last whole line that it said: how far it is.
-[[nodiscard]] std::string last_line(const std::filesystem::path& log);
-
 }  // namespace pencilscan::cli

@@ -9,6 +9,7 @@
 #include "pencilscan/core/median.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/io/file.h"
+#include "pencilscan/report/labelled_share.h"
 
 namespace pencilscan {
 namespace {
@@ -65,19 +66,12 @@ void read_report(const json& report, const SequenceDevices& devices, FrameRow& r
   row.crossing_expected_px = figure(crossings, "expected_px");
   const json surface = report.value("surface", json::object());
   if (figure(surface, "vertices") > 0) row.measured_share = figure(surface, "measured_share");
-  double curve_points = 0;
-  double labelled = 0;
   double saturated = 0;
   for (const std::string& name : devices.cameras) {
     const json& entry = named_entry(report, "cameras", name);
     row.cameras.push_back(camera_row(entry));
-    const auto add = [&](double& sum, const char* key) {
-      const double value = figure(entry, key);
-      if (std::isfinite(value)) sum += value;
-    };
-    add(curve_points, "curve_points");
-    add(labelled, "labelled_curve_points");
-    add(saturated, "saturated_pixels");
+    const double pixels = figure(entry, "saturated_pixels");
+    if (std::isfinite(pixels)) saturated += pixels;
     row.device_crossing_px.push_back(figure(named_entry(crossings, "devices", name), "median_px"));
   }
   const json by_projector = report.value("points_by_projector", json::object());
@@ -85,7 +79,7 @@ void read_report(const json& report, const SequenceDevices& devices, FrameRow& r
     row.projector_points.push_back(figure(by_projector, name.c_str()));
     row.device_crossing_px.push_back(figure(named_entry(crossings, "devices", name), "median_px"));
   }
-  row.labelled_share = share(labelled, curve_points);
+  row.labelled_share = labelled_share(report).value_or(kUnknownFigure);
   row.saturated_pixels = saturated;
   row.line_width_px = median_of_known(row.cameras, &CameraRow::line_width_px);
   row.line_height = median_of_known(row.cameras, &CameraRow::line_height);

@@ -1,7 +1,6 @@
 #include "pencilscan/jobs/job_folder.h"
 
 #include <array>
-#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "pencilscan/core/error.h"
@@ -77,12 +76,7 @@ fs::path task_log(const fs::path& out, std::size_t task) {
 }
 
 std::string last_log_line(const fs::path& out, std::size_t task) {
-  std::ifstream log(task_log(out, task));
-  std::string last;
-  for (std::string line; std::getline(log, line);) {
-    if (!line.empty()) last = line;
-  }
-  return last;
+  return last_line(task_log(out, task));
 }
 
 std::string shell_word(const std::string& text) {

@@ -5,6 +5,7 @@
 #include <map>
 
 #include "pencilscan/core/formatted.h"
+#include "pencilscan/report/labelled_share.h"
 
 namespace pencilscan {
 namespace {
@@ -113,18 +114,11 @@ void advise_holes(const json& area, std::vector<Advice>& advice) {
 }
 
 void advise_undecided(const json& report, std::vector<Advice>& advice) {
-  double curve_points = 0;
-  double labelled = 0;
-  const json& cameras = child(report, "cameras");
-  if (!cameras.is_array()) return;
-  for (const json& camera : cameras) {
-    curve_points += number_at(camera, "curve_points");
-    labelled += number_at(camera, "labelled_curve_points");
-  }
   constexpr double kMuch = 0.25;
-  if (curve_points > 0 && labelled < (1 - kMuch) * curve_points) {
+  const auto labelled = labelled_share(report);
+  if (labelled && *labelled < 1 - kMuch) {
     advice.push_back(
-        {percent(1 - labelled / curve_points) + " of the detected curve points got no line",
+        {percent(1 - *labelled) + " of the detected curve points got no line",
          "Switch the image layer to \"undecided\": it shows the reason of every piece. Many "
          "crossings from two or more projectors on each part of the surface help most."});
   }

@@ -285,8 +285,8 @@ class FrameProgress {
   std::size_t done_ = 0;
 };
 
-/// How many frames are made at once. Half of a frame's time one thread works alone: so as many
-/// again as the threads alone would fill, and no more than memory holds.
+}  // namespace
+
 std::size_t frames_at_once(const Rig& rig) {
   // .57 GB for six pictures of 1280 x 960 (docs/performance.md), and a third more.
   constexpr double kBytesPerPixel = 100;
@@ -297,8 +297,6 @@ std::size_t frames_at_once(const Rig& rig) {
   const double useful = (thread_count() + 2) / 2;  // one for one thread, two for two
   return static_cast<std::size_t>(std::max(1.0, std::min(useful, std::floor(most))));
 }
-
-}  // namespace
 
 SequenceOutcome reconstruct_sequence(const fs::path& rig_path, const fs::path& frames_path,
                                      const fs::path& out, const SequenceOptions& options,

@@ -42,6 +42,10 @@ struct SequenceOutcome {
   std::vector<std::string> warnings;            ///< of cameras over several frames
 };
 
+/// How many frames of a sequence are made at once. Half of a frame's time one thread works alone:
+/// so as many again as the threads alone would fill, and no more than memory holds.
+[[nodiscard]] std::size_t frames_at_once(const Rig& rig);
+
 /// Reconstructs every frame of `frames` (image folders or a recording) into `out`/<frame>:
 /// points.ply, mesh.ply, mesh_measured.ply, pictures/, timing.json, report.json; or failure.json
 /// with the reason. A frame's folder appears whole or not at all. All input is checked before the

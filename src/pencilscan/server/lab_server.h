@@ -1,9 +1,10 @@
 #pragma once
 
 #include <map>
-#include <memory>
 #include <nlohmann/json_fwd.hpp>
 #include <string>
+
+#include "pencilscan/server/page_server.h"
 
 namespace pencilscan {
 
@@ -25,30 +26,20 @@ class LabDesk {
                                         const std::map<std::string, std::string>& values) = 0;
 };
 
-/// Serves the page of a laboratory on the loopback interface, to who knows the link: below a random
-/// token, GET / is the page, GET status and GET preview/<camera> what it shows; POST act/<action>
-/// with values in the query is a button. Every other path is forbidden (Gate); requests are limited
-/// in size and time (LimitedServer).
-class LabServer {
+/// Serves the page of a laboratory on the loopback interface: below a random token, GET / is the
+/// page, GET status and GET preview/<camera> what it shows; POST act/<action> with values in the
+/// query is a button.
+class LabServer : public PageServer {
  public:
   /// Takes the port (0: any free one), in the network that this process is in now. StageError when
   /// it is not free.
   explicit LabServer(int port);
-  ~LabServer();
 
-  [[nodiscard]] int port() const;
-  [[nodiscard]] std::string link() const;
   /// What is served from now on.
-  void set_desk(LabDesk& desk);
-  /// The whole answer to the bytes of one request, without a network: for tests.
-  [[nodiscard]] std::string answer(const std::string& request);
-  /// Answers requests until stop() is called, from another thread.
-  void run();
-  void stop();
+  void set_desk(LabDesk& desk) { desk_ = &desk; }
 
  private:
-  struct State;
-  std::unique_ptr<State> state_;
+  LabDesk* desk_ = nullptr;
 };
 
 }  // namespace pencilscan

@@ -7,8 +7,7 @@
 #include <string>
 
 #include "pencilscan/core/error.h"
-#include "pencilscan/server/gate.h"
-#include "pencilscan/server/limited_server.h"
+#include "pencilscan/server/guarded_server.h"
 #include "pencilscan/server/served_files.h"
 
 namespace pencilscan {
@@ -68,13 +67,9 @@ std::string part_type(const std::string& name) {
 
 struct ViewServer::State {
   State(const fs::path& folder, const ViewOptions& options)
-      : gate(options.address),
-        root(folder),
-        data(folder, options.page),
-        readers(data),
-        experiment(data.experiment({})) {}
+      : root(folder), data(folder, options.page), readers(data), experiment(data.experiment({})) {}
 
-  void add_routes();
+  void add_routes(GuardedServer& server);
   void answer_part(const httplib::Request& request, httplib::Response& response);
   void answer_list(const httplib::Request& request, httplib::Response& response);
   void answer_picture(const httplib::Request& request, httplib::Response& response);
@@ -83,12 +78,10 @@ struct ViewServer::State {
   /// The number in the first group of a route; nothing when there is no such result.
   std::optional<std::size_t> result_of(const httplib::Request& request) const;
 
-  Gate gate;
   fs::path root;
   PageData data;
   Readers readers;
   std::optional<ExperimentPage> experiment;
-  LimitedServer server;
   std::string page;
 };
 
@@ -164,8 +157,8 @@ void ViewServer::State::answer_file(const httplib::Request& request, httplib::Re
       });
 }
 
-void ViewServer::State::add_routes() {
-  const std::string root_path = gate.path();
+void ViewServer::State::add_routes(GuardedServer& server) {
+  const std::string root_path = server.gate.path();
   server.Get(root_path, [this](const httplib::Request&, httplib::Response& response) {
     response.set_content(page, "text/html; charset=utf-8");
   });
@@ -180,25 +173,14 @@ void ViewServer::State::add_routes() {
 }
 
 ViewServer::ViewServer(const fs::path& root, const ViewOptions& options)
-    : state_(std::make_unique<State>(root, options)) {
-  State& state = *state_;
-  state.server.new_task_queue = [] {
-    return new httplib::ThreadPool(kRequestThreads);  // NOLINT: the server takes it
-  };
-  state.gate.guard(state.server, options.port, "only by the link that pencilscan view prints");
-  state.page = state.make_page();
-  state.add_routes();
+    : PageServer(options.address, options.port, kRequestThreads, "view"),
+      state_(std::make_unique<State>(root, options)) {
+  state_->page = state_->make_page();
+  state_->add_routes(server());
 }
 
 ViewServer::~ViewServer() = default;
 
-int ViewServer::port() const { return state_->gate.port(); }
-std::string ViewServer::link() const { return state_->gate.link(); }
-std::string ViewServer::answer(const std::string& request) {
-  return state_->server.answer(request);
-}
 std::size_t ViewServer::results() const { return state_->data.size(); }
-void ViewServer::run() { state_->server.listen_after_bind(); }
-void ViewServer::stop() { state_->server.stop(); }
 
 }  // namespace pencilscan
