@@ -89,13 +89,16 @@ cv::Mat decode(const std::filesystem::path& path, const std::string& bytes) {
 
 /// RGB to OpenCV's BGR for encoding; one-channel images as they are.
 cv::Mat encodable(const cv::Mat& image, const std::string& ending, int bit_depth) {
-  cv::Mat result = image;
+  cv::Mat integers;
   if (image.depth() == CV_32F && ending != ".tiff") {
     const double top = bit_depth == 16 ? 65535 : 255;
-    image.convertTo(result, bit_depth == 16 ? CV_16U : CV_8U, top);
+    image.convertTo(integers, bit_depth == 16 ? CV_16U : CV_8U, top);
   }
-  if (result.channels() == 3) cv::cvtColor(result, result, cv::COLOR_RGB2BGR);
-  return result;
+  const cv::Mat& values = integers.empty() ? image : integers;
+  if (values.channels() != 3) return values;
+  cv::Mat bgr;  // of its own: the caller keeps his image
+  cv::cvtColor(values, bgr, cv::COLOR_RGB2BGR);
+  return bgr;
 }
 
 std::string lower_ending(const std::filesystem::path& path) {

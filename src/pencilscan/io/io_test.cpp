@@ -498,6 +498,14 @@ TEST(LinearLight, BlackIsTakenOutBeforeGamma) {
   EXPECT_EQ(linearized(image, 1).data, image.data);
 }
 
+TEST(LinearLight, LeavesTheImageAsItIs) {
+  for (const double black : {0.0, 0.1}) {
+    const cv::Mat image(2, 2, CV_32FC3, cv::Scalar::all(0.5));
+    static_cast<void>(linearized(image, 2.2, black));
+    EXPECT_EQ(cv::norm(image, cv::Mat(2, 2, CV_32FC3, cv::Scalar::all(0.5)), cv::NORM_INF), 0);
+  }
+}
+
 TEST(Mosaic, NamesSayWhatThePixelsSee) {
   for (const std::string name : {"RGGB", "BGGR", "GRBG", "GBRG"}) {
     const auto mosaic = Mosaic::from_name(name);

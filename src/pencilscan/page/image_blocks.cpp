@@ -21,10 +21,10 @@ constexpr int kStride = 4;  ///< of depth and hole maps, px: that of the pipelin
 /// `image` is RGB or grey, 8 bit.
 EncodedImage encode(const cv::Mat& image, const std::string& ending, const std::string& type,
                     const std::vector<int>& parameters) {
-  cv::Mat stored = image;
-  if (image.channels() == 3) cv::cvtColor(image, stored, cv::COLOR_RGB2BGR);
+  cv::Mat bgr;
+  if (image.channels() == 3) cv::cvtColor(image, bgr, cv::COLOR_RGB2BGR);
   std::vector<unsigned char> bytes;
-  if (!cv::imencode(ending, stored, bytes, parameters))
+  if (!cv::imencode(ending, bgr.empty() ? image : bgr, bytes, parameters))
     throw StageError("a picture of the page cannot be encoded as " + type);
   return {type, std::string(bytes.begin(), bytes.end())};
 }

@@ -107,10 +107,29 @@ TEST_F(Laws, TheRigsUnitDoesNotMatter) {
 
 TEST_F(Laws, TheGainDecidesNothing) {
   Frame darker = *frame_;
-  for (cv::Mat& image : darker.images) image = 0.5 * image;
+  for (cv::Mat& image : darker.images) image = cv::Mat(0.5 * image);
   const FrameResult other = reconstruct_frame(*rig_, darker, {}, coarse(), false);
   const FrameResult same = reconstruct_frame(*rig_, *frame_, {}, coarse(), false);
   EXPECT_GT(agreement(same.points.points, other.points.points), 0.98);
+}
+
+/// What a gamma was put on and taken off again is the same light, in every stage.
+TEST_F(Laws, GammaIsTakenOutOnce) {
+  constexpr double kGamma = 2.2;
+  Rig coded_rig = *rig_;
+  Frame coded;
+  coded.name = frame_->name;
+  for (const cv::Mat& image : frame_->images) {
+    cv::Mat values;
+    cv::pow(image, 1 / kGamma, values);
+    coded.images.push_back(values);
+  }
+  for (Camera& camera : coded_rig.cameras) camera.gamma = kGamma;
+  const FrameResult other = reconstruct_frame(coded_rig, coded, {}, coarse());
+  EXPECT_GT(agreement(result_->points.points, other.points.points), 0.98);
+  EXPECT_NEAR(error(other), error(*result_), 0.02 * error(*result_));
+  EXPECT_NEAR(other.shape.surface.report.measured_share,
+              result_->shape.surface.report.measured_share, 0.005);
 }
 
 TEST_F(Laws, TheOrderOfDevicesDoesNotMatter) {

@@ -92,7 +92,7 @@ Frame* PictureCheck::frame_ = nullptr;
 TEST_F(PictureCheck, RightPicturesAreNotAccused) {
   EXPECT_THAT(said_of(*frame_), IsEmpty());
   Frame dark = *frame_;
-  for (cv::Mat& image : dark.images) image = 0.1 * image;
+  for (cv::Mat& image : dark.images) image = cv::Mat(0.1 * image);
   EXPECT_THAT(said_of(dark), IsEmpty());
   Frame some = *frame_;
   some.images[1] = some.images[3] = some.images[5] = cv::Mat();
