@@ -16,6 +16,8 @@ const char* to_string(WarningCode code) {
       return "saturated";
     case WarningCode::kColorsFilledIn:
       return "colors-filled-in";
+    case WarningCode::kGamma:
+      return "gamma";
     case WarningCode::kRigIsOff:
       return "rig-is-off";
     case WarningCode::kPointsLeftOut:

@@ -14,6 +14,7 @@ enum class WarningCode {
   kNoLines,         ///< a camera's picture shows none
   kSaturated,       ///< figure "share": of a camera's pixels
   kColorsFilledIn,  ///< pictures went through a mosaic and an interpolation
+  kGamma,           ///< pictures are not coded as the rig says; figure "gamma" of the first camera
   kRigIsOff,        ///< figures "median_px", "expected_px": how crossing lines miss each other
   kPointsLeftOut,   ///< coordinates are not finite or absurd
   kTooFewPoints,    ///< for a surface

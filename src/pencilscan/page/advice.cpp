@@ -18,7 +18,7 @@ struct Known {
 };
 
 /// What to do about warnings, by their code (core/warning.h).
-constexpr std::array<Known, 9> kKnown = {{
+constexpr std::array<Known, 10> kKnown = {{
     {"saturated",
      "Close the aperture or shorten the exposure until the brightest lines stay below "
      "full scale, and capture again."},
@@ -31,6 +31,9 @@ constexpr std::array<Known, 9> kKnown = {{
     {"colors-mix",
      "Give projectors whose lines overlap colours of different channels "
      "(blue/cyan against red/yellow), or state color_matrix in the rig."},
+    {"gamma",
+     "Switch the camera to linear values, or state the gamma in the rig (calibrate "
+     "measures it from solid pictures)."},
     {"rig-is-off",
      "Run reconstruct with --refine-rig, or calibrate again if devices were "
      "moved."},

@@ -183,6 +183,8 @@ PointResult measure_points(const Rig& stated, const Frame& frame, const PointOpt
   const StageClock clock(options.progress, result.times);
   if (std::optional<Warning> warning = interpolation_warning(rig, frame))
     result.warnings.push_back(std::move(*warning));
+  if (std::optional<Warning> warning = gamma_warning(rig, frame, result.graphs))
+    result.warnings.push_back(std::move(*warning));
   leave_out(rig, plain_faults(rig, frame), result);
   std::optional<Rig> corrected;
   clock("solution", [&] { corrected = label_lines(rig, frame, options, result); });

@@ -1,10 +1,13 @@
 #include "pencilscan/pipeline/frame_warnings.h"
 
+#include <cmath>
 #include <string>
 
 #include "pencilscan/core/formatted.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/detection/mosaic_trace.h"
+#include "pencilscan/grid/gamma_trace.h"
+#include "pencilscan/rig/camera_light.h"
 
 namespace pencilscan {
 namespace {
@@ -69,6 +72,35 @@ std::optional<Warning> interpolation_warning(const Rig& rig, const Frame& frame)
                  "the colours of " + names +
                      " were filled in behind a mosaic: raw pictures, with \"mosaic\" in the rig, "
                      "are more accurate"};
+}
+
+std::optional<Warning> gamma_warning(const Rig& rig, const Frame& frame,
+                                     std::span<const GridGraph> graphs) {
+  constexpr double kWorthSaying = 1.3;  // halved colours of a JPEG look like a factor of up to 1.16
+  constexpr double kDeviations = 4;
+  std::vector<double> gammas(rig.cameras.size(), 0);
+  parallel_for(rig.cameras.size(), [&](std::size_t c) {
+    const Camera& camera = rig.cameras[c];
+    if (graphs[c].crossings.empty() || camera.mosaic) return;  // raw samples count light
+    const auto trace = gamma_at_crossings(graphs[c], linear_light(camera, frame.images[c]));
+    if (!trace) return;
+    const double off = std::abs(std::log(trace->gamma));
+    if (off > std::log(kWorthSaying) && off > kDeviations * trace->deviation)
+      gammas[c] = camera.gamma * trace->gamma;
+  });
+  std::string names;
+  double first = 0;
+  for (std::size_t c = 0; c < gammas.size(); ++c) {
+    if (gammas[c] == 0) continue;
+    if (names.empty()) first = gammas[c];
+    add_name(names, rig.cameras[c].name + " (" + formatted(gammas[c], "%.1f") + ")", ", ");
+  }
+  if (names.empty()) return std::nullopt;
+  return Warning{WarningCode::kGamma,
+                 "where lines cross, light adds up only with another gamma than the rig's: about " +
+                     names + "; state it as \"gamma\" of these cameras, or switch it off there",
+                 {},
+                 {{"gamma", first}}};
 }
 
 Warning rig_warning(const CrossingDisagreement& crossings, bool is_corrected) {

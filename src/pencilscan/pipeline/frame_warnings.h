@@ -17,6 +17,11 @@ namespace pencilscan {
 /// Which cameras' colours were filled in behind a mosaic, if any.
 [[nodiscard]] std::optional<Warning> interpolation_warning(const Rig& rig, const Frame& frame);
 
+/// Which cameras' values are not the light that the rig says, and with which gamma they would be
+/// (grid/gamma_trace.h).
+[[nodiscard]] std::optional<Warning> gamma_warning(const Rig& rig, const Frame& frame,
+                                                   std::span<const GridGraph> graphs);
+
 /// Crossings miss each other by more than noise. `is_corrected`: lines were named with the devices
 /// as the frame corrects them.
 [[nodiscard]] Warning rig_warning(const CrossingDisagreement& crossings, bool is_corrected);

@@ -113,19 +113,38 @@ TEST_F(Laws, TheGainDecidesNothing) {
   EXPECT_GT(agreement(same.points.points, other.points.points), 0.98);
 }
 
+constexpr double kGamma = 2.2;
+
+Frame coded(const Frame& frame) {
+  Frame coded;
+  coded.name = frame.name;
+  for (const cv::Mat& image : frame.images) cv::pow(image, 1 / kGamma, coded.images.emplace_back());
+  return coded;
+}
+
+Rig with_gamma(Rig rig) {
+  for (Camera& camera : rig.cameras) camera.gamma = kGamma;
+  return rig;
+}
+
+/// The gamma that the frame warns of; 0: of none.
+double gamma_named(const PointResult& points) {
+  for (const Warning& warning : points.warnings)
+    if (warning.code == WarningCode::kGamma) return warning.figures.front().second;
+  return 0;
+}
+
+TEST_F(Laws, AGammaThatIsNotStatedIsNamed) {
+  EXPECT_EQ(gamma_named(result_->points), 0);
+  EXPECT_EQ(gamma_named(measure_points(with_gamma(*rig_), coded(*frame_))), 0);
+  EXPECT_NEAR(gamma_named(measure_points(*rig_, coded(*frame_))), kGamma, 0.3);
+  EXPECT_NEAR(gamma_named(measure_points(with_gamma(*rig_), *frame_)), 1, 0.15);
+}
+
 /// What a gamma was put on and taken off again is the same light, in every stage.
 TEST_F(Laws, GammaIsTakenOutOnce) {
-  constexpr double kGamma = 2.2;
-  Rig coded_rig = *rig_;
-  Frame coded;
-  coded.name = frame_->name;
-  for (const cv::Mat& image : frame_->images) {
-    cv::Mat values;
-    cv::pow(image, 1 / kGamma, values);
-    coded.images.push_back(values);
-  }
-  for (Camera& camera : coded_rig.cameras) camera.gamma = kGamma;
-  const FrameResult other = reconstruct_frame(coded_rig, coded, {}, coarse());
+  const Rig coded_rig = with_gamma(*rig_);
+  const FrameResult other = reconstruct_frame(coded_rig, coded(*frame_), {}, coarse());
   EXPECT_GT(agreement(result_->points.points, other.points.points), 0.98);
   EXPECT_NEAR(error(other), error(*result_), 0.02 * error(*result_));
   EXPECT_NEAR(other.shape.surface.report.measured_share,
