@@ -94,21 +94,15 @@ double cost(const WindowFit& fit) { return static_cast<double>(fit.misfit); }
 
 }  // namespace
 
-CameraLight measure_light(const Rig& rig, int camera, const std::vector<ColorFamily>& families,
-                          std::vector<cv::Mat> presence, std::vector<cv::Mat> sampled,
-                          cv::Mat valid, std::span<const MeasuredPoint> points,
-                          const DepthOptions& options) {
-  CameraLight light;
-  light.camera = &rig.cameras[static_cast<std::size_t>(camera)];
+void measure_light(const Rig& rig, int camera, const std::vector<ColorFamily>& families,
+                   std::span<const MeasuredPoint> points, const DepthOptions& options,
+                   CameraLight& light) {
   for (std::size_t f = 0; f < families.size(); ++f) {
     for (const PatternRef& ref : families[f].patterns) {
       light.patterns.emplace_back(rig, *light.camera, ref.projector, ref.pattern);
       light.patterns.back().set_family(static_cast<int>(f));
     }
   }
-  light.families = std::move(presence);
-  light.sampled = std::move(sampled);
-  light.valid = std::move(valid);
   light.noise.assign(families.size(), NoiseModel{});
   // Pilot windows at evenly picked curve points.
   constexpr std::size_t kPilots = 100;
@@ -186,7 +180,6 @@ CameraLight measure_light(const Rig& rig, int camera, const std::vector<ColorFam
     noise.offset = std::max({dark.second - noise.slope * dark.first, 0.2F * dark.second, 1e-7F});
     light.noise[f] = noise;
   }
-  return light;
 }
 
 DepthMap dense_depth(const CameraLight& light, int camera, std::span<const MeasuredPoint> points,

@@ -23,13 +23,11 @@ struct DepthOptions {
   double max_move = 2;                  ///< footprints; of a node started from the closed surface
 };
 
-/// Light as one camera sees it (presence, sampled, valid: see CameraLight), blur and noise measured
-/// from the image itself at the seeds.
-[[nodiscard]] CameraLight measure_light(const Rig& rig, int camera,
-                                        const std::vector<ColorFamily>& families,
-                                        std::vector<cv::Mat> presence, std::vector<cv::Mat> sampled,
-                                        cv::Mat valid, std::span<const MeasuredPoint> points,
-                                        const DepthOptions& options);
+/// Completes the light of one camera, whose images are there: its patterns, and blur and noise as
+/// measured from the images at the seeds.
+void measure_light(const Rig& rig, int camera, const std::vector<ColorFamily>& families,
+                   std::span<const MeasuredPoint> points, const DepthOptions& options,
+                   CameraLight& light);
 
 [[nodiscard]] DepthMap dense_depth(const CameraLight& light, int camera,
                                    std::span<const MeasuredPoint> points, const ObjectSpace& space,

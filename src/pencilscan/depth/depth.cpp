@@ -7,6 +7,7 @@
 #include "pencilscan/core/median.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/core/stopwatch.h"
+#include "pencilscan/detection/mosaic_trace.h"
 #include "pencilscan/rig/camera_light.h"
 
 namespace pencilscan {
@@ -19,12 +20,12 @@ cv::Mat unsaturated(const cv::Mat& values) {
   return valid;
 }
 
-/// A mosaic leaves a quarter of the samples, so noise at a window's centre doubles. It falls as 1 /
-/// r with the radius r, what a quadric leaves of the surface grows as r^4: the best r goes as the
-/// fifth root of the noise.
-DepthOptions options_for(const Camera& camera, DepthOptions options) {
+/// A mosaic leaves a quarter of the samples, also where the camera fills its colours in, so noise
+/// at a window's centre doubles. It falls as 1 / r with the radius r, what a quadric leaves of the
+/// surface grows as r^4: the best r goes as the fifth root of the noise.
+DepthOptions options_for(const CameraLight& light, DepthOptions options) {
   constexpr double kWider = 1.1487;  // 2^(1/5)
-  if (camera.mosaic)
+  if (light.of_mosaic)
     options.half = static_cast<int>(std::lround((options.half + 0.5) * kWider - 0.5));
   return options;
 }
@@ -68,9 +69,13 @@ DepthResult measure_depth(const Rig& rig, const std::vector<ColorFamily>& famili
       sampled.push_back(presence_samples(camera, unmixings[c], family));
     }
     CameraLight& light = result.lights[i];
-    const DepthOptions depth = options_for(camera, options.depth);
-    light = measure_light(rig, static_cast<int>(c), families, std::move(presence),
-                          std::move(sampled), unsaturated(images[c]), points, depth);
+    light.camera = &camera;
+    light.families = std::move(presence);
+    light.sampled = std::move(sampled);
+    light.valid = unsaturated(images[c]);
+    light.of_mosaic = camera.mosaic || looks_interpolated(images[c]);
+    const DepthOptions depth = options_for(light, options.depth);
+    measure_light(rig, static_cast<int>(c), families, points, depth, light);
     result.maps[i] = dense_depth(light, static_cast<int>(c), points, space, depth);
   });
   result.report.seconds_depth = watch.seconds();
@@ -97,7 +102,7 @@ void complete_depth(const Rig& rig, const RayScene& surface, const DepthStageOpt
   parallel_for(result.maps.size(), [&](std::size_t i) {
     found[i] =
         complete_map(result.lights[i], surface, space, result.report.consistency.sigma_factor,
-                     options_for(*result.lights[i].camera, options.depth), result.maps[i]);
+                     options_for(result.lights[i], options.depth), result.maps[i]);
   });
   for (std::size_t i = 0; i < found.size(); ++i) {
     result.report.completed += found[i];
