@@ -31,7 +31,6 @@ bool acceptable(const CameraLight& light, const Vec2& pixel, const WindowFit& fi
   if (static_cast<double>(fit.relative_residual) >
       std::max(options.max_relative_residual, 2 * usual))
     return false;
-  if (fit.significance < 5) return false;
   if (std::sqrt(fit.variance) * static_cast<double>(fit.lines_per_w) > options.max_sigma_lines)
     return false;
   if (incidence(light, pixel, fit.q, half) < options.min_cosine) return false;

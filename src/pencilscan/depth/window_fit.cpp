@@ -20,8 +20,14 @@ auto bell_integral(const Array& u) {
   return 0.5F + (35.F / 32) * u * (1.F + u2 * (-1.F + u2 * (0.6F - u2 * (1.F / 7))));
 }
 
-constexpr float kLeastShare = 0.15F;       // of the largest amplitude, to be called lit
-constexpr float kLeastSignificance = 8.F;  // amplitude / deviation, to be called lit
+constexpr float kLeastShare = 0.15F;  // of the largest amplitude, to be called lit
+
+/// Amplitude / deviation, to be called lit. Of the 6 million windows and patterns of a frame, noise
+/// alone takes one beyond 5 deviations. In full windows 8 are asked, which also keeps out what a
+/// surface that is no quadric makes; that does not grow with the number of samples.
+float least_significance(float sampled_share) {
+  return std::max(5.F, 8.F * std::sqrt(sampled_share));
+}
 
 constexpr float kSideStart = 0.2F;    // of the radius: where a side of the window begins
 constexpr float kLeastLight = 0.6F;   // share of the predicted light that a side must show ...
@@ -71,6 +77,7 @@ WindowFitter::WindowFitter(const CameraLight& light, int half) : light_(&light),
   image_.assign(families, Column::Zero(padded_));
   weight_ = root_ = image_;
   weight_sum_.assign(families, 0.F);
+  sampled_share_.assign(families, 1.F);
   offset_.assign(families, 0.F);
   ex_ = ey_ = inverse_variance_ = mean_ = variance_ = offset_;
   profile_.assign(light.patterns.size(), Column::Zero(padded_));
@@ -95,11 +102,16 @@ bool WindowFitter::gather(int u, int v) {
   if (used * 2 < count_) return false;
   for (std::size_t f = 0; f < image_.size(); ++f) {
     weight = valid;
+    sampled_share_[f] = 1;
     if (!light_->sampled[f].empty()) {
+      int without = 0;
       for (int i = 0; i < count_; ++i) {
         const auto k = static_cast<std::size_t>(i);
-        if (light_->sampled[f].at<std::uint8_t>(v + dv_[k], u + du_[k]) == 0) weight[i] = 0;
+        if (light_->sampled[f].at<std::uint8_t>(v + dv_[k], u + du_[k]) != 0) continue;
+        weight[i] = 0;
+        ++without;
       }
+      sampled_share_[f] = 1 - static_cast<float>(without) / static_cast<float>(count_);
     }
     set_weight(f, weight);
     for (int i = 0; i < count_; ++i) {
@@ -421,7 +433,8 @@ std::optional<WindowFit> WindowFitter::fit(const Vec2& pixel, const Quadric& sta
   }
   for (const Lit& lit : lit_) {
     if (!lit.on || lit.amplitude < kLeastShare * fit.amplitude) continue;
-    if (lit.amplitude < kLeastSignificance * std::sqrt(lit.amplitude_variance)) continue;
+    const float least = least_significance(sampled_share_[static_cast<std::size_t>(lit.family)]);
+    if (lit.amplitude < least * std::sqrt(lit.amplitude_variance)) continue;
     fit.lit.set(static_cast<std::size_t>(lit.pattern));
     fit.significance =
         std::max(fit.significance, lit.amplitude / std::sqrt(lit.amplitude_variance));

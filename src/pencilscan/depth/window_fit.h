@@ -104,6 +104,7 @@ class WindowFitter {
   Column seen_, predicted_;                    ///< weighted by what a pixel says
   std::vector<Column> image_, weight_, root_;  ///< per family; root_: of the weight
   std::vector<float> weight_sum_;              ///< per family
+  std::vector<float> sampled_share_;           ///< per family: of the pixels, a mosaic's samples
   std::vector<Lit> lit_;
   std::vector<Column> profile_, slope_;  ///< per lit: P, dP/dw
   std::vector<float> offset_, ex_, ey_, inverse_variance_, mean_, variance_;
