@@ -6,8 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
-// After all that includes Eigen: its <resolv.h> defines a macro that Eigen uses as a name.
-#include <httplib.h>
+#include "pencilscan/server/http.h"
 
 namespace pencilscan {
 namespace {

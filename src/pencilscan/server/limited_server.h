@@ -1,10 +1,8 @@
 #pragma once
 
-// After all that includes Eigen: <resolv.h>, which httplib includes, defines a macro that Eigen
-// uses as a name.
-#include <httplib.h>
-
 #include <string>
+
+#include "pencilscan/server/http.h"
 
 namespace pencilscan {
 

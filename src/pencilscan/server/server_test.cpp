@@ -10,16 +10,12 @@
 #include <thread>
 #include <vector>
 
-// clang-format off
-#include "pencilscan/io/temporary_folder.h"
 #include "pencilscan/core/error.h"
+#include "pencilscan/io/temporary_folder.h"
 #include "pencilscan/page/sample_result.h"
+#include "pencilscan/server/http.h"
 #include "pencilscan/server/served_files.h"
 #include "pencilscan/server/view_server.h"
-
-// After all that includes Eigen: its <resolv.h> defines a macro that Eigen uses as a name.
-#include <httplib.h>
-// clang-format on
 
 namespace pencilscan {
 namespace {

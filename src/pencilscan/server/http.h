@@ -1,0 +1,6 @@
+#pragma once
+
+#include <httplib.h>
+
+// It includes <resolv.h>, whose macro takes a name that Eigen uses.
+#undef _res
