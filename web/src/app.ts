@@ -25,8 +25,17 @@ function nearest(places: {u: ArrayLike<number>; v: ArrayLike<number>}, begin: nu
   return best;
 }
 
+/** A frame that the shown one is compared with. */
+export interface Reference {
+  result: number;
+  how: 'beside' | 'difference';
+}
+
+type Happening = 'result' | 'points' | 'curves' | 'selection' | 'theme' | 'reference';
+
 export class App {
   result = 0;
+  reference: Reference | null = null;
   rig: RigJson | null = null;
   cameras: Device[] = [];
   points: Points | null = null;
@@ -37,12 +46,17 @@ export class App {
 
   constructor(readonly source: Source) {}
 
-  on(what: 'result' | 'points' | 'curves' | 'selection' | 'theme', listener: () => void): void {
+  on(what: Happening, listener: () => void): void {
     this.listeners.set(what, [...(this.listeners.get(what) ?? []), listener]);
   }
 
-  tell(what: 'result' | 'points' | 'curves' | 'selection' | 'theme'): void {
+  tell(what: Happening): void {
     for (const listener of this.listeners.get(what) ?? []) listener();
+  }
+
+  compareWith(reference: Reference | null): void {
+    this.reference = reference;
+    this.tell('reference');
   }
 
   /** Shows another result; its parts arrive one after another. */

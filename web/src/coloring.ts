@@ -1,10 +1,12 @@
 // Colours of points and vertices by what is known of them, and the legend that explains them.
 import type {Mesh, Points, RigJson} from './data';
+import {kFigures} from './figure_text';
 import {nearestVertices} from './nearest';
-import {category, kHoles, lightColor, sequential, type Named, type Rgb} from './palette';
+import {category, diverging, kHoles, lightColor, sequential, type Named, type Rgb} from './palette';
 
 export type ColorMode =
-  'shading' | 'albedo' | 'camera' | 'projector' | 'line' | 'sigma' | 'confidence' | 'hole' | 'distance';
+  'shading' | 'albedo' | 'camera' | 'projector' | 'line' | 'sigma' | 'confidence' | 'hole' | 'distance' |
+  'difference';
 
 export const kColorModes: {value: ColorMode; text: string}[] = [
   {value: 'shading', text: 'Shading'},
@@ -16,12 +18,14 @@ export const kColorModes: {value: ColorMode; text: string}[] = [
   {value: 'confidence', text: 'Confidence'},
   {value: 'hole', text: 'Hole reason'},
   {value: 'distance', text: 'Distance to truth'},
+  {value: 'difference', text: 'Difference of frames'},
 ];
 
 export interface Legend {
   title: string;
   named?: Named[];
-  range?: {low: number; high: number; unit: string};
+  scale?: Scaled;
+  unit?: string;
 }
 
 const toLinear = new Float32Array(256);
@@ -53,34 +57,71 @@ function quantile(values: Float32Array, share: number): number {
   return sample.length ? sample[Math.floor(share * (sample.length - 1))] : 1;
 }
 
-function niceHigh(value: number): number {
-  if (!(value > 0)) return 1;
+/** The next larger one of 1, 2, 5, 10, ... */
+function niceStep(value: number): number {
   const unit = 10 ** Math.floor(Math.log10(value));
-  for (const step of [1, 1.5, 2, 3, 4, 5, 6, 8, 10]) {
-    if (value <= step * unit) return step * unit;
-  }
-  return 10 * unit;
+  return unit * ([1, 2, 5].find((step) => value <= step * unit * 1.0001) ?? 10);
 }
 
 const colorAt = (color: Uint8Array, i: number): Rgb =>
   [color[3 * i], color[3 * i + 1], color[3 * i + 2]];
 
-/** The high end of a scale that both points and mesh share. */
-export function scaleOf(...lists: (Float32Array | undefined)[]): number {
-  return niceHigh(Math.max(0, ...lists.filter((l) => l?.length).map((l) => quantile(l!, 0.95))));
+export interface Range {
+  low: number;
+  high: number;
 }
 
-export interface Ramps {
-  sigma: number;
-  distance: number;
+/** Colour modes with a scale. */
+export type Scaled = 'sigma' | 'confidence' | 'distance' | 'difference';
+export type Ranges = Record<Scaled, Range>;
+export const isScaled = (mode: ColorMode): mode is Scaled =>
+  ['sigma', 'confidence', 'distance', 'difference'].includes(mode);
+
+/** What nearly all of the values are within (outliers do not spoil it), in round numbers. */
+export function fitted(lists: (Float32Array | undefined)[], symmetric = false): Range {
+  const known = lists.filter((list): list is Float32Array => list !== undefined && list.length > 0);
+  if (!known.length) return {low: 0, high: 1};
+  let low = Math.min(...known.map((list) => quantile(list, 0.02)));
+  let high = Math.max(...known.map((list) => quantile(list, 0.98)));
+  if (symmetric) low = -(high = Math.max(Math.abs(low), Math.abs(high)));
+  if (!(high > low)) [low, high] = [low - 0.05 * (Math.abs(low) || 1), high + 0.05 * (Math.abs(high) || 1)];
+  const step = niceStep((high - low) / 20);
+  const round = (value: number) => Number(value.toPrecision(6)); // 0.30000000000000004
+  return {low: round(Math.floor(low / step + 1e-6) * step), high: round(Math.ceil(high / step - 1e-6) * step)};
+}
+
+const shares = (bytes: Uint8Array | undefined): Float32Array | undefined =>
+  bytes && Float32Array.from(bytes, (byte) => byte / 255);
+
+/** Vertices that close the surface where nobody measured. */
+const isClosing = (mesh: Mesh, i: number): boolean =>
+  (mesh.confidence !== undefined && mesh.confidence[i] === 0) ||
+  (mesh.hole !== undefined && mesh.hole[i] !== 1);
+
+const measured = (mesh: Mesh, values: Float32Array | undefined): Float32Array | undefined =>
+  values?.filter((_, i) => !isClosing(mesh, i));
+
+/** Of what is known of points and surface together. */
+export function fittedRange(mode: Scaled, points: Points | null, mesh: Mesh | null): Range {
+  switch (mode) {
+    case 'sigma': return fitted([points?.sigma, mesh ? measured(mesh, mesh.sigma) : undefined]);
+    case 'confidence': return fitted([shares(points?.confidence), mesh ? measured(mesh, shares(mesh.confidence)) : undefined]);
+    case 'distance': return fitted([points?.distance, mesh?.distance]);
+    case 'difference': return fitted([mesh?.difference], true);
+  }
+}
+
+/** Where a value lies in its scale, as a colour. */
+export function scaled(mode: Scaled, value: number, {low, high}: Range): Rgb {
+  const share = (value - low) / (high - low);
+  return mode === 'difference' ? diverging(2 * share - 1) : sequential(share);
 }
 
 /** mesh: of which the points take their albedo. */
 export function colorPoints(
-  points: Points, mesh: Mesh | null, mode: ColorMode, rig: RigJson | null, ramps: Ramps, plain: Rgb,
+  points: Points, mesh: Mesh | null, mode: ColorMode, rig: RigJson | null, ranges: Ranges, plain: Rgb,
 ): Float32Array {
   const {count} = points;
-  const byConfidence = (i: number) => sequential(points.confidence[i] / 255);
   switch (mode) {
     case 'camera': return paint(count, (i) => category(points.camera[i]));
     case 'projector': return paint(count, (i) => category(points.projector[i]));
@@ -89,11 +130,11 @@ export function colorPoints(
       if (!pattern) return plain;
       return lightColor(pattern.colors[pattern.sequence[points.line[i] % pattern.sequence.length]]);
     });
-    case 'sigma': return paint(count, (i) => sequential(points.sigma[i] / ramps.sigma));
-    case 'confidence': return paint(count, byConfidence);
+    case 'sigma': return paint(count, (i) => scaled('sigma', points.sigma[i], ranges.sigma));
+    case 'confidence': return paint(count, (i) => scaled('confidence', points.confidence[i] / 255, ranges.confidence));
     case 'distance':
       return points.distance
-        ? paint(count, (i) => sequential(points.distance![i] / ramps.distance))
+        ? paint(count, (i) => scaled('distance', points.distance![i], ranges.distance))
         : paint(count, () => plain);
     case 'albedo': {
       const color = mesh?.color;
@@ -106,30 +147,31 @@ export function colorPoints(
 }
 
 export function colorMesh(
-  mesh: Mesh, mode: ColorMode, ramps: Ramps, clay: Rgb, invented: Rgb,
+  mesh: Mesh, mode: ColorMode, ranges: Ranges, clay: Rgb, invented: Rgb,
 ): Float32Array {
   const count = mesh.position.length / 3;
-  const closing = (i: number) =>
-    (mesh.confidence !== undefined && mesh.confidence[i] === 0) ||
-    (mesh.hole !== undefined && mesh.hole[i] !== 1);
+  const closing = (i: number) => isClosing(mesh, i);
   if (mode === 'sigma' && mesh.sigma) {
-    return paint(count, (i) => closing(i) ? invented : sequential(mesh.sigma![i] / ramps.sigma));
+    return paint(count, (i) => closing(i) ? invented : scaled('sigma', mesh.sigma![i], ranges.sigma));
   }
   if (mode === 'confidence' && mesh.confidence) {
-    return paint(count, (i) => sequential(mesh.confidence![i] / 255));
+    return paint(count, (i) => scaled('confidence', mesh.confidence![i] / 255, ranges.confidence));
   }
   if (mode === 'hole' && mesh.hole) {
     return paint(count, (i) => (kHoles[mesh.hole![i]] ?? kHoles[0]).color);
   }
   if (mode === 'distance' && mesh.distance) {
-    return paint(count, (i) => sequential(mesh.distance![i] / ramps.distance));
+    return paint(count, (i) => scaled('distance', mesh.distance![i], ranges.distance));
+  }
+  if (mode === 'difference' && mesh.difference) {
+    return paint(count, (i) => scaled('difference', mesh.difference![i], ranges.difference));
   }
   if (mode === 'albedo' && mesh.color) return paint(count, (i) => colorAt(mesh.color!, i));
   return paint(count, (i) => closing(i) ? invented : clay);
 }
 
 export function legendOf(
-  mode: ColorMode, rig: RigJson | null, mesh: Mesh | null, ramps: Ramps, clay: Rgb, invented: Rgb,
+  mode: ColorMode, rig: RigJson | null, mesh: Mesh | null, clay: Rgb, invented: Rgb,
 ): Legend | null {
   const unit = rig?.unit ?? 'mm';
   const devices = (list: {name: string}[] | undefined) =>
@@ -142,9 +184,10 @@ export function legendOf(
       return {title: 'Colour of the projected line',
         named: [...names].map((name) => ({name, color: lightColor(name)}))};
     }
-    case 'sigma': return {title: 'Sigma', range: {low: 0, high: ramps.sigma, unit}};
-    case 'confidence': return {title: 'Confidence', range: {low: 0, high: 1, unit: ''}};
-    case 'distance': return {title: 'Distance to truth', range: {low: 0, high: ramps.distance, unit}};
+    case 'confidence': return {title: 'Confidence', scale: mode, unit: ''};
+    case 'sigma':
+    case 'distance':
+    case 'difference': return {title: kFigures[mode].name, scale: mode, unit};
     case 'albedo': return {title: 'Albedo, up to one common factor', named: []};
     case 'hole': {
       const present = new Set(mesh?.hole ?? []);

@@ -91,6 +91,7 @@ export interface IndexJson {
   failed: string[];
   calibrations: CalibrationEntry[];
   experiment: ExperimentJson | null;
+  sequence: boolean; // there is a sequence.json
 }
 
 export interface HistogramJson {
@@ -138,6 +139,7 @@ export interface Mesh {
   hole?: Uint8Array;
   distance?: Float32Array;
   color?: Uint8Array; // albedo as sRGB: red green blue of each vertex
+  difference?: Float32Array; // to the frame that this one is compared with
 }
 
 export interface Curves {
@@ -204,7 +206,12 @@ export class Source {
     return this.bytes('experiment', String(part));
   }
 
-  private async bytes(result: number | 'experiment', part: string): Promise<Uint8Array<ArrayBuffer>> {
+  /** The table of all frames. */
+  async sequence<T>(): Promise<T> {
+    return inflateJson<T>(await this.bytes('sequence', '0'));
+  }
+
+  private async bytes(result: number | 'experiment' | 'sequence', part: string): Promise<Uint8Array<ArrayBuffer>> {
     if (this.index.mode === 'report') {
       const element = document.getElementById(`part/${result}/${part}`);
       if (!element) throw new Error(`${part} is not in this report`);
@@ -242,9 +249,9 @@ export class Source {
     );
   }
 
-  /** playing: a coarse mesh will do, where the source makes a difference. */
-  async mesh(result: number, part: 'mesh' | 'measured', playing = false): Promise<Mesh> {
-    const name = playing && this.index.mode === 'view' ? 'play' : part;
+  /** thousands: of faces that will do while a sequence plays, where the source makes a difference. */
+  async mesh(result: number, part: 'mesh' | 'measured', thousands = 0): Promise<Mesh> {
+    const name = thousands > 0 && this.index.mode === 'view' ? `play/${thousands}` : part;
     const block = await this.block(result, name);
     const optional = (key: string) => (block.has(key) ? block.floats(key) : undefined);
     return {

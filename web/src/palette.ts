@@ -26,6 +26,14 @@ export function sequential(value: number): Rgb {
     Math.round(kViridis[i][k] * (1 - f) + kViridis[i + 1][k] * f)) as unknown as Rgb;
 }
 
+/** From blue (-1) over a pale grey to red (1): what lies behind and before. */
+export function diverging(value: number): Rgb {
+  if (!Number.isFinite(value)) return kUndecided;
+  const x = Math.min(Math.max(value, -1), 1);
+  const [pale, end]: [Rgb, Rgb] = [[235, 235, 235], x < 0 ? [33, 102, 172] : [178, 24, 43]];
+  return [0, 1, 2].map((k) => Math.round(pale[k] + Math.abs(x) * (end[k] - pale[k]))) as unknown as Rgb;
+}
+
 export const css = ([r, g, b]: Rgb, alpha = 1): string => `rgba(${r},${g},${b},${alpha})`;
 
 export interface Named {

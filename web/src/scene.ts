@@ -6,6 +6,7 @@ import {
 } from 'three';
 import {OrbitControls} from 'three/examples/jsm/controls/OrbitControls.js';
 import type {Device} from './device';
+import {vertexNormals} from './normals';
 
 const kFov = 35; // degrees, of the free view
 
@@ -28,6 +29,22 @@ function makeRenderer(): WebGLRenderer {
   return renderer;
 }
 
+interface Triangles {
+  position: Float32Array;
+  index: Uint32Array;
+}
+
+function fill(mesh: ThreeMesh, geometry: Triangles | null): void {
+  mesh.geometry.dispose();
+  mesh.geometry = new BufferGeometry();
+  if (geometry) {
+    mesh.geometry.setAttribute('position', new BufferAttribute(geometry.position, 3));
+    mesh.geometry.setAttribute('normal', new BufferAttribute(vertexNormals(geometry.position, geometry.index), 3));
+    mesh.geometry.setIndex(new BufferAttribute(geometry.index, 1));
+  }
+  mesh.visible = geometry !== null;
+}
+
 export class Picture3d {
   readonly camera = new PerspectiveCamera(kFov, 1, 1, 10000);
   readonly helpers = new Group(); // devices, planes, markers: not picked, not fitted
@@ -37,6 +54,7 @@ export class Picture3d {
   private controls: OrbitControls;
   private readonly mesh = new ThreeMesh(
     new BufferGeometry(), new MeshLambertMaterial({vertexColors: true, side: DoubleSide}));
+  private readonly other = new ThreeMesh(new BufferGeometry(), this.mesh.material); // beside it
   private readonly points = new ThreePoints(
     new BufferGeometry(), new PointsMaterial({vertexColors: true, sizeAttenuation: false, size: 2}));
   private readonly up = new Vector3(0, 0, 1);
@@ -54,13 +72,14 @@ export class Picture3d {
     container.append(canvas);
     this.camera.up.set(0, 0, 1);
     this.scene.add(new HemisphereLight(0xffffff, 0x667788, 0.9), new AmbientLight(0xffffff, 0.25),
-      this.camera, this.mesh, this.points, this.helpers);
+      this.camera, this.mesh, this.other, this.points, this.helpers);
     this.headlight.position.set(-0.5, 0.7, 1);
     this.camera.add(this.headlight, this.headlight.target);
     this.headlight.target.position.set(0, 0, -1);
-    this.mesh.frustumCulled = false;
-    this.points.frustumCulled = false;
-    this.mesh.visible = this.points.visible = false;
+    for (const object of [this.mesh, this.other, this.points]) {
+      object.frustumCulled = false;
+      object.visible = false;
+    }
     this.controls = this.makeControls();
     new ResizeObserver(() => this.resize()).observe(container);
     canvas.addEventListener('keydown', (event) => this.key(event));
@@ -85,16 +104,22 @@ export class Picture3d {
     this.render();
   }
 
-  setMesh(geometry: {position: Float32Array; index: Uint32Array} | null): void {
-    this.mesh.geometry.dispose();
-    this.mesh.geometry = new BufferGeometry();
-    if (geometry) {
-      this.mesh.geometry.setAttribute('position', new BufferAttribute(geometry.position, 3));
-      this.mesh.geometry.setIndex(new BufferAttribute(geometry.index, 1));
-      this.mesh.geometry.computeVertexNormals();
-    }
-    this.mesh.visible = geometry !== null;
+  setMesh(geometry: Triangles | null): void {
+    fill(this.mesh, geometry);
     this.render();
+  }
+
+  /** A second mesh, in the right half of the picture; the first one keeps the left half. */
+  setOther(geometry: Triangles | null, colors?: Float32Array): void {
+    const before = this.beside;
+    fill(this.other, geometry);
+    if (colors) this.other.geometry.setAttribute('color', new BufferAttribute(colors, 3));
+    if (before !== this.beside) this.resize();
+    this.render();
+  }
+
+  private get beside(): boolean {
+    return this.other.visible;
   }
 
   setPoints(position: Float32Array | null): void {
@@ -151,7 +176,7 @@ export class Picture3d {
     this.camera.up.copy(this.up);
     this.camera.fov = kFov;
     const half = (kFov / 2) * (Math.PI / 180);
-    const narrow = Math.min(1, width / height);
+    const narrow = this.beside ? 1 : Math.min(1, width / height);
     const distance = larger * this.ball.radius / Math.sin(Math.atan(Math.tan(half) * narrow));
     this.camera.position.copy(this.ball.center)
       .addScaledVector(new Vector3(...direction).normalize(), distance);
@@ -187,9 +212,10 @@ export class Picture3d {
     this.camera.updateProjectionMatrix();
   }
 
+  /** Of the picture of one mesh, CSS pixels. */
   private size(): {width: number; height: number} {
     return {
-      width: Math.max(1, this.container.clientWidth),
+      width: Math.max(1, this.container.clientWidth / (this.beside ? 2 : 1)),
       height: Math.max(1, this.container.clientHeight),
     };
   }
@@ -197,8 +223,9 @@ export class Picture3d {
   private resize(): void {
     const {width, height} = this.size();
     const now = this.renderer.getSize(new Vector2());
-    const resized = now.x !== width || now.y !== height;
-    if (resized) this.renderer.setSize(width, height);
+    const whole = Math.max(1, this.container.clientWidth);
+    const resized = now.x !== whole || now.y !== height;
+    if (resized) this.renderer.setSize(whole, height);
     this.camera.aspect = width / height;
     if (this.deviceView) {
       const {K, width: w, height: h} = this.deviceView.json;
@@ -209,6 +236,9 @@ export class Picture3d {
       const shiftY = (K[1][2] - (h - 1) / 2) * scale;
       this.camera.setViewOffset(width, height, -shiftX, -shiftY, width, height);
     } else {
+      // A shape that filled the whole picture fits into half of it.
+      const narrow = this.beside ? Math.min(1, width / height) : 1;
+      this.camera.fov = 2 * Math.atan(Math.tan((kFov / 2) * (Math.PI / 180)) / narrow) * (180 / Math.PI);
       this.camera.clearViewOffset();
     }
     this.camera.updateProjectionMatrix();
@@ -226,11 +256,30 @@ export class Picture3d {
     this.pending = false;
     this.drawn = true;
     this.beforeRender?.();
-    this.renderer.render(this.scene, this.camera);
+    if (this.beside) this.drawBeside();
+    else this.renderer.render(this.scene, this.camera);
     if (!this.shapeDrawn && (this.mesh.visible || this.points.visible)) {
       this.shapeDrawn = true;
       performance.mark('shape-drawn'); // for web/benchmark.mjs
     }
+  }
+
+  /** The mesh and all that belongs to it on the left, the other one on the right. */
+  private drawBeside(): void {
+    const {renderer, mesh, other, points, helpers} = this;
+    const {width, height} = this.size();
+    const shown = [mesh, points, helpers].map((object) => ({object, visible: object.visible}));
+    renderer.setScissorTest(true);
+    for (const half of [0, 1]) {
+      renderer.setViewport(half * width, 0, width, height);
+      renderer.setScissor(half * width, 0, width, height);
+      for (const {object, visible} of shown) object.visible = visible && half === 0;
+      other.visible = half === 1;
+      renderer.render(this.scene, this.camera);
+    }
+    for (const {object, visible} of shown) object.visible = visible;
+    renderer.setScissorTest(false);
+    renderer.setViewport(0, 0, 2 * width, height);
   }
 
   screenshot(): Promise<Blob | null> {
@@ -277,10 +326,12 @@ export class Picture3d {
 
   /** Where the ray through a canvas position meets the mesh. */
   meshHit(x: number, y: number): Vector3 | null {
-    if (!this.mesh.visible) return null;
+    const right = this.beside && x >= this.size().width;
+    const mesh = right ? this.other : this.mesh;
+    if (!mesh.visible) return null;
     const caster = new Raycaster();
-    caster.setFromCamera(this.normalized(x, y), this.camera);
-    return caster.intersectObject(this.mesh, false)[0]?.point ?? null;
+    caster.setFromCamera(this.normalized(right ? x - this.size().width : x, y), this.camera);
+    return caster.intersectObject(mesh, false)[0]?.point ?? null;
   }
 
   /** Index of the frontmost of `position`s within `reach` CSS pixels of a canvas position. */

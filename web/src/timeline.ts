@@ -1,136 +1,158 @@
-// Frames of a sequence, or runs of an experiment: thumbnails, quality, playing.
+// Frames of a sequence, or runs of an experiment: thumbnails, playing, figures as curves, comparing.
 import type {App} from './app';
-import type {Mesh} from './data';
-import {byId, format, h, percent} from './dom';
+import {Comparing} from './comparing';
+import {byId, format, h} from './dom';
+import {figureText} from './figure_text';
+import {Film} from './film';
+import {FrameStrip} from './frame_strip';
+import {Sequence} from './sequence';
+import {TimeCurves} from './time_curves';
+import {TimeMarks} from './time_marks';
 import type {Viewer} from './viewer';
 
 export class Timeline {
   private readonly root = byId('timeline');
-  private items: HTMLButtonElement[] = [];
+  private readonly film: Film;
+  private readonly strip: FrameStrip;
   private playing = false;
-  private at = 0;
-  private readonly meshes = new Map<number, Mesh>();
+  private at = 0; // the result in the picture
+  private wanted = -1; // by scrubbing, while its mesh is read
+  private sequence: Sequence | null = null;
+  private curves: TimeCurves | null = null;
+  private comparing: Comparing | null = null;
   private readonly play = h('button', {type: 'button', id: 'play', class: 'primary',
     onclick: () => void this.toggle()}, '▶ Play');
-  private readonly speed = h('select', {'aria-label': 'Frames per second'},
-    ...[2, 5, 10, 15, 30].map((fps) => h('option', {value: fps, selected: fps === 10}, `${fps} / s`)));
+  private readonly speed = h('select', {id: 'speed', 'aria-label': 'Frames per second'},
+    ...[2, 5, 10, 15, 25, 30].map((fps) => h('option', {value: fps, selected: fps === 10}, `${fps} / s`)));
+  private readonly loop = h('input', {type: 'checkbox', id: 'loop', checked: true});
+  private readonly faces = h('select', {id: 'play-faces', 'aria-label': 'Faces while playing',
+    onchange: () => (this.film.faces = Number(this.faces.value))},
+  ...[20, 50, 100].map((thousands) => h('option', {value: thousands}, `${thousands} k faces`)));
   private readonly slider = h('input', {type: 'range', min: 0, value: 0, id: 'frame-slider',
-    'aria-label': 'Frame', onchange: () => this.app.show(Number(this.slider.value)),
-    oninput: () => this.label(Number(this.slider.value))});
-  private readonly name = h('output', {class: 'frame-name', 'aria-live': 'polite'});
+    'aria-label': 'Frame', onchange: () => this.choose(Number(this.slider.value), true),
+    oninput: () => this.choose(Number(this.slider.value), false)});
+  private readonly name = h('output', {class: 'frame-name', 'aria-live': 'off'});
+  private readonly rate = h('output', {class: 'tool-label', id: 'play-rate'});
 
   constructor(private readonly app: App, private readonly viewer: Viewer) {
-    const {results, failed} = app.source.index;
+    const {source} = app;
+    const {results, failed, mode} = source.index;
+    this.film = new Film(source);
+    this.strip = new FrameStrip(app);
     this.root.hidden = results.length < 2;
     if (results.length < 2) return;
     document.body.classList.add('with-timeline'); // which is in sight beside the pictures
     const sequence = new Set(results.map((r) => r.name)).size > 1;
     const playable = sequence && results.filter((r) => r.parts.includes('mesh')).length > 1;
-    const strip = h('div', {class: 'frames', role: 'group', 'aria-label': sequence ? 'Frames' : 'Runs'});
-    const quality = (i: number): number | undefined => results[i].summary.measured_share;
-    const partial = results.some((r) => r.detail === 'shape');
-    const best = Math.max(...results.map((r) => r.summary.points ?? 0), 1);
-    this.items = results.map((r, i) => {
-      const share = quality(i);
-      const points = r.summary.points;
-      const about = [share === undefined ? '' : `${percent(share, 0)} measured`,
-        points === undefined ? '' : `${format(points)} points`,
-        r.summary.warnings ? `${r.summary.warnings} warnings` : '',
-        partial ? (r.detail === 'full' ? 'with images and points' : 'shape only') : '',
-        r.missing.length ? 'parts are missing' : ''].filter(Boolean).join(', ');
-      const title = [r.run, r.name].filter(Boolean).join(' / ');
-      return h('button', {type: 'button', class: 'frame', title: `${title}: ${about}`,
-        'aria-label': `${title}: ${about}`, onclick: () => app.show(i)},
-      h('span', {class: 'thumb'}, r.parts.includes('thumb') ? null : 'no surface'),
-      h('span', {class: 'quality', 'aria-hidden': 'true'},
-        h('i', {style: `width:${100 * (share ?? (points ?? 0) / best)}%`})),
-      h('span', {class: 'name'}, partial && r.detail === 'full' ? h('i', {class: 'whole'}) : null, sequence ? (r.run ? `${r.run} ${r.name}` : r.name) : r.run || r.name,
-        r.summary.warnings || r.missing.length ? h('b', {class: 'alert', 'aria-hidden': 'true'}, '!') : null));
-    });
-    strip.append(...this.items);
     this.slider.max = String(results.length - 1);
     this.root.append(
-      h('div', {class: 'timeline-tools'}, playable ? this.play : null, playable ? this.speed : null,
-        sequence ? this.slider : null, this.name,
-        partial ? h('span', {class: 'tool-label'}, h('i', {class: 'whole'}), 'with images and points') : null,
-        failed.length ? h('span', {class: 'failed'}, `${failed.length} failed: ${failed.slice(0, 8).join(', ')}${
-          failed.length > 8 ? ', …' : ''}`) : null),
-      strip);
-    this.lazyThumbs();
-    app.on('result', () => this.mark());
+      h('div', {class: 'timeline-tools'}, ...(playable ? [this.play, this.speed,
+        mode === 'view' ? this.faces : null, h('label', {class: 'check'}, this.loop, 'Loop'), this.rate] : []),
+      sequence ? this.slider : null, this.name, this.strip.note,
+      failed.length ? h('span', {class: 'failed'}, `${failed.length} failed: ${failed.slice(0, 8).join(', ')}${
+        failed.length > 8 ? ', …' : ''}`) : null),
+      this.strip.element);
+    app.on('result', () => this.shown());
+    if (sequence) void this.readSequence();
   }
 
-  private lazyThumbs(): void {
-    const {source} = this.app;
-    const observer = new IntersectionObserver((entries) => {
-      for (const entry of entries) {
-        if (!entry.isIntersecting) continue;
-        observer.unobserve(entry.target);
-        const i = this.items.indexOf(entry.target as HTMLButtonElement);
-        if (!source.has(i, 'thumb')) continue;
-        void source.imageUrl(i, 'thumb').then((url) => {
-          entry.target.querySelector('.thumb')!.append(h('img', {src: url, alt: ''}));
-        }).catch(() => undefined);
-      }
-    }, {root: this.root.querySelector('.frames'), rootMargin: '300px'});
-    for (const item of this.items) observer.observe(item);
+  private async readSequence(): Promise<void> {
+    const {app} = this;
+    const sequence = this.sequence = await Sequence.read(app.source);
+    const chooseRow = (row: number, settled: boolean) => {
+      const result = sequence.resultOf(row);
+      if (result >= 0) this.choose(result, settled);
+      else if (settled) this.name.textContent = `${sequence.name(row)} · no result`;
+    };
+    const marks = new TimeMarks(sequence, (row) => chooseRow(row, true));
+    this.comparing = new Comparing(app, sequence);
+    this.curves = new TimeCurves(sequence, app.rig?.unit ?? 'mm', chooseRow, this.comparing.tools);
+    this.root.append(marks.track, this.curves.element, this.comparing.figures, marks.list);
+    document.body.classList.add('with-curves');
+    this.tell(app.result);
+    this.root.dataset.sequence = 'read';
   }
 
-  private label(i: number): void {
+  /** What is said of a frame that is in the picture. */
+  private tell(i: number): void {
     const r = this.app.source.index.results[i];
     const share = r.summary.measured_share;
+    this.slider.value = String(i);
     this.name.textContent = [[r.run, r.name].filter(Boolean).join(' / '),
-      `${i + 1} of ${this.items.length}`, share === undefined ? '' : `${percent(share, 0)} measured`]
+      `${i + 1} of ${this.app.source.index.results.length}`, share === undefined ? '' : `${figureText('measured_share', share)} measured`]
       .filter(Boolean).join(' · ');
+    const row = this.sequence?.rowOf(i) ?? -1;
+    if (row >= 0) this.curves?.show(row);
+    this.comparing?.show(row);
   }
 
-  private mark(): void {
-    const i = this.app.result;
-    this.items.forEach((item, k) => {
-      if (k === i) item.setAttribute('aria-current', 'true');
-      else item.removeAttribute('aria-current');
-    });
-    const strip = this.root.querySelector('.frames');
-    const item = this.items[i];
-    if (strip && item) {
-      strip.scrollLeft = item.offsetLeft - (strip as HTMLElement).offsetLeft - strip.clientWidth / 2 + item.clientWidth / 2;
+  private shown(): void {
+    this.at = this.app.result;
+    this.strip.mark(this.at);
+    this.tell(this.at);
+  }
+
+  /** Scrubs: the shape at once, all that belongs to it when the choice is settled. */
+  private choose(i: number, settled: boolean): void {
+    if (settled) {
+      this.stop();
+      this.wanted = -1;
+      this.app.show(i);
+      return;
     }
-    this.slider.value = String(i);
-    this.label(i);
+    this.tell(i);
+    const busy = this.wanted >= 0;
+    this.wanted = i;
+    if (!busy) void this.scrub();
+  }
+
+  private async scrub(): Promise<void> {
+    while (this.wanted >= 0) {
+      const i = this.wanted;
+      const mesh = await this.film.get(i);
+      if (this.wanted < 0) return;
+      if (mesh) this.viewer.play(mesh);
+      if (this.wanted === i) this.wanted = -1;
+    }
+  }
+
+  private stop(): void {
+    this.playing = false;
+    this.play.textContent = '▶ Play';
+    this.rate.textContent = '';
   }
 
   private async toggle(): Promise<void> {
-    this.playing = !this.playing;
-    this.play.textContent = this.playing ? '▮▮ Pause' : '▶ Play';
-    if (!this.playing) {
+    if (this.playing) {
+      this.stop();
       this.app.show(this.at); // with all that belongs to it
       return;
     }
+    this.playing = true;
+    this.play.textContent = '▮▮ Pause';
     this.at = this.app.result;
-    const {results} = this.app.source.index;
+    await this.run();
+  }
+
+  private async run(): Promise<void> {
+    const count = this.app.source.index.results.length;
+    const moments: number[] = []; // when the last frames were drawn, ms
+    let due = performance.now();
     while (this.playing) {
-      const began = performance.now();
-      const next = (this.at + 1) % results.length;
-      const mesh = await this.meshOf(next);
-      const wait = 1000 / Number(this.speed.value) - (performance.now() - began);
-      await new Promise((done) => setTimeout(done, Math.max(0, wait)));
+      if (this.at + 1 >= count && !this.loop.checked) return void this.toggle();
+      const next = (this.at + 1) % count;
+      const mesh = await this.film.get(next, Array.from({length: 8}, (_, k) => (next + 1 + k) % count));
+      due = Math.max(due + 1000 / Number(this.speed.value), performance.now() - 200);
+      await new Promise((done) => setTimeout(done, Math.max(0, due - performance.now())));
       if (!this.playing) return;
       this.at = next;
       if (mesh) this.viewer.play(mesh);
-      this.slider.value = String(next);
-      this.label(next);
+      this.tell(next);
+      await new Promise((done) => requestAnimationFrame(done)); // the browser says how fast it can draw
+      moments.push(performance.now());
+      if (moments.length > 25) moments.shift();
+      if (moments.length > 1) this.rate.textContent = `${format((1000 * (moments.length - 1)) / (moments[moments.length - 1] - moments[0]), 2)} / s`;
       this.root.dataset.played = String(Number(this.root.dataset.played ?? 0) + 1);
     }
-  }
-
-  private async meshOf(i: number): Promise<Mesh | null> {
-    const known = this.meshes.get(i);
-    if (known) return known;
-    if (!this.app.source.has(i, 'mesh')) return null;
-    const mesh = await this.app.source.mesh(i, 'mesh', true).catch(() => null);
-    if (mesh) this.meshes.set(i, mesh);
-    const kept = 600;
-    if (this.meshes.size > kept) this.meshes.delete(this.meshes.keys().next().value!);
-    return mesh;
   }
 }

@@ -2,14 +2,16 @@
 import {Group, Vector3} from 'three';
 import type {App} from './app';
 import {
-  colorMesh, colorPoints, kColorModes, legendOf, scaleOf, type ColorMode, type Legend, type Ramps,
+  colorMesh, colorPoints, fittedRange, isScaled, kColorModes, legendOf, type ColorMode,
 } from './coloring';
 import type {Mesh, RigJson} from './data';
 import {clear, drawDevices, drawMarker, drawSegments, drawSheet} from './devices3d';
 import {Device, type Vec3} from './device';
-import {byId, choice, format, h} from './dom';
+import {signedDistances} from './difference';
+import {byId, choice, h} from './dom';
+import {LegendPanel} from './legend_panel';
 import {Measuring, type Measure} from './measuring';
-import {css, sequential, type Rgb} from './palette';
+import type {Rgb} from './palette';
 import {Picture3d} from './scene';
 
 type Surface = 'mesh' | 'measured' | 'none';
@@ -31,7 +33,9 @@ export class Viewer {
   private meshes: Record<'mesh' | 'measured', Mesh | null> = {mesh: null, measured: null};
   private readonly devices = new Group();
   private readonly picked = new Group();
-  private ramps: Ramps = {sigma: 1, distance: 1};
+  private playing: Mesh | null = null; // while a sequence plays or is scrubbed: what is in the picture
+  private reference: Mesh | null = null; // of the frame that this one is compared with
+  private readonly halves = [h('span', {class: 'half left'}), h('span', {class: 'half right'})];
   private shown = -1; // result in the picture
   private readonly colorSelect = h('select', {id: 'color-mode', onchange: () => {
     this.mode = this.colorSelect.value as ColorMode;
@@ -46,7 +50,7 @@ export class Viewer {
     onchange: () => this.drawSelection()});
   private readonly sheetLabel = h('label', {class: 'check', hidden: true, title:
     'The light of the selected line, as a plane from its projector'}, this.showSheet, 'Light plane');
-  private readonly legend = h('div', {class: 'legend', hidden: true});
+  private readonly legend = new LegendPanel(() => this.recolor());
   private readonly message = h('p', {class: 'overlay-message', hidden: true});
   private readonly measuring = new Measuring(() => ({
     position: this.app.points?.position ?? this.currentMesh()?.position ?? null,
@@ -76,6 +80,7 @@ export class Viewer {
     app.on('result', () => void this.load());
     app.on('points', () => this.pointsArrived());
     app.on('selection', () => this.drawSelection());
+    app.on('reference', () => void this.loadReference());
     app.on('theme', () => {
       this.recolor();
       this.drawDevices(); // their ink
@@ -96,7 +101,7 @@ export class Viewer {
         h('label', {class: 'tool-group'}, h('span', {class: 'tool-label'}, 'View'), this.viewSelect),
         h('button', {type: 'button', title: 'Save a screenshot of the 3-D picture', 'aria-label': 'Save a screenshot', onclick: () => void this.save()},
           'PNG')),
-      h('div', {class: 'canvas-holder', id: 'canvas-3d'}, this.message, this.legend,
+      h('div', {class: 'canvas-holder', id: 'canvas-3d'}, this.message, this.legend.element, ...this.halves,
         this.measuring.readout,
         h('div', {class: 'canvas-tools'}, this.toolChoice.element, this.measuring.patchLabel, this.sheetLabel)));
     try {
@@ -131,6 +136,7 @@ export class Viewer {
   private async load(): Promise<void> {
     const {app} = this;
     this.meshes = {mesh: null, measured: null};
+    this.playing = null;
     this.fillSelects();
     this.drawPoints();
     this.drawDevices();
@@ -169,14 +175,16 @@ export class Viewer {
       confidence: points !== null || mesh?.confidence !== undefined,
       hole: mesh?.hole !== undefined,
       distance: points?.distance !== undefined || mesh?.distance !== undefined,
+      difference: this.reference !== null,
     };
     this.colorSelect.replaceChildren(...kColorModes.map(({value, text}) =>
       h('option', {value, disabled: !available[value]}, text)));
+    if (!available[this.mode] && this.mode === 'difference') this.mode = 'shading';
     if (available[this.mode]) this.colorSelect.value = this.mode;
   }
 
   private currentMesh(): Mesh | null {
-    return this.surface === 'none' ? null : this.meshes[this.surface];
+    return this.playing ?? (this.surface === 'none' ? null : this.meshes[this.surface]);
   }
 
   private async drawSurface(): Promise<void> {
@@ -293,36 +301,19 @@ export class Viewer {
     const mesh = this.currentMesh();
     const {points} = app;
     const [clay, invented] = [rgbOf('--clay'), rgbOf('--invented')];
-    this.ramps = {
-      sigma: scaleOf(points?.sigma, points ? undefined : mesh?.sigma),
-      distance: scaleOf(points?.distance, mesh?.distance),
-    };
+    const closed = mesh ?? this.meshes.mesh;
+    if (mesh) this.compare(mesh);
+    if (isScaled(this.mode)) this.legend.fit(this.mode, fittedRange(this.mode, points, closed));
+    const {ranges} = this.legend;
     picture.setBackground(cssColor('--canvas'));
     picture.pointSize = 2 * Math.min(devicePixelRatio, 2);
-    if (mesh) picture.setColors('mesh', colorMesh(mesh, this.mode, this.ramps, clay, invented));
+    if (mesh) picture.setColors('mesh', colorMesh(mesh, this.mode, ranges, clay, invented));
+    this.drawReference();
     if (points && this.showPoints.checked) {
       picture.setColors('points',
-        colorPoints(points, mesh ?? this.meshes.mesh, this.mode, app.rig, this.ramps, rgbOf('--point')));
+        colorPoints(points, closed, this.mode, app.rig, ranges, rgbOf('--point')));
     }
-    this.drawLegend(legendOf(this.mode, app.rig, mesh, this.ramps, clay, invented));
-  }
-
-  private drawLegend(legend: Legend | null): void {
-    this.legend.hidden = legend === null;
-    if (!legend) return;
-    this.legend.replaceChildren(h('strong', {}, legend.title));
-    for (const {name, color} of legend.named ?? []) {
-      this.legend.append(h('span', {class: 'key'},
-        h('i', {style: `background:${css(color)}`}), name));
-    }
-    if (legend.range) {
-      const {low, high, unit} = legend.range;
-      const stops = [0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1].map((x) => css(sequential(x)));
-      this.legend.append(
-        h('span', {class: 'ramp', style: `background:linear-gradient(90deg,${stops.join(',')})`}),
-        h('span', {class: 'ramp-ends'}, h('span', {}, format(low)), h('span', {}, format((low + high) / 2)),
-          h('span', {}, `${unit === '' ? '' : '≥ '}${format(high)} ${unit}`)));
-    }
+    this.legend.show(legendOf(this.mode, app.rig, mesh, clay, invented));
   }
 
   private click(x: number, y: number): void {
@@ -387,12 +378,48 @@ export class Viewer {
     picture.render();
   }
 
-  /** One frame of a playing sequence. */
+  /** One frame of a playing sequence, in the colours of the scale that is shown. */
   play(mesh: Mesh): void {
     const {picture} = this;
     if (!picture) return;
+    if (!this.playing) { // what belongs to another frame
+      picture.setPoints(null);
+      clear(this.picked);
+    }
+    this.playing = mesh;
+    this.compare(mesh);
     picture.setMesh(mesh);
-    picture.setColors('mesh', colorMesh(mesh, this.mode, this.ramps, rgbOf('--clay'), rgbOf('--invented')));
+    picture.setColors('mesh', colorMesh(mesh, this.mode, this.legend.ranges, rgbOf('--clay'), rgbOf('--invented')));
+  }
+
+  /** Reads the frame that others are compared with. */
+  private async loadReference(): Promise<void> {
+    const {app} = this;
+    const wanted = app.reference;
+    this.reference = wanted && await app.source.mesh(wanted.result, 'mesh').catch(() => null);
+    if (app.reference !== wanted) return;
+    for (const mesh of [this.meshes.mesh, this.meshes.measured]) delete mesh?.difference;
+    if (wanted && !this.reference) this.say('The frame to compare with has no surface.');
+    if (wanted?.how === 'difference' && this.reference) this.mode = 'difference';
+    else if (this.mode === 'difference') this.mode = 'shading';
+    this.fillColorModes();
+    this.recolor();
+  }
+
+  private compare(mesh: Mesh): void {
+    if (this.mode === 'difference' && this.reference) mesh.difference ??= signedDistances(mesh, this.reference);
+  }
+
+  /** The other frame beside this one, in the same colours. */
+  private drawReference(): void {
+    const {picture, app, reference} = this;
+    const beside = app.reference?.how === 'beside' ? reference : null;
+    this.halves.forEach((half, k) => {
+      half.hidden = !beside;
+      half.textContent = k === 0 ? 'this frame' : app.source.index.results[app.reference?.result ?? 0]?.name ?? '';
+    });
+    if (!beside) return picture?.setOther(null);
+    picture?.setOther(beside, colorMesh(beside, this.mode, this.legend.ranges, rgbOf('--clay'), rgbOf('--invented')));
   }
 
   private async save(): Promise<void> {

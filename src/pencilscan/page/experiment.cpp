@@ -140,6 +140,7 @@ std::optional<ExperimentFolder> find_experiment(const fs::path& root) {
                 is_file(root / "table.md");
   for (const fs::path& file : files_in(root)) {
     const std::string ending = file.extension().string();
+    if (file.filename() == "sequence.csv") continue;  // of the frames beside it: their time line
     if (ending == ".csv" || ending == ".md") folder.tables.push_back(file);
     is_one = is_one || ending == ".csv";
   }

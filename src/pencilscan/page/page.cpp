@@ -9,6 +9,7 @@
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/io/file.h"
 #include "pencilscan/page/page_assets.h"
+#include "pencilscan/page/sequence_part.h"
 #include "pencilscan/view/color_family.h"
 
 namespace pencilscan {
@@ -288,6 +289,7 @@ ordered_json PageData::index(const std::string& mode, std::vector<ordered_json> 
   index["rigs"] = rig_jsons_;
   index["results"] = std::move(entries);
   index["experiment"] = experiment;
+  index["sequence"] = is_file(folder_.root / "sequence.json");
   index["failed"] = ordered_json::array();
   for (const fs::path& path : folder_.failed)
     index["failed"].push_back(fs::relative(path, folder_.root).string());
@@ -314,7 +316,9 @@ PageReport write_report(const fs::path& root, const fs::path& file, const PageOp
                      "below");
   }
   const auto experiment = data.experiment(experiment_detail(data, options.max_bytes));
-  const std::size_t taken = experiment ? embedded_bytes(*experiment) : 0;
+  const std::string sequence = sequence_part(root);
+  const std::size_t taken =
+      (experiment ? embedded_bytes(*experiment) : 0) + sequence.size() * 4 / 3;
   const std::vector<Collected> collected =
       collect_all(data, options.max_bytes - std::min(taken, options.max_bytes - kLeast), progress);
   const std::size_t count = collected.size();
@@ -340,16 +344,17 @@ PageReport write_report(const fs::path& root, const fs::path& file, const PageOp
       data.index("report", std::move(entries), experiment ? experiment->json : ordered_json()));
   write_atomically(file, [&](std::ostream& stream) {
     stream << assets.head;
+    const auto embed = [&](const std::string& name, const std::string& bytes) {
+      stream << "<script type=\"text/plain\" id=\"part/" << name << "\">" << base64(bytes)
+             << "</script>\n";
+    };
     for (std::size_t i = 0; i < count; ++i) {
-      for (const CollectedPart& part : collected[i].parts) {
-        stream << "<script type=\"text/plain\" id=\"part/" << i << "/" << part.name << "\">"
-               << base64(part.bytes) << "</script>\n";
-      }
+      for (const CollectedPart& part : collected[i].parts)
+        embed(std::to_string(i) + "/" + part.name, part.bytes);
     }
-    for (std::size_t i = 0; experiment && i < experiment->pictures.size(); ++i) {
-      stream << "<script type=\"text/plain\" id=\"part/experiment/" << i << "\">"
-             << base64(experiment->pictures[i]) << "</script>\n";
-    }
+    for (std::size_t i = 0; experiment && i < experiment->pictures.size(); ++i)
+      embed("experiment/" + std::to_string(i), experiment->pictures[i]);
+    if (!sequence.empty()) embed("sequence/0", sequence);
     stream << assets.middle << index << assets.tail;
   });
   report.bytes = fs::file_size(file);
@@ -366,6 +371,7 @@ std::string calibration_page(const ordered_json& calibration, const std::string&
                       {"rigs", none},
                       {"results", none},
                       {"experiment", nullptr},
+                      {"sequence", false},
                       {"failed", none},
                       {"calibrations", {{{"file", "calibration.json"}, {"report", calibration}}}}});
 }

@@ -151,7 +151,7 @@ std::optional<std::string> ResultReader::make_part(const std::string& name) {
         truth == nullptr ? std::vector<float>() : vertex_distances(*mesh, *truth);
     return mesh_block(*mesh, distances,
                       detail_.shape_only ? MeshPrecision::kCoarse : MeshPrecision::kFine)
-        .bytes();
+        .bytes(detail_.compression);
   }
   if (detail_.shape_only) return std::nullopt;
   if (name == "points") {

@@ -70,15 +70,19 @@ class Served : public ::testing::Test {
 
 TEST_F(Served, GivesThePageItsPartsAndTheFiles) {
   EXPECT_THAT(body("/"), HasSubstr("\"mode\":\"view\""));
-  for (const char* part : {"details", "mesh", "points", "curves", "image/0", "depth/1", "play"})
+  for (const char* part : {"details", "mesh", "points", "curves", "image/0", "depth/1", "play/5"})
     EXPECT_EQ(status(std::string("/part/0/") + part), 200) << part;
+  EXPECT_LT(body("/part/0/play/1").size(), body("/part/0/play/400").size());
+  write_json(root_ / "sequence.json", {{"format", "sequence/1"}});
+  EXPECT_EQ(status("/part/sequence/0"), 200);
   EXPECT_EQ(body("/files/000000/points.ply"), read_file(root_ / "000000" / "points.ply"));
   EXPECT_THAT(body("/list/0"), HasSubstr("000000/mesh.ply"));
 }
 
 TEST_F(Served, SaysWhatItDoesNotHave) {
-  for (const char* path : {"/part/1/mesh", "/part/99999999999999999999/mesh", "/part/0/image/7",
-                           "/part/0/nothing", "/files/none.ply", "/elsewhere"}) {
+  for (const char* path :
+       {"/part/1/mesh", "/part/99999999999999999999/mesh", "/part/0/image/7", "/part/sequence/0",
+        "/part/0/nothing", "/files/none.ply", "/elsewhere"}) {
     EXPECT_EQ(status(path), 404) << path;
   }
 }

@@ -1,12 +1,16 @@
 #include "pencilscan/server/view_server.h"
 
+#include <algorithm>
 #include <fstream>
 #include <list>
 #include <map>
 #include <mutex>
 #include <string>
+#include <string_view>
+#include <utility>
 
 #include "pencilscan/core/error.h"
+#include "pencilscan/page/sequence_part.h"
 #include "pencilscan/server/guarded_server.h"
 #include "pencilscan/server/served_files.h"
 
@@ -17,7 +21,8 @@ namespace fs = std::filesystem;
 
 constexpr int kRequestThreads = 8;
 constexpr std::size_t kOpenReaders = 4;
-constexpr std::size_t kPlayFaces = 20'000;  ///< of a mesh while a sequence plays
+constexpr std::size_t kThumbFaces = 20'000;  ///< of a mesh that is drawn as a small picture
+constexpr std::size_t kMostPlayFaces = 400'000;
 
 Detail full_detail(std::size_t results) {
   Detail detail;
@@ -33,18 +38,20 @@ class Readers {
  public:
   explicit Readers(const PageData& data) : data_(data) {}
 
-  std::shared_ptr<ResultReader> get(std::size_t result, bool playing) {
+  /// play_faces: of the shape alone, to be made fast; 0: of the whole result.
+  std::shared_ptr<ResultReader> get(std::size_t result, std::size_t play_faces) {
     const std::lock_guard lock(mutex_);
-    const std::size_t key = 2 * result + (playing ? 1 : 0);
+    const std::pair key(result, play_faces);
     for (auto it = open_.begin(); it != open_.end(); ++it) {
       if (it->first != key) continue;
       open_.splice(open_.begin(), open_, it);
       return open_.front().second;
     }
     Detail detail = full_detail(data_.size());
-    if (playing) {
+    if (play_faces > 0) {
       detail.shape_only = true;
-      detail.max_faces = kPlayFaces;
+      detail.max_faces = play_faces;
+      detail.compression = Block::kFast;
     }
     open_.emplace_front(key, data_.open(result, detail));
     if (open_.size() > kOpenReaders) open_.pop_back();
@@ -54,8 +61,16 @@ class Readers {
  private:
   const PageData& data_;
   std::mutex mutex_;
-  std::list<std::pair<std::size_t, std::shared_ptr<ResultReader>>> open_;
+  std::list<std::pair<std::pair<std::size_t, std::size_t>, std::shared_ptr<ResultReader>>> open_;
 };
+
+/// Of "play/100": 100,000; 0 for other parts.
+std::size_t play_faces(const std::string& part) {
+  static constexpr std::string_view kPrefix = "play/";
+  if (!part.starts_with(kPrefix) || part.size() > kPrefix.size() + 3) return 0;
+  const std::size_t thousands = std::stoul(part.substr(kPrefix.size()));
+  return std::clamp<std::size_t>(1000 * thousands, 1000, kMostPlayFaces);
+}
 
 std::string part_type(const std::string& name) {
   if (name == "thumb") return "image/jpeg";
@@ -106,9 +121,10 @@ void ViewServer::State::answer_part(const httplib::Request& request, httplib::Re
   const auto result = result_of(request);
   if (!result) return refuse(response, 404, "no such result");
   const std::string name = request.matches[2];
-  const bool playing = name == "play" || (name == "thumb" && data.size() > 1);
-  const auto reader = readers.get(*result, playing);
-  auto bytes = reader->part(name == "play" ? "mesh" : name);
+  const std::size_t playing = play_faces(name);
+  const bool small = name == "thumb" && data.size() > 1;
+  const auto reader = readers.get(*result, small ? kThumbFaces : playing);
+  auto bytes = reader->part(playing > 0 ? "mesh" : name);
   if (!bytes) {
     std::string why = "not in this result: " + name;
     for (const auto& missing : reader->missing()) {
@@ -166,6 +182,12 @@ void ViewServer::State::add_routes(GuardedServer& server) {
              [this](const auto& request, auto& response) { answer_part(request, response); });
   server.Get(root_path + R"(part/experiment/(\d+))",
              [this](const auto& request, auto& response) { answer_picture(request, response); });
+  server.Get(root_path + "part/sequence/0",
+             [this](const httplib::Request&, httplib::Response& response) {
+               const std::string bytes = sequence_part(root);
+               if (bytes.empty()) return refuse(response, 404, "this folder has no sequence.json");
+               response.set_content(bytes, "application/octet-stream");
+             });
   server.Get(root_path + R"(list/(\d+))",
              [this](const auto& request, auto& response) { answer_list(request, response); });
   server.Get(root_path + R"(files/(.+))",
