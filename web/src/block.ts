@@ -10,7 +10,7 @@ interface ArrayHeader {
 }
 
 export async function inflate(bytes: Uint8Array<ArrayBuffer>): Promise<Uint8Array<ArrayBuffer>> {
-  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream('deflate'));
+  const stream = new Response(bytes).body!.pipeThrough(new DecompressionStream('deflate'));
   return new Uint8Array(await new Response(stream).arrayBuffer());
 }
 
@@ -80,5 +80,22 @@ export class Block {
       values[i] = codes[i] === 65535 ? NaN : logarithmic ? Math.exp(x) : x;
     }
     return values;
+  }
+}
+
+/** The arrays of unpacked_mesh() in src/pencilscan/page/geometry_blocks.h, as they lie in `bytes`. */
+export class Unpacked {
+  private readonly header: {arrays: Record<string, {at: number; count: number}>};
+  private readonly begin: number;
+
+  constructor(private readonly bytes: Uint8Array<ArrayBuffer>) {
+    const length = new DataView(bytes.buffer).getUint32(0, true);
+    this.begin = 4 + length;
+    this.header = JSON.parse(new TextDecoder().decode(bytes.subarray(4, this.begin)));
+  }
+
+  array<T>(name: string, type: new (buffer: ArrayBuffer, at: number, count: number) => T): T | undefined {
+    const found = this.header.arrays[name];
+    return found && new type(this.bytes.buffer, this.begin + found.at, found.count);
   }
 }

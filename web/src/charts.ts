@@ -1,6 +1,7 @@
 // Histograms and bars as SVG, each with a text that says the same.
 import type {HistogramJson} from './data';
 import {format, h, svg} from './dom';
+import {significant} from './figure_text';
 
 export function histogramChart(
   title: string, data: HistogramJson, unit: string,
@@ -10,7 +11,7 @@ export function histogramChart(
   const most = Math.max(1, ...data.counts);
   const bin = width / data.counts.length;
   const y = (count: number) => (height - bottom - top) * (1 - count / most) + top;
-  const words = `${title}: median ${format(data.median)} ${unit}, 90 % below ${format(data.p90)} ${unit}` +
+  const words = `${title}: median ${significant(data.median)} ${unit}, 90 % below ${significant(data.p90)} ${unit}` +
     (data.above ? `, ${format(data.above)} of ${format(data.count)} above ${format(data.high)} ${unit}` : '');
   const picture = svg('svg', {viewBox: `0 0 ${width} ${height}`, role: 'img', 'aria-label': words});
   data.counts.forEach((count, i) => {
@@ -33,15 +34,16 @@ export function histogramChart(
       `${format(share * data.high, 2)}${share === 1 ? ` ${unit}` : ''}`));
   }
   return h('figure', {class: 'chart'}, h('figcaption', {}, h('strong', {}, title), ` ${
-    format(data.count)} values, median ${format(data.median)} ${unit}`), picture);
+    format(data.count)} values, median ${significant(data.median)} ${unit}`), picture);
 }
 
-/** Horizontal bars: [name, value, text]. */
-export function bars(title: string, rows: [string, number, string][], highest?: number): HTMLElement {
+/** Horizontal bars: [name, value, text]. about: what a name means. */
+export function bars(title: string, rows: [string, number, string][], highest?: number,
+    about: (name: string) => string | undefined = () => undefined): HTMLElement {
   const most = highest ?? Math.max(1e-12, ...rows.map(([, value]) => value));
   return h('figure', {class: 'chart'}, h('figcaption', {}, h('strong', {}, title)),
     h('div', {class: 'bars', role: 'list'}, ...rows.map(([name, value, text]) =>
-      h('div', {class: 'bar-row', role: 'listitem'}, h('span', {class: 'bar-name'}, name),
+      h('div', {class: 'bar-row', role: 'listitem'}, h('span', {class: 'bar-name', title: about(name)}, name),
         h('span', {class: 'bar-track'},
           h('span', {style: `width:${Math.max(0, Math.min(100, (100 * value) / most))}%`})),
         h('span', {class: 'bar-value'}, text)))));

@@ -81,8 +81,8 @@ export const isScaled = (mode: ColorMode): mode is Scaled =>
 export function fitted(lists: (Float32Array | undefined)[], symmetric = false): Range {
   const known = lists.filter((list): list is Float32Array => list !== undefined && list.length > 0);
   if (!known.length) return {low: 0, high: 1};
-  let low = Math.min(...known.map((list) => quantile(list, 0.02)));
-  let high = Math.max(...known.map((list) => quantile(list, 0.98)));
+  let low = Math.min(...known.map((list) => quantile(list, 0.05)));
+  let high = Math.max(...known.map((list) => quantile(list, 0.95)));
   if (symmetric) low = -(high = Math.max(Math.abs(low), Math.abs(high)));
   if (!(high > low)) [low, high] = [low - 0.05 * (Math.abs(low) || 1), high + 0.05 * (Math.abs(high) || 1)];
   const step = niceStep((high - low) / 20);

@@ -1,6 +1,6 @@
 // What the page shows, and where it comes from: parts embedded in the page (report) or asked from
 // the server (view). The names are those of src/pencilscan/page/result_reader.h.
-import {Block, inflateJson} from './block';
+import {Block, inflateJson, Unpacked} from './block';
 import type {DeviceJson} from './device';
 
 export interface PatternJson {
@@ -251,8 +251,8 @@ export class Source {
 
   /** thousands: of faces that will do while a sequence plays, where the source makes a difference. */
   async mesh(result: number, part: 'mesh' | 'measured', thousands = 0): Promise<Mesh> {
-    const name = thousands > 0 && this.index.mode === 'view' ? `play/${thousands}` : part;
-    const block = await this.block(result, name);
+    if (thousands > 0 && this.index.mode === 'view') return this.playingMesh(result, thousands);
+    const block = await this.block(result, part);
     const optional = (key: string) => (block.has(key) ? block.floats(key) : undefined);
     return {
       position: interleave(block.floats('x'), block.floats('y'), block.floats('z')),
@@ -263,6 +263,17 @@ export class Source {
       distance: optional('distance'),
       color: block.has('red')
         ? interleave(block.bytes('red'), block.bytes('green'), block.bytes('blue')) : undefined,
+    };
+  }
+
+  private async playingMesh(result: number, thousands: number): Promise<Mesh> {
+    const unpacked = new Unpacked(await this.bytes(result, `play/${thousands}`));
+    return {
+      position: unpacked.array('position', Float32Array)!,
+      index: unpacked.array('index', Uint32Array)!,
+      sigma: unpacked.array('sigma', Float32Array),
+      confidence: unpacked.array('confidence', Uint8Array),
+      hole: unpacked.array('hole', Uint8Array),
     };
   }
 

@@ -35,6 +35,7 @@ export const kFigures = {
   time_offset_us: {name: "From the frame's moment", text: (x: number) => `${significant(x)} µs`},
   warnings: {name: 'Warnings', text: count},
   sigma: {name: 'Sigma', text: length, hint: 'one standard deviation along the ray'},
+  sigma_median: {name: 'Sigma, median', text: length, hint: 'one standard deviation along the ray'},
   sigma_px: {name: 'Sigma in the image', text: pixels},
   confidence: {name: 'Confidence', text: significant},
   distance: {name: 'Distance to truth', text: length},

@@ -2,7 +2,10 @@
 import type {App} from './app';
 import {bars, histogramChart, table, tiles, type Tile} from './charts';
 import {dig, digList, digNumber, type Details, type Json} from './data';
-import {byId, format, h, percent} from './dom';
+import {byId, format, h} from './dom';
+import {figureText, kFigures, type FigureName, type FigureText} from './figure_text';
+import {kHoles} from './palette';
+import {kStageWords, wordList} from './words';
 
 const kReasons = ['no_crossing', 'ambiguous', 'contradicted', 'outside_volume'];
 const words = (key: string) => key.replace(/_/g, ' ');
@@ -73,26 +76,17 @@ export class Figures {
     const {summary} = this.app.source.index.results[this.app.result];
     const list: Tile[] = [];
     const unit = this.app.rig?.unit ?? 'mm';
-    const add = (name: string, value: number | undefined, text: (x: number) => string, hint?: string) => {
-      if (value !== undefined) list.push({name, value: text(value), hint});
+    const add = (key: FigureName, value: number | undefined, more?: string) => {
+      const {name, hint}: FigureText = kFigures[key];
+      if (value !== undefined) list.push({name, value: figureText(key, value, unit), hint: [hint, more].filter(Boolean).join('; ')});
     };
-    add('Measured points', digNumber(report, 'points') ?? summary.points ?? histograms?.confidence?.count,
-      (x) => format(x));
-    if (this.app.source.has(this.app.result, 'mesh')) {
-      add('Surface measured', digNumber(report, 'surface', 'measured_share'), percent,
-        'share of the closed surface that was measured');
-    }
-    const sigma = histograms?.sigma_mm;
-    if (sigma) add('Sigma, median', sigma.median, (x) => `${format(x)} ${unit}`, 'one standard deviation along the ray');
-    add('Lines disagree by', digNumber(report, 'crossing_disagreement', 'median_px'),
-      (x) => `${format(x)} px`, `median at crossings; noise explains ${
-        format(digNumber(report, 'crossing_disagreement', 'expected_px'))} px`);
-    add('Label error', digNumber(figures, 'label_error'), (x) => percent(x, 2), 'points with a wrong line');
-    add('Line recall', digNumber(figures, 'line_recall'), percent, 'true lines that were measured, spacing from 5 px');
-    add('Distance, median', digNumber(figures, 'distance_median_mm'), (x) => `${format(x)} ${unit}`, 'points to the truth');
-    add('Complete at 1 mm', digNumber(figures, 'completeness_1mm'), percent, 'of the measurable surface');
-    add('Time', digNumber(timing, 'seconds', 'total') ?? summary.seconds, (x) => `${format(x)} s`,
-      `${format(digNumber(timing, 'threads'))} threads`);
+    add('points', digNumber(report, 'points') ?? summary.points ?? histograms?.confidence?.count);
+    if (this.app.source.has(this.app.result, 'mesh')) add('measured_share', digNumber(report, 'surface', 'measured_share'));
+    add('sigma_median', histograms?.sigma_mm?.median);
+    add('crossing_px', digNumber(report, 'crossing_disagreement', 'median_px'),
+      `noise explains ${figureText('crossing_expected_px', digNumber(report, 'crossing_disagreement', 'expected_px'))}`);
+    for (const key of ['label_error', 'line_recall', 'distance_median_mm', 'completeness_1mm'] as const) add(key, digNumber(figures, key));
+    add('total', digNumber(timing, 'seconds', 'total') ?? summary.seconds, `${format(digNumber(timing, 'threads'))} threads`);
     return tiles(list);
   }
 
@@ -113,15 +107,15 @@ export class Figures {
     if (seconds && typeof seconds === 'object' && !Array.isArray(seconds)) {
       const rows = inOrder(Object.entries(seconds), kStages)
         .filter(([key, value]) => key !== 'total' && typeof value === 'number')
-        .map(([key, value]) => [words(key), value as number, `${format(value as number, 2)} s`] as [string, number, string]);
-      if (rows.length) grid.append(bars('Time per stage', rows));
+        .map(([key, value]) => [words(key), value as number, figureText('total', value as number)] as [string, number, string]);
+      if (rows.length) grid.append(bars('Time per stage', rows, undefined, (name) => kStageWords[name]));
     }
     const recall = (key: string, title: string) => {
       const group = dig(figures, key);
       if (!group || typeof group !== 'object' || Array.isArray(group)) return;
       const rows = inOrder(Object.entries(group), kBands).flatMap(([name, entry]) => {
         const value = digNumber(entry, 'line_recall');
-        return value === undefined ? [] : [[spacing(name), value, percent(value)] as [string, number, string]];
+        return value === undefined ? [] : [[spacing(name), value, figureText('line_recall', value)] as [string, number, string]];
       });
       if (rows.length) grid.append(bars(title, rows, 1));
     };
@@ -133,7 +127,8 @@ export class Figures {
       const total = entries.reduce((sum, [, v]) => sum + v, 0);
       if (total > 0) {
         grid.append(bars('Surface by what is known of it',
-          entries.filter(([, v]) => v > 0).sort(([, a], [, b]) => b - a).map(([key, v]) => [words(key), v / total, percent(v / total)]), 1));
+          entries.filter(([, v]) => v > 0).sort(([, a], [, b]) => b - a).map(([key, v]) => [words(key), v / total, figureText('measured_share', v / total)]), 1,
+          (name) => kHoles.find((hole) => hole.name === name)?.about));
       }
     }
     return grid;
@@ -145,15 +140,15 @@ export class Figures {
     const cameras = digList(report, 'cameras');
     if (cameras.length) {
       result.push(table(
-        ['Camera', 'Curves', 'Curve points', 'Labelled', ...kReasons.map(words), 'Crossings', 'Sigma px', 'Saturated px'],
+        ['Camera', 'Curves', 'Curve points', 'Labelled', ...kReasons.map(words), 'Crossings', kFigures.sigma_px.name, kFigures.saturated_pixels.name],
         cameras.map((camera) => {
           const n = (...path: string[]) => digNumber(camera, ...path);
           const points = n('curve_points');
           const labelled = n('labelled_curve_points');
           return [text(dig(camera, 'name')), format(n('curves')), format(points),
-            points ? percent((labelled ?? 0) / points) : '–',
+            figureText('labelled_share', points ? (labelled ?? 0) / points : undefined),
             ...kReasons.map((key) => format(n('undecided_points', key))),
-            format(n('crossings')), format(n('curve_sigma_median_px')), format(n('saturated_pixels'))];
+            format(n('crossings')), figureText('sigma_px', n('curve_sigma_median_px')), figureText('saturated_pixels', n('saturated_pixels'))];
         }), 'What each camera saw; undecided curve points by reason'));
     }
     const perProjector = dig(report, 'points_by_projector');
@@ -162,11 +157,11 @@ export class Figures {
         const judged = dig(figures, 'by_projector', name);
         const error = digNumber(judged, 'label_error');
         const recall = digNumber(judged, 'line_recall');
-        return [name, format(typeof value === 'number' ? value : undefined), percent(error, 2), percent(recall)];
+        return [name, figureText('points', typeof value === 'number' ? value : undefined), figureText('label_error', error), figureText('line_recall', recall)];
       });
       result.push(table(['Projector', 'Points', 'Label error', 'Line recall'], rows, 'What each projector gave'));
     }
-    result.push(this.comparison());
+    result.push(this.comparison(), wordList());
     const raw = {report, timing: details.timing, figures};
     result.push(h('details', {class: 'raw'}, h('summary', {}, 'All numbers (JSON)'),
       h('pre', {tabindex: 0}, JSON.stringify(raw, null, 1))));
@@ -178,16 +173,13 @@ export class Figures {
     const {results} = this.app.source.index;
     const runs = new Set(results.map((r) => r.run));
     if (runs.size < 2) return h('div');
-    const keys: [string, string, (x: number) => string][] = [
-      ['points', 'Points', (x) => format(x)], ['measured_share', 'Measured', percent],
-      ['label_error', 'Label error', (x) => percent(x, 2)], ['line_recall', 'Line recall', percent],
-      ['line_recall_3_5px', 'Recall 3–5 px', percent],
-      ['distance_median_mm', 'Distance mm', (x) => format(x)], ['completeness_1mm', 'Complete 1 mm', percent],
-      ['total', 'Seconds', (x) => format(x)]];
-    const shown = keys.filter(([key]) => results.some((r) => r.summary[key] !== undefined));
-    return table(['Run', ...shown.map(([, name]) => name)],
+    const keys: FigureName[] = ['points', 'measured_share', 'label_error', 'line_recall', 'line_recall_3_5px',
+      'distance_median_mm', 'completeness_1mm', 'total'];
+    const shown = keys.filter((key) => results.some((r) => r.summary[key] !== undefined));
+    const unit = this.app.rig?.unit ?? 'mm';
+    return table(['Run', ...shown.map((key) => kFigures[key].name)],
       results.slice(0, 60).map((r) => [[r.run, r.name].filter(Boolean).join(' / '),
-        ...shown.map(([key, , show]) => r.summary[key] === undefined ? '–' : show(r.summary[key]))]),
+        ...shown.map((key) => figureText(key, r.summary[key], unit))]),
       'All runs beside each other');
   }
 

@@ -190,8 +190,8 @@ export class Images {
   private drawLegend(): void {
     const children: HTMLElement[] = [];
     const keys = (title: string, named: Named[]) => {
-      children.push(h('strong', {}, title), ...named.map(({name, color}) =>
-        h('span', {class: 'key'}, h('i', {style: `background:${css(color)}`}), name)));
+      children.push(h('strong', {}, title), ...named.map(({name, color, about}) =>
+        h('span', {class: 'key', title: about}, h('i', {style: `background:${css(color)}`}), name)));
     };
     const curves = this.paths.length ? layerLegend(this.app, this.layer) : null;
     if (curves) keys(curves.title, curves.named);

@@ -1,7 +1,8 @@
 // What is known of the selected point, in words, and how every camera sees it.
 import type {App} from './app';
-import {byId, format, h} from './dom';
-import {css, kStateWords, lightColor} from './palette';
+import {byId, h} from './dom';
+import {figureText} from './figure_text';
+import {css, kStates, lightColor} from './palette';
 
 const kCrop = 44; // image px shown around the point
 const kSide = 88; // CSS px of a crop
@@ -63,9 +64,9 @@ export class Inspector {
     } else fact(app.source.index.results[app.result]?.scan ? 'Panel column or row' : 'Line', String(line));
     const [x, y, z] = app.position(i);
     fact('3-D point', `${x.toFixed(2)}, ${y.toFixed(2)}, ${z.toFixed(2)} ${unit}`);
-    fact('Sigma', `${format(points.sigma[i])} ${unit}`);
-    fact('Confidence', (points.confidence[i] / 255).toFixed(3));
-    if (points.distance) fact('Distance to truth', `${format(points.distance[i])} ${unit}`);
+    fact('Sigma', figureText('sigma', points.sigma[i], unit));
+    fact('Confidence', figureText('confidence', points.confidence[i] / 255));
+    if (points.distance) fact('Distance to truth', figureText('distance', points.distance[i], unit));
     fact('Vertex', `${i * points.stride} of points.ply`);
   }
 
@@ -73,7 +74,8 @@ export class Inspector {
     const {app} = this;
     const curves = app.curves!;
     const i = app.selection!.sample;
-    if (alone) fact('State', kStateWords[curves.state[i]] ?? 'undecided');
+    const {name, about} = kStates[curves.state[i]] ?? kStates[5];
+    if (alone) fact('State', `${name}: ${about}`);
     const colors = app.rig?.families[curves.family[i]] ?? [];
     const color = colors[curves.color[i]];
     if (colors.length > 1) {
@@ -82,7 +84,7 @@ export class Inspector {
         ` ${color}, ${lead >= 25.5 ? '> 25' : lead.toFixed(1)} nats over ${
           colors.length === 2 ? colors[1 - curves.color[i]] : 'the next'}`);
     } else fact('Code evidence', 'lines without a code');
-    fact('Curve', `${curves.curve[i]}, sigma ${(curves.sigma_px[i] / 500).toFixed(3)} px across`);
+    fact('Curve', `${curves.curve[i]}, sigma ${figureText('sigma_px', curves.sigma_px[i] / 500)} across`);
   }
 
   /** The surroundings of the point in every camera that looks there. */

@@ -20,8 +20,8 @@ export class LegendPanel {
     this.element.hidden = legend === null;
     if (!legend || this.element.contains(document.activeElement)) return; // somebody is typing
     this.element.replaceChildren(h('strong', {}, legend.title));
-    for (const {name, color} of legend.named ?? []) {
-      this.element.append(h('span', {class: 'key'}, h('i', {style: `background:${css(color)}`}), name));
+    for (const {name, color, about} of legend.named ?? []) {
+      this.element.append(h('span', {class: 'key', title: about}, h('i', {style: `background:${css(color)}`}), name));
     }
     if (legend.scale) this.element.append(...this.scale(legend.scale, legend.unit ?? ''));
   }

@@ -1,8 +1,9 @@
 import {App} from './app';
 import {showCalibrations} from './calibration';
 import {Source} from './data';
-import {byId, format, h, percent} from './dom';
+import {byId, h} from './dom';
 import {showExperiment} from './experiment';
+import {figureText} from './figure_text';
 import {Figures} from './figures';
 import {Images} from './images';
 import {Inspector} from './inspector';
@@ -35,8 +36,8 @@ function header(app: App): void {
     const texts = [
       index.results.length > 1 ? `${index.results.length} results` : null,
       found ? [found.run, found.name].filter(Boolean).join(' / ') : null,
-      found?.summary.points !== undefined ? `${format(found.summary.points)} points` : null,
-      found?.summary.measured_share !== undefined ? `${percent(found.summary.measured_share, 0)} measured` : null,
+      found?.summary.points !== undefined ? `${figureText('points', found.summary.points)} points` : null,
+      found?.summary.measured_share !== undefined ? `${figureText('measured_share', found.summary.measured_share)} measured` : null,
     ];
     chips.replaceChildren(...texts.filter(Boolean).map((text) => h('span', {class: 'chip'}, text)));
   };

@@ -2,7 +2,8 @@
 import {Group, Vector3} from 'three';
 import {clear, drawMarker, drawSegments} from './devices3d';
 import type {Vec3} from './device';
-import {format, h} from './dom';
+import {h} from './dom';
+import {significant} from './figure_text';
 import {angleBetween, fitPlane, type Plane} from './plane_fit';
 
 export type Measure = 'distance' | 'angle';
@@ -92,7 +93,7 @@ export class Measuring {
     const {marks} = this;
     const {unit, eye} = this.ask();
     if (marks.some((m) => !m.plane)) return 'Too few points there: take a larger patch.';
-    const fits = marks.map((m) => `${m.plane!.count} points, rms ${format(m.plane!.rms)} ${unit}`);
+    const fits = marks.map((m) => `${m.plane!.count} points, rms ${significant(m.plane!.rms)} ${unit}`);
     if (marks.length < 2) return marks.length ? `First plane: ${fits[0]}. Click the second one.` :
       'Click two flat places; planes are fitted to the points around them.';
     const angle = angleBetween(marks[0].plane!, marks[1].plane!, eye);

@@ -39,38 +39,30 @@ export const css = ([r, g, b]: Rgb, alpha = 1): string => `rgba(${r},${g},${b},$
 export interface Named {
   name: string;
   color: Rgb;
+  about?: string; // what the name means
 }
 
 /** Indices are those of `hole` in mesh.ply (docs/formats.md). */
 export const kHoles: Named[] = [
   {name: 'background', color: [24, 24, 28]},
-  {name: 'measured', color: [225, 225, 225]},
-  {name: 'no projector', color: [70, 70, 160]},
-  {name: 'one projector', color: [60, 160, 230]},
-  {name: 'too compressed', color: [240, 180, 40]},
-  {name: 'ambiguous', color: [170, 80, 200]},
-  {name: 'contradicted', color: [220, 50, 50]},
-  {name: 'saturated', color: [255, 255, 90]},
-  {name: 'not seen', color: [90, 90, 90]},
+  {name: 'measured', about: 'some camera and projector fixed its depth', color: [225, 225, 225]},
+  {name: 'no projector', about: 'in shadow of all projectors, or turned away from them', color: [70, 70, 160]},
+  {name: 'one projector', about: 'lit by one projector only, whose lines did not fix the depth', color: [60, 160, 230]},
+  {name: 'too compressed', about: 'lines lie closer together than the camera resolves, or the view is grazing', color: [240, 180, 40]},
+  {name: 'ambiguous', about: 'several projectors light it, and yet no depth was accepted', color: [170, 80, 200]},
+  {name: 'contradicted', about: 'a depth was found, and other views prove it wrong', color: [220, 50, 50]},
+  {name: 'saturated', about: 'too bright for the camera there', color: [255, 255, 90]},
+  {name: 'not seen', about: 'not seen by any camera', color: [90, 90, 90]},
 ];
 
 /** Indices are those of `state` in curves.ply. */
 export const kStates: Named[] = [
-  {name: 'labelled', color: [90, 110, 130]},
-  {name: 'no crossing', color: [247, 231, 51]},
-  {name: 'ambiguous', color: [200, 110, 240]},
-  {name: 'contradicted', color: [255, 70, 70]},
-  {name: 'outside volume', color: [60, 170, 255]},
-  {name: 'undecided', color: [255, 159, 28]},
-];
-
-export const kStateWords: string[] = [
-  'labelled',
-  'undecided: nothing crosses it, and its surroundings do not decide',
-  'undecided: several lines fit',
-  'undecided: no line fits its crossings',
-  'undecided: no line meets its rays in the volume',
-  'undecided',
+  {name: 'labelled', about: 'projector, pattern and line are known', color: [90, 110, 130]},
+  {name: 'no crossing', about: 'nothing crosses the curve, and its surroundings do not decide', color: [247, 231, 51]},
+  {name: 'ambiguous', about: 'several lines fit the curve', color: [200, 110, 240]},
+  {name: 'contradicted', about: 'no line fits the crossings of the curve', color: [255, 70, 70]},
+  {name: 'outside volume', about: 'no line meets the rays of the curve within the volume', color: [60, 170, 255]},
+  {name: 'undecided', about: 'no line was decided on', color: [255, 159, 28]},
 ];
 
 const kLightColors: Record<string, Rgb> = {

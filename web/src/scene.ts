@@ -1,7 +1,7 @@
 // The 3-D picture: mesh, points and helpers, drawn when something changed.
 import {
-  AmbientLight, BufferAttribute, BufferGeometry, Color, DirectionalLight, DoubleSide, Group,
-  HemisphereLight, Mesh as ThreeMesh, MeshLambertMaterial, PerspectiveCamera, Points as ThreePoints,
+  AmbientLight, BufferAttribute, BufferGeometry, Color, DirectionalLight, DoubleSide, FrontSide, Group,
+  HemisphereLight, Mesh as ThreeMesh, MeshLambertMaterial, PerspectiveCamera, type Plane, Points as ThreePoints,
   PointsMaterial, Raycaster, Scene, Sphere, Vector2, Vector3, WebGLRenderer,
 } from 'three';
 import {OrbitControls} from 'three/examples/jsm/controls/OrbitControls.js';
@@ -64,6 +64,7 @@ export class Picture3d {
   private pending = false;
   private shapeDrawn = false;
   private drawn = false; // once at least
+  private cut: Plane | null = null;
   beforeRender: (() => void) | null = null;
 
   constructor(private readonly container: HTMLElement) {
@@ -104,8 +105,10 @@ export class Picture3d {
     this.render();
   }
 
-  setMesh(geometry: Triangles | null): void {
+  /** closed: seen from outside only, so that half of its faces need no colour. */
+  setMesh(geometry: Triangles | null, closed = false): void {
     fill(this.mesh, geometry);
+    this.mesh.material.side = closed && !this.cut ? FrontSide : DoubleSide;
     this.render();
   }
 
@@ -139,14 +142,6 @@ export class Picture3d {
   set pointSize(size: number) {
     this.points.material.size = size;
     this.render();
-  }
-
-  get pointsVisible(): boolean {
-    return this.points.visible;
-  }
-
-  get meshVisible(): boolean {
-    return this.mesh.visible;
   }
 
   /** What is up in the free view, and from where fit() looks when it is not told. */
@@ -255,6 +250,7 @@ export class Picture3d {
   private draw(): void {
     this.pending = false;
     this.drawn = true;
+    this.camera.updateMatrixWorld();
     this.beforeRender?.();
     if (this.beside) this.drawBeside();
     else this.renderer.render(this.scene, this.camera);
@@ -262,6 +258,22 @@ export class Picture3d {
       this.shapeDrawn = true;
       performance.mark('shape-drawn'); // for web/benchmark.mjs
     }
+  }
+
+  /** Hides what of meshes and points lies behind a plane. */
+  setCut(plane: Plane | null): void {
+    this.cut = plane;
+    this.renderer.localClippingEnabled = true; // devices and markers stay whole
+    this.mesh.material.clippingPlanes = this.points.material.clippingPlanes = plane ? [plane] : [];
+    this.render();
+  }
+
+  /** CSS pixels of one unit of length, in the middle of what is looked at. */
+  pixelsPerUnit(): number {
+    const {height} = this.size();
+    const away = this.controls.target.clone().sub(this.camera.position)
+      .dot(this.camera.getWorldDirection(new Vector3()));
+    return height / (2 * away * Math.tan((this.camera.fov / 2) * (Math.PI / 180)));
   }
 
   /** The mesh and all that belongs to it on the left, the other one on the right. */
@@ -324,14 +336,22 @@ export class Picture3d {
     return new Vector2((2 * x) / width - 1, 1 - (2 * y) / height);
   }
 
-  /** Where the ray through a canvas position meets the mesh. */
-  meshHit(x: number, y: number): Vector3 | null {
-    const right = this.beside && x >= this.size().width;
-    const mesh = right ? this.other : this.mesh;
+  /** Where the ray through a canvas position meets a mesh, and the nearest corner of the face there.
+   * beside: of the mesh in the right half. */
+  meshHit(x: number, y: number): {point: Vector3; vertex: number; beside: boolean} | null {
+    const beside = this.beside && x >= this.size().width;
+    const mesh = beside ? this.other : this.mesh;
     if (!mesh.visible) return null;
     const caster = new Raycaster();
-    caster.setFromCamera(this.normalized(right ? x - this.size().width : x, y), this.camera);
-    return caster.intersectObject(mesh, false)[0]?.point ?? null;
+    caster.setFromCamera(this.normalized(beside ? x - this.size().width : x, y), this.camera);
+    const hit = caster.intersectObject(mesh, false)
+      .find(({point}) => !this.cut || this.cut.distanceToPoint(point) >= 0);
+    if (!hit?.face) return null;
+    const place = mesh.geometry.getAttribute('position');
+    const away = (vertex: number) => new Vector3().fromBufferAttribute(place, vertex).distanceTo(hit.point);
+    const {a, b, c} = hit.face;
+    const vertex = [b, c].reduce((best, v) => (away(v) < away(best) ? v : best), a);
+    return {point: hit.point, vertex, beside};
   }
 
   /** Index of the frontmost of `position`s within `reach` CSS pixels of a canvas position. */

@@ -5,14 +5,17 @@ import {
   colorMesh, colorPoints, fittedRange, isScaled, kColorModes, legendOf, type ColorMode,
 } from './coloring';
 import type {Mesh, RigJson} from './data';
-import {clear, drawDevices, drawMarker, drawSegments, drawSheet} from './devices3d';
+import {clear, drawDevices} from './devices3d';
 import {Device, type Vec3} from './device';
-import {signedDistances} from './difference';
 import {byId, choice, h} from './dom';
+import {Hovering} from './hovering';
 import {LegendPanel} from './legend_panel';
 import {Measuring, type Measure} from './measuring';
 import type {Rgb} from './palette';
+import {ReferenceView} from './reference_view';
 import {Picture3d} from './scene';
+import {drawSelection} from './selection3d';
+import {boxOf, SpaceAids} from './space_aids';
 
 type Surface = 'mesh' | 'measured' | 'none';
 type Tool = 'select' | Measure;
@@ -34,8 +37,7 @@ export class Viewer {
   private readonly devices = new Group();
   private readonly picked = new Group();
   private playing: Mesh | null = null; // while a sequence plays or is scrubbed: what is in the picture
-  private reference: Mesh | null = null; // of the frame that this one is compared with
-  private readonly halves = [h('span', {class: 'half left'}), h('span', {class: 'half right'})];
+  private readonly reference: ReferenceView;
   private shown = -1; // result in the picture
   private readonly colorSelect = h('select', {id: 'color-mode', onchange: () => {
     this.mode = this.colorSelect.value as ColorMode;
@@ -46,6 +48,7 @@ export class Viewer {
     onchange: () => this.drawPoints()});
   private readonly showDevices = h('input', {type: 'checkbox', id: 'show-devices', checked: true,
     onchange: () => this.drawDevices()});
+  private readonly aids = new SpaceAids(h('label', {class: 'check'}, this.showDevices, 'Devices'));
   private readonly showSheet = h('input', {type: 'checkbox', id: 'show-sheet', checked: true,
     onchange: () => this.drawSelection()});
   private readonly sheetLabel = h('label', {class: 'check', hidden: true, title:
@@ -76,11 +79,12 @@ export class Viewer {
   });
 
   constructor(private readonly app: App) {
+    this.reference = new ReferenceView(app);
     this.build();
     app.on('result', () => void this.load());
     app.on('points', () => this.pointsArrived());
     app.on('selection', () => this.drawSelection());
-    app.on('reference', () => void this.loadReference());
+    app.on('reference', () => void this.referenceChosen());
     app.on('theme', () => {
       this.recolor();
       this.drawDevices(); // their ink
@@ -96,12 +100,12 @@ export class Viewer {
         h('span', {class: 'tool-group'}, h('span', {class: 'tool-label'}, 'Surface'),
           this.surfaceChoice.element),
         check(this.showPoints, 'Points'),
-        check(this.showDevices, 'Devices'),
         h('label', {class: 'tool-group'}, h('span', {class: 'tool-label'}, 'Colour'), this.colorSelect),
         h('label', {class: 'tool-group'}, h('span', {class: 'tool-label'}, 'View'), this.viewSelect),
+        this.aids.menu,
         h('button', {type: 'button', title: 'Save a screenshot of the 3-D picture', 'aria-label': 'Save a screenshot', onclick: () => void this.save()},
           'PNG')),
-      h('div', {class: 'canvas-holder', id: 'canvas-3d'}, this.message, this.legend.element, ...this.halves,
+      h('div', {class: 'canvas-holder', id: 'canvas-3d'}, this.message, this.legend.element, ...this.reference.halves, this.aids.overlay,
         this.measuring.readout,
         h('div', {class: 'canvas-tools'}, this.toolChoice.element, this.measuring.patchLabel, this.sheetLabel)));
     try {
@@ -115,6 +119,10 @@ export class Viewer {
     canvas.setAttribute('aria-label',
       '3-D view. Arrow keys turn it, plus and minus zoom, 0 shows everything.');
     helpers.add(this.devices, this.picked, this.measuring.group);
+    this.aids.attach(this.picture);
+    const hovering = new Hovering(this.app, this.picture, () =>
+      ({mode: this.mode, mesh: this.currentMesh(), points: this.pointsShown}));
+    byId('canvas-3d').append(hovering.element);
     let down: {x: number; y: number} | null = null;
     canvas.addEventListener('pointerdown', (e) => (down = {x: e.offsetX, y: e.offsetY}));
     canvas.addEventListener('pointerup', (e) => {
@@ -175,7 +183,7 @@ export class Viewer {
       confidence: points !== null || mesh?.confidence !== undefined,
       hole: mesh?.hole !== undefined,
       distance: points?.distance !== undefined || mesh?.distance !== undefined,
-      difference: this.reference !== null,
+      difference: this.reference.mesh !== null,
     };
     this.colorSelect.replaceChildren(...kColorModes.map(({value, text}) =>
       h('option', {value, disabled: !available[value]}, text)));
@@ -215,12 +223,7 @@ export class Viewer {
   private frame(position: Float32Array): void {
     const {picture} = this;
     if (!picture || position.length === 0) return;
-    const low = [Infinity, Infinity, Infinity];
-    const high = [-Infinity, -Infinity, -Infinity];
-    for (let i = 0; i < position.length; ++i) {
-      low[i % 3] = Math.min(low[i % 3], position[i]);
-      high[i % 3] = Math.max(high[i % 3], position[i]);
-    }
+    const {low, high} = boxOf(position);
     const center = low.map((x, k) => (x + high[k]) / 2) as Vec3;
     picture.setBounds(center, Math.max(1e-6, Math.hypot(...low.map((x, k) => high[k] - x)) / 2));
     if (this.shown < 0) this.lookFrom();
@@ -260,10 +263,16 @@ export class Viewer {
     if (this.shown !== this.app.result && this.app.points) this.frame(this.app.points.position);
   }
 
+  /** Reasons of holes are those of the surface: points, which have none, would cover them. */
+  private get pointsShown(): boolean {
+    return this.showPoints.checked && this.app.points !== null && !this.playing &&
+      !(this.mode === 'hole' && this.currentMesh() !== null);
+  }
+
   private drawPoints(): void {
     const {picture, app} = this;
     if (!picture) return;
-    picture.setPoints(this.showPoints.checked && app.points ? app.points.position : null);
+    picture.setPoints(this.pointsShown ? app.points!.position : null);
     this.recolor();
   }
 
@@ -282,17 +291,13 @@ export class Viewer {
     const ofPoints = ['camera', 'projector', 'line'].includes(this.mode) ||
       (this.mode === 'sigma' && !mesh?.sigma) || (this.mode === 'confidence' && !mesh?.confidence) ||
       (this.mode === 'distance' && !mesh?.distance);
-    const ofMesh = this.mode === 'hole';
-    if (ofPoints && !this.showPoints.checked) {
-      this.showPoints.checked = true;
-      this.drawPoints();
-    }
-    if (ofMesh && this.surface !== 'mesh') {
+    if (ofPoints) this.showPoints.checked = true;
+    if (this.mode === 'hole' && this.surface !== 'mesh') {
       this.surface = 'mesh';
       this.surfaceChoice.set('mesh');
       void this.drawSurface();
     }
-    this.recolor();
+    this.drawPoints();
   }
 
   private recolor(): void {
@@ -302,14 +307,15 @@ export class Viewer {
     const {points} = app;
     const [clay, invented] = [rgbOf('--clay'), rgbOf('--invented')];
     const closed = mesh ?? this.meshes.mesh;
-    if (mesh) this.compare(mesh);
+    if (mesh) this.reference.compare(mesh);
+    this.aids.show(mesh?.position ?? (this.pointsShown ? points!.position : null), app.rig?.unit ?? 'mm');
     if (isScaled(this.mode)) this.legend.fit(this.mode, fittedRange(this.mode, points, closed));
     const {ranges} = this.legend;
     picture.setBackground(cssColor('--canvas'));
     picture.pointSize = 2 * Math.min(devicePixelRatio, 2);
     if (mesh) picture.setColors('mesh', colorMesh(mesh, this.mode, ranges, clay, invented));
-    this.drawReference();
-    if (points && this.showPoints.checked) {
+    this.reference.draw(picture, (other) => colorMesh(other, this.mode, ranges, clay, invented));
+    if (points && this.pointsShown) {
       picture.setColors('points',
         colorPoints(points, closed, this.mode, app.rig, ranges, rgbOf('--point')));
     }
@@ -319,7 +325,7 @@ export class Viewer {
   private click(x: number, y: number): void {
     const {picture, app} = this;
     if (!picture) return;
-    const hit = picture.meshHit(x, y);
+    const hit = picture.meshHit(x, y)?.point;
     const {points} = app;
     if (this.tool !== 'select') {
       const i = !hit && points ? picture.pointHit(points.position, x, y, 12) : -1;
@@ -352,29 +358,9 @@ export class Viewer {
     const {picture, app} = this;
     if (!picture) return;
     clear(this.picked);
-    const {selection, points, rig} = app;
+    const {selection} = app;
     this.sheetLabel.hidden = !selection || selection.point < 0 || !app.patternOf(selection.point);
-    if (selection && selection.point >= 0 && points) {
-      const at = app.position(selection.point);
-      const marker = drawMarker('#ff3d6e');
-      marker.position.set(...at);
-      this.picked.add(marker);
-      const camera = app.cameras[selection.camera];
-      if (camera) this.picked.add(drawSegments([...camera.center, ...at], 0xff3d6e));
-      if (rig && this.showSheet.checked && app.patternOf(selection.point)) {
-        this.picked.add(drawSheet(rig, points.projector[selection.point],
-          points.pattern[selection.point], points.line[selection.point]));
-      }
-    } else if (selection && rig) {
-      const camera = app.cameras[selection.camera];
-      if (camera) {
-        const d = camera.direction(selection.u, selection.v);
-        const reach = Math.hypot(...camera.center.map((x, k) => x - rig.volume.center[k])) +
-          rig.volume.radius;
-        this.picked.add(drawSegments(
-          [...camera.center, ...camera.center.map((x, k) => x + reach * d[k])], 0xff3d6e));
-      }
-    }
+    drawSelection(app, this.picked, this.showSheet.checked);
     picture.render();
   }
 
@@ -382,44 +368,24 @@ export class Viewer {
   play(mesh: Mesh): void {
     const {picture} = this;
     if (!picture) return;
-    if (!this.playing) { // what belongs to another frame
+    const begins = !this.playing;
+    this.playing = mesh;
+    if (begins) { // what belongs to another frame
       picture.setPoints(null);
       clear(this.picked);
     }
-    this.playing = mesh;
-    this.compare(mesh);
-    picture.setMesh(mesh);
+    this.reference.compare(mesh);
+    picture.setMesh(mesh, true);
     picture.setColors('mesh', colorMesh(mesh, this.mode, this.legend.ranges, rgbOf('--clay'), rgbOf('--invented')));
   }
 
-  /** Reads the frame that others are compared with. */
-  private async loadReference(): Promise<void> {
-    const {app} = this;
-    const wanted = app.reference;
-    this.reference = wanted && await app.source.mesh(wanted.result, 'mesh').catch(() => null);
-    if (app.reference !== wanted) return;
+  private async referenceChosen(): Promise<void> {
+    if (!(await this.reference.read())) return;
     for (const mesh of [this.meshes.mesh, this.meshes.measured]) delete mesh?.difference;
-    if (wanted && !this.reference) this.say('The frame to compare with has no surface.');
-    if (wanted?.how === 'difference' && this.reference) this.mode = 'difference';
-    else if (this.mode === 'difference') this.mode = 'shading';
+    if (this.app.reference && !this.reference.mesh) this.say('The frame to compare with has no surface.');
+    this.mode = this.reference.modeFor(this.mode);
     this.fillColorModes();
-    this.recolor();
-  }
-
-  private compare(mesh: Mesh): void {
-    if (this.mode === 'difference' && this.reference) mesh.difference ??= signedDistances(mesh, this.reference);
-  }
-
-  /** The other frame beside this one, in the same colours. */
-  private drawReference(): void {
-    const {picture, app, reference} = this;
-    const beside = app.reference?.how === 'beside' ? reference : null;
-    this.halves.forEach((half, k) => {
-      half.hidden = !beside;
-      half.textContent = k === 0 ? 'this frame' : app.source.index.results[app.reference?.result ?? 0]?.name ?? '';
-    });
-    if (!beside) return picture?.setOther(null);
-    picture?.setOther(beside, colorMesh(beside, this.mode, this.legend.ranges, rgbOf('--clay'), rgbOf('--invented')));
+    this.drawPoints();
   }
 
   private async save(): Promise<void> {

@@ -90,21 +90,22 @@ void Block::add_floats(const std::string& name, std::span<const float> values, S
   data_ += difference_planes<std::uint16_t>(codes);
 }
 
-std::string Block::bytes(int level) const {
+std::string Block::bytes() const {
   const std::string header = header_.dump();
   std::string whole;
   append_little_endian(whole, static_cast<std::uint32_t>(header.size()));
   whole += header;
   whole += data_;
-  return compress(whole, level);
+  return compress(whole);
 }
 
-std::string compress(std::string_view bytes, int level) {
+std::string compress(std::string_view bytes) {
+  constexpr int kLevel = 6;  // beyond it, time grows and size hardly shrinks
   uLongf size = compressBound(static_cast<uLong>(bytes.size()));
   std::string result(size, '\0');
   const int status = compress2(reinterpret_cast<Bytef*>(result.data()), &size,
                                reinterpret_cast<const Bytef*>(bytes.data()),
-                               static_cast<uLong>(bytes.size()), level);
+                               static_cast<uLong>(bytes.size()), kLevel);
   PENCILSCAN_CHECK(status == Z_OK);
   result.resize(size);
   return result;

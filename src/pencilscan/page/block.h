@@ -29,10 +29,8 @@ class Block {
   void add_floats(const std::string& name, std::span<const float> values,
                   Steps steps = Steps::kLinear, int bits = 16);
 
-  /// The whole, compressed (zlib, RFC 1950). level: 1 (fast) to 9 (small).
-  [[nodiscard]] std::string bytes(int level = kSmall) const;
-  static constexpr int kSmall = 6;  ///< beyond it, time grows and size hardly shrinks
-  static constexpr int kFast = 1;
+  /// The whole, compressed (zlib, RFC 1950).
+  [[nodiscard]] std::string bytes() const;
 
  private:
   void describe(const std::string& name, const char* type, std::size_t count,
@@ -43,7 +41,7 @@ class Block {
 };
 
 /// zlib-compressed bytes.
-[[nodiscard]] std::string compress(std::string_view bytes, int level = Block::kSmall);
+[[nodiscard]] std::string compress(std::string_view bytes);
 /// RFC 4648, with padding.
 [[nodiscard]] std::string base64(std::string_view bytes);
 

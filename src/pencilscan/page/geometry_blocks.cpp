@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "pencilscan/core/parallel.h"
+#include "pencilscan/io/little_endian.h"
 #include "pencilscan/io/srgb.h"
 
 namespace pencilscan {
@@ -184,6 +185,40 @@ Block mesh_block(const TriangleMesh& mesh, std::span<const float> distance_mm,
     block.add_bytes("blue", channel(2));
   }
   return block;
+}
+
+std::string unpacked_mesh(const TriangleMesh& mesh) {
+  std::string data;
+  nlohmann::ordered_json arrays = nlohmann::ordered_json::object();
+  const auto begin = [&](const char* name, std::size_t count) {
+    data.resize((data.size() + 3) / 4 * 4);
+    arrays[name] = {{"at", data.size()}, {"count", count}};
+  };
+  const auto add_bytes = [&](const char* name, const std::vector<std::uint8_t>& values) {
+    begin(name, values.size());
+    data.append(values.begin(), values.end());
+  };
+  data.reserve(21 * mesh.vertices.size() + 12 * mesh.faces.size());
+  begin("position", 3 * mesh.vertices.size());
+  for (const Vec3& v : mesh.vertices) {
+    for (Eigen::Index k = 0; k < 3; ++k) append_little_endian(data, static_cast<float>(v[k]));
+  }
+  begin("index", 3 * mesh.faces.size());
+  for (const auto& face : mesh.faces) {
+    for (const int vertex : face) append_little_endian(data, static_cast<std::uint32_t>(vertex));
+  }
+  if (!mesh.sigma.empty()) {
+    begin("sigma", mesh.sigma.size());
+    for (const float sigma : mesh.sigma) append_little_endian(data, sigma);
+  }
+  if (!mesh.confidence.empty())
+    add_bytes("confidence", integers<std::uint8_t>(mesh.confidence, share_byte));
+  if (!mesh.hole.empty()) add_bytes("hole", mesh.hole);
+  std::string header = nlohmann::ordered_json{{"arrays", arrays}}.dump();
+  header.resize((header.size() + 3) / 4 * 4, ' ');
+  std::string whole;
+  append_little_endian(whole, static_cast<std::uint32_t>(header.size()));
+  return whole + header + data;
 }
 
 Block curves_block(const Rig& rig, const CurveFile& curves) {

@@ -251,6 +251,36 @@ TEST_F(Folder, FindsFramesRunsAndFailedFrames) {
   EXPECT_EQ(find_results(root_ / "joint" / "000001").results.size(), 1U);
 }
 
+TEST(UnpackedMesh, LiesReadyForTheBrowser) {
+  TriangleMesh mesh = sample::ball();
+  mesh.sigma[3] = 0.25F;
+  mesh.hole.resize(mesh.vertices.size() - 1);  // what follows is aligned, whatever came before
+  const std::string bytes = unpacked_mesh(mesh);
+  std::uint32_t length = 0;
+  std::memcpy(&length, bytes.data(), 4);
+  const auto arrays = nlohmann::json::parse(bytes.substr(4, length))["arrays"];
+  const auto at = [&](const char* name) {
+    return 4 + length + arrays[name]["at"].get<std::size_t>();
+  };
+  for (const char* name : {"position", "index", "sigma"}) EXPECT_EQ(at(name) % 4, 0U) << name;
+  std::vector<float> position(arrays["position"]["count"].get<std::size_t>());
+  ASSERT_EQ(position.size(), 3 * mesh.vertices.size());
+  std::memcpy(position.data(), &bytes[at("position")], 4 * position.size());
+  std::vector<std::uint32_t> index(arrays["index"]["count"].get<std::size_t>());
+  ASSERT_EQ(index.size(), 3 * mesh.faces.size());
+  std::memcpy(index.data(), &bytes[at("index")], 4 * index.size());
+  for (std::size_t i = 0; i < position.size(); ++i)
+    ASSERT_EQ(position[i],
+              static_cast<float>(mesh.vertices[i / 3][static_cast<Eigen::Index>(i % 3)]));
+  for (std::size_t i = 0; i < index.size(); ++i)
+    ASSERT_EQ(index[i], static_cast<std::uint32_t>(mesh.faces[i / 3][i % 3]));
+  float sigma = 0;
+  std::memcpy(&sigma, &bytes[at("sigma") + 12], 4);
+  EXPECT_EQ(sigma, 0.25F);
+  EXPECT_EQ(arrays["confidence"]["count"], mesh.confidence.size());
+  EXPECT_EQ(bytes.size(), at("hole") + mesh.hole.size());
+}
+
 TEST_F(Folder, AReportHoldsAllPartsAndNoAddressToLoadFrom) {
   sample::write_output(root_, 1);
   const std::string page = report();

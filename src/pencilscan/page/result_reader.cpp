@@ -146,12 +146,13 @@ std::optional<std::string> ResultReader::make_part(const std::string& name) {
   if (name == "mesh" || name == "measured") {
     const TriangleMesh* mesh = name == "mesh" ? files_.mesh() : files_.measured();
     if (mesh == nullptr) return std::nullopt;
+    if (detail_.for_playing) return unpacked_mesh(*mesh);
     const RayScene* truth = files_.truth();
     const auto distances =
         truth == nullptr ? std::vector<float>() : vertex_distances(*mesh, *truth);
     return mesh_block(*mesh, distances,
                       detail_.shape_only ? MeshPrecision::kCoarse : MeshPrecision::kFine)
-        .bytes(detail_.compression);
+        .bytes();
   }
   if (detail_.shape_only) return std::nullopt;
   if (name == "points") {

@@ -7,7 +7,6 @@
 #include <string>
 #include <vector>
 
-#include "pencilscan/page/block.h"
 #include "pencilscan/page/result_files.h"
 #include "pencilscan/page/result_folder.h"
 #include "pencilscan/rig/rig.h"
@@ -16,13 +15,13 @@ namespace pencilscan {
 
 /// How much of a result the page gets.
 struct Detail {
-  std::size_t max_faces = 80'000;   ///< of each mesh, >= 100
-  std::size_t point_stride = 1;     ///< every how many points, >= 1
-  int image_width = 1280;           ///< at most, px
-  int image_quality = 72;           ///< WebP, 1..100
-  bool evaluate = true;             ///< compute figures where there is a truth and no file has them
-  bool shape_only = false;          ///< the closed mesh, figures and a thumbnail
-  int compression = Block::kSmall;  ///< of meshes: zlib's level
+  std::size_t max_faces = 80'000;  ///< of each mesh, >= 100
+  std::size_t point_stride = 1;    ///< every how many points, >= 1
+  int image_width = 1280;          ///< at most, px
+  int image_quality = 72;          ///< WebP, 1..100
+  bool evaluate = true;            ///< compute figures where there is a truth and no file has them
+  bool shape_only = false;         ///< the closed mesh, figures and a thumbnail
+  bool for_playing = false;        ///< meshes as unpacked_mesh()
 };
 
 /// One result as parts for the browser. A part that is missing or broken is left out, and missing()

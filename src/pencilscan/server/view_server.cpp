@@ -38,7 +38,7 @@ class Readers {
  public:
   explicit Readers(const PageData& data) : data_(data) {}
 
-  /// play_faces: of the shape alone, to be made fast; 0: of the whole result.
+  /// play_faces: of the shape alone, as it plays; 0: of the whole result.
   std::shared_ptr<ResultReader> get(std::size_t result, std::size_t play_faces) {
     const std::lock_guard lock(mutex_);
     const std::pair key(result, play_faces);
@@ -51,7 +51,7 @@ class Readers {
     if (play_faces > 0) {
       detail.shape_only = true;
       detail.max_faces = play_faces;
-      detail.compression = Block::kFast;
+      detail.for_playing = true;
     }
     open_.emplace_front(key, data_.open(result, detail));
     if (open_.size() > kOpenReaders) open_.pop_back();
