@@ -140,6 +140,6 @@ export class SpaceAids {
       right: e[0] * x + e[4] * y + e[8] * z, up: e[1] * x + e[5] * y + e[9] * z, near: e[2] * x + e[6] * y + e[10] * z}));
     axes.replaceChildren(...seen.sort((a, b) => a.near - b.near).flatMap(({name, color, right, up}) => [
       svg('line', {x1: 0, y1: 0, x2: 17 * right, y2: -17 * up, stroke: color}),
-      svg('text', {x: 23 * right, y: -23 * up, style: `fill:${color}`}, name)]));
+      svg('text', {x: 23 * right, y: -23 * up}, name)]));
   }
 }
