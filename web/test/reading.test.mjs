@@ -95,11 +95,19 @@ test('box and cut: the size is that of the shape, and half of it goes', async ()
   await page.click('.menu summary');
   await page.uncheck('#show-devices');
   await looksNew(page, '#canvas-3d canvas', seen, 'no devices');
-  const whole = (await pixels(page, '#canvas-3d canvas')).ground;
+  const menu = (open) => page.locator('.menu').evaluate((e, is) => (e.open = is), open);
+  const ground = async () => { // what is neither shape nor tool
+    await menu(false);
+    await drawn(page);
+    const share = (await pixels(page, '#canvas-3d canvas')).ground;
+    await menu(true);
+    return share;
+  };
+  const whole = await ground();
   await page.click('[data-value=none]');
   await page.uncheck('#show-points');
   await looksNew(page, '#canvas-3d canvas', seen, 'nothing');
-  const shape = (await pixels(page, '#canvas-3d canvas')).ground - whole;
+  const shape = (await ground()) - whole;
   await page.click('[data-value=mesh]');
   await page.check('#show-box');
   await looksNew(page, '#canvas-3d canvas', seen, 'the box');
@@ -118,9 +126,8 @@ test('box and cut: the size is that of the shape, and half of it goes', async ()
   }
   await page.selectOption('#cut', 'z');
   await page.locator('#cut-depth').fill('500');
-  // Shape and tools take what is not ground; the tools stay.
   await until(async () => {
-    const gone = (await pixels(page, '#canvas-3d canvas')).ground - whole;
+    const gone = (await ground()) - whole;
     return gone > 0.2 * shape && gone < 0.8 * shape;
   }, 'half of the shape is still there, or all of it gone', 30000);
   await page.check('#cut-flip');
