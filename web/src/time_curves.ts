@@ -54,7 +54,7 @@ export class TimeCurves {
     this.row = row;
     for (const {figure, values, value, cursor} of this.curves) {
       value.textContent = figureText(figure, values[row], this.unit);
-      cursor.style.left = `${(100 * (row + 0.5)) / this.sequence.length}%`;
+      cursor.style.transform = `translateX(${(100 * (row + 0.5)) / this.sequence.length}%)`; // of its width: nothing is drawn anew
     }
   }
 
