@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "pencilscan/surface/attributes.h"
 #include "pencilscan/surface/manifold.h"
@@ -26,23 +27,36 @@ Cube bounding_cube(std::span<const SurfaceSample> samples) {
   return {0.5 * (low + high), 0.5 * (high - low).maxCoeff()};
 }
 
+/// Every so many samples, that a cell of an octree still has a few: coarse surfaces need no more.
+std::vector<SurfaceSample> thinned(std::span<const SurfaceSample> samples, double cell_spacings) {
+  constexpr double kPerCell = 4;
+  const auto step =
+      static_cast<std::size_t>(std::max(1.0, cell_spacings * cell_spacings / kPerCell));
+  std::vector<SurfaceSample> few;
+  for (std::size_t i = 0; i < samples.size(); i += step) few.push_back(samples[i]);
+  return few;
+}
+
 /// Side of a cube that the closed surface does not leave, relative to the samples' bounding cube:
 /// the smaller, the finer the octree. A coarse surface tells. What few cameras saw may leave any
 /// cube: it is cut by the smallest one and capped there.
-double cube_scale(std::span<const SurfaceSample> samples, const Cube& cube) {
+double cube_scale(std::span<const SurfaceSample> samples, const Cube& cube, double spacing) {
   constexpr int kProbeDepth = 6;
   constexpr double kSmallest = 1.5;
   constexpr double kWide = 2;
   constexpr double kWidest = 3;
   constexpr double kRoom = 1.25;  // a surface moves outwards with the faces of its cube near by
-  const TriangleMesh probe = poisson_surface(samples, kProbeDepth, kWide);
+  constexpr double kCells = 1 << kProbeDepth;
+  const std::vector<SurfaceSample> few =
+      thinned(samples, 2 * kWide * cube.half_side / kCells / spacing);
+  const TriangleMesh probe = poisson_surface(few, kProbeDepth, kWide);
   if (count_edges(probe).boundary == 0) {
     double reach = 0;
     for (const Vec3& x : probe.vertices)
       reach = std::max(reach, (x - cube.center).cwiseAbs().maxCoeff());
     return kRoom * reach < kSmallest * cube.half_side ? kSmallest : kWide;
   }
-  const bool is_inside = count_edges(poisson_surface(samples, kProbeDepth, kWidest)).boundary == 0;
+  const bool is_inside = count_edges(poisson_surface(few, kProbeDepth, kWidest)).boundary == 0;
   return is_inside ? kWidest : kSmallest;
 }
 
@@ -84,7 +98,7 @@ ClosedSurface closed_surface(std::span<const SurfaceSample> samples,
                              const ClosingOptions& options) {
   const Cube cube = bounding_cube(samples);
   ClosedSurface result;
-  result.scale = cube_scale(samples, cube);
+  result.scale = cube_scale(samples, cube, options.spacing_mm);
   result.depth = octree_depth(cube, options, result.scale);
   result.mesh = with_caps(poisson_surface(samples, result.depth, result.scale));
   make_manifold(result.mesh);
