@@ -108,7 +108,9 @@ void fit_batch(const std::vector<CurvePoint>& points, const std::vector<Profile>
       const auto both = [&](int o) { return at(o) + at(-o); };
       int valley = half;
       for (int o = half; o >= 3; --o) valley = both(o) < both(valley) ? o : valley;
-      constexpr float kRise = 0.25F;  // of the line's height; noise makes smaller valleys
+      // Of the line's own height: lines side by side are about as bright as each other, what noise
+      // and crossing lines add is less.
+      constexpr float kRise = 0.75F;
       if (both(half) - both(valley) > kRise * (both(0) - both(valley))) half = valley;
     }
     batch.half[k] = static_cast<float>(half);
