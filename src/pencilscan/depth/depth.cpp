@@ -7,7 +7,6 @@
 #include "pencilscan/core/median.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/core/stopwatch.h"
-#include "pencilscan/detection/mosaic_trace.h"
 #include "pencilscan/rig/camera_light.h"
 
 namespace pencilscan {
@@ -46,9 +45,10 @@ CameraDepthReport camera_report(const DepthMap& map, double blur_px) {
 }  // namespace
 
 DepthResult measure_depth(const Rig& rig, const std::vector<ColorFamily>& families,
-                          std::span<const cv::Mat> images, std::span<const Unmixing> unmixings,
+                          std::span<const cv::Mat> images,
+                          std::span<const CameraDetection> detections,
                           std::span<const MeasuredPoint> points, const DepthStageOptions& options) {
-  PENCILSCAN_CHECK(images.size() == rig.cameras.size() && unmixings.size() == images.size());
+  PENCILSCAN_CHECK(images.size() == rig.cameras.size() && detections.size() == images.size());
   const Stopwatch watch;
   DepthResult result;
   std::vector<std::size_t> cameras;
@@ -61,19 +61,20 @@ DepthResult measure_depth(const Rig& rig, const std::vector<ColorFamily>& famili
   parallel_for(cameras.size(), [&](std::size_t i) {
     const std::size_t c = cameras[i];
     const Camera& camera = rig.cameras[c];
-    const cv::Mat rgb = projector_light(camera, linear_light(camera, images[c]), unmixings[c]);
+    const Unmixing& unmixing = detections[c].unmixing;
+    const cv::Mat rgb = projector_light(camera, linear_light(camera, images[c]), unmixing);
     std::vector<cv::Mat> presence;
     std::vector<cv::Mat> sampled;
     for (const ColorFamily& family : families) {
       presence.push_back(presence_image(rgb, family));
-      sampled.push_back(presence_samples(camera, unmixings[c], family));
+      sampled.push_back(presence_samples(camera, unmixing, family));
     }
     CameraLight& light = result.lights[i];
     light.camera = &camera;
     light.families = std::move(presence);
     light.sampled = std::move(sampled);
     light.valid = unsaturated(images[c]);
-    light.of_mosaic = camera.mosaic || looks_interpolated(images[c]);
+    light.of_mosaic = camera.mosaic || detections[c].is_filled_in;
     const DepthOptions depth = options_for(light, options.depth);
     measure_light(rig, static_cast<int>(c), families, points, depth, light);
     result.maps[i] = dense_depth(light, static_cast<int>(c), points, space, depth);

@@ -7,8 +7,8 @@
 
 #include "pencilscan/depth/consistency.h"
 #include "pencilscan/depth/dense_depth.h"
+#include "pencilscan/detection/detect.h"
 #include "pencilscan/geometry/ray_scene.h"
-#include "pencilscan/view/unmix.h"
 
 namespace pencilscan {
 
@@ -44,10 +44,10 @@ struct DepthResult {
 /// Dense depth of one frame. Around each node of a pixel grid, inverse depth is a quadric that is
 /// fitted to the image of all lit projectors at once (window_fit.h), started from labelled curve
 /// points or from solved neighbours; then the cameras check each other (consistency.h). `images` as
-/// read, one per camera of the rig (empty: missing); `unmixings` likewise.
+/// read, one per camera of the rig (empty: missing); `detections` of them.
 [[nodiscard]] DepthResult measure_depth(const Rig& rig, const std::vector<ColorFamily>& families,
                                         std::span<const cv::Mat> images,
-                                        std::span<const Unmixing> unmixings,
+                                        std::span<const CameraDetection> detections,
                                         std::span<const MeasuredPoint> points,
                                         const DepthStageOptions& options = {});
 

@@ -43,7 +43,7 @@ struct BallScene {
       truth.push_back(camera_truth(rig, c, object));
       add_points(c, random);
     }
-    unmixings.resize(rig.cameras.size());
+    detections.resize(rig.cameras.size());
   }
 
   /// Every pixel within half a pixel of a line.
@@ -79,7 +79,7 @@ struct BallScene {
   }
 
   [[nodiscard]] DepthResult measure(const DepthStageOptions& options = {}) const {
-    return measure_depth(rig, families, images, unmixings, points, options);
+    return measure_depth(rig, families, images, detections, points, options);
   }
 
   /// Signed depth error of every measured node whose pixel sees the ball.
@@ -100,7 +100,7 @@ struct BallScene {
   std::vector<cv::Mat> images;
   std::vector<CameraTruth> truth;
   std::vector<MeasuredPoint> points;
-  std::vector<Unmixing> unmixings;
+  std::vector<CameraDetection> detections;
 };
 
 const BallScene& ball_scene() {
@@ -302,12 +302,12 @@ TEST(DenseDepth, SameBytesForAnyThreadCount) {
 TEST(DenseDepth, NoPointsAndNoImagesGiveNoDepth) {
   const BallScene& scene = ball_scene();
   const DepthResult none =
-      measure_depth(scene.rig, scene.families, scene.images, scene.unmixings, {});
+      measure_depth(scene.rig, scene.families, scene.images, scene.detections, {});
   for (const DepthMap& map : none.maps) {
     for (const DepthNode& node : map.nodes) EXPECT_FALSE(node.measured());
   }
   const std::vector<cv::Mat> missing(2);
-  EXPECT_TRUE(measure_depth(scene.rig, scene.families, missing, scene.unmixings, scene.points)
+  EXPECT_TRUE(measure_depth(scene.rig, scene.families, missing, scene.detections, scene.points)
                   .maps.empty());
 }
 

@@ -436,8 +436,6 @@ std::optional<WindowFit> WindowFitter::fit(const Vec2& pixel, const Quadric& sta
     const float least = least_significance(sampled_share_[static_cast<std::size_t>(lit.family)]);
     if (lit.amplitude < least * std::sqrt(lit.amplitude_variance)) continue;
     fit.lit.set(static_cast<std::size_t>(lit.pattern));
-    fit.significance =
-        std::max(fit.significance, lit.amplitude / std::sqrt(lit.amplitude_variance));
     fit.lines_per_w =
         std::max(fit.lines_per_w, std::abs(lit.lines.slope(static_cast<float>(q[0]))));
   }

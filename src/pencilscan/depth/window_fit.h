@@ -44,7 +44,6 @@ struct WindowFit {
   LitPatterns lit;              ///< patterns found
   bool cut = false;             ///< a side of the window does not belong to the surface
   float amplitude = 0;          ///< largest, image value
-  float significance = 0;       ///< largest amplitude / its standard deviation
   float lines_per_w = 0;        ///< largest |dl / dw| of a lit pattern
 };
 

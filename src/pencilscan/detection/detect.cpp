@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "pencilscan/core/parallel.h"
+#include "pencilscan/detection/mosaic_trace.h"
 #include "pencilscan/rig/camera_light.h"
 
 namespace pencilscan {
@@ -43,6 +44,7 @@ CameraDetection detect_curves(const Camera& camera, const Rig& rig,
   const cv::Mat whole = linear_light(camera, image);
   const cv::Rect area = lit_area(whole);
   const cv::Mat linear = whole(area);
+  result.is_filled_in = !camera.mosaic && looks_interpolated(image);
   result.saturated_pixels = static_cast<std::size_t>(cv::countNonZero(overexposed(image(area))));
   result.unmixing = estimate_unmixing(camera, rig, families, registered(camera, linear, area.tl()));
   const cv::Mat rgb = projector_light(camera, linear, result.unmixing, area.tl());

@@ -26,6 +26,7 @@ struct CameraDetection {
   Unmixing unmixing;
   std::vector<cv::Mat> presence;  ///< per family: how bright its lines are, CV_32FC1
   std::size_t saturated_pixels = 0;
+  bool is_filled_in = false;  ///< its colours, behind a mosaic (mosaic_trace.h)
 };
 
 /// Curves of all colour families of one camera image (linear or gamma-coded RGB as read, CV_32FC3).

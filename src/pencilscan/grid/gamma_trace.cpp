@@ -3,35 +3,20 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 
 #include "pencilscan/core/median.h"
+#include "pencilscan/view/sample_color.h"
 
 namespace pencilscan {
 namespace {
 
 using Eigen::Vector2f;
-using Rgb = Eigen::Array3d;
 
 constexpr double kMostGamma = 4;  // and its inverse: beyond are no cameras
 constexpr float kApart = 2.5F;    // deviations of a profile: there its line has faded
-constexpr double kFull = 0.95;    // values near the top of the range may be cut off
+constexpr float kFull = 0.95F;    // values near the top of the range may be cut off
 constexpr std::size_t kLeastCrossings = 50;
-
-std::optional<Rgb> value_at(const cv::Mat& values, const Vector2f& x) {
-  if (!(x.x() >= 0 && x.y() >= 0 && x.x() < static_cast<float>(values.cols - 1) &&
-        x.y() < static_cast<float>(values.rows - 1)))
-    return std::nullopt;
-  const int u = static_cast<int>(x.x());
-  const int v = static_cast<int>(x.y());
-  const auto a = static_cast<double>(x.x()) - u;
-  const auto b = static_cast<double>(x.y()) - v;
-  const auto at = [&](int row, int column) {
-    const auto& p = values.at<cv::Vec3f>(row, column);
-    return Rgb(p[0], p[1], p[2]).eval();
-  };
-  return (1 - b) * ((1 - a) * at(v, u) + a * at(v, u + 1)) +
-         b * ((1 - a) * at(v + 1, u) + a * at(v + 1, u + 1));
-}
 
 /// What is seen at a crossing, on one line beside it, on the other, and off both.
 struct Sum {
@@ -88,16 +73,13 @@ class NextCrossings {
   std::vector<std::vector<float>> at_;
 };
 
-/// Mean over places; nothing when one of them is outside.
+/// Mean over places; NaN when one of them is outside.
 template <std::size_t kCount>
-std::optional<Rgb> mean_at(const cv::Mat& values, const std::array<Vector2f, kCount>& places) {
-  Rgb sum = Rgb::Zero();
-  for (const Vector2f& place : places) {
-    const auto value = value_at(values, place);
-    if (!value) return std::nullopt;
-    sum += *value;
-  }
-  return sum / static_cast<double>(kCount);
+Eigen::Array3f mean_at(const cv::Mat& values, const std::array<Vector2f, kCount>& places) {
+  Eigen::Array3f sum = Eigen::Array3f::Zero();
+  for (const Vector2f& place : places)
+    sum += sample_color(values, static_cast<double>(place.x()), static_cast<double>(place.y()));
+  return sum / static_cast<float>(kCount);
 }
 
 /// The channel in which both lines are brightest.
@@ -117,17 +99,18 @@ std::optional<Sum> sum_at(const GridGraph& graph, const NextCrossings& next, con
   const Vector2f o = x.position;
   const Vector2f a1 = along(a, x.at_a + from_b).first - o, a2 = along(a, x.at_a - from_b).first - o;
   const Vector2f b1 = along(b, x.at_b + from_a).first - o, b2 = along(b, x.at_b - from_a).first - o;
-  const auto both = value_at(values, o);
+  const auto both = mean_at(values, std::array<Vector2f, 1>{o});
   const auto first = mean_at(values, std::array<Vector2f, 2>{o + a1, o + a2});
   const auto second = mean_at(values, std::array<Vector2f, 2>{o + b1, o + b2});
   const auto none =
       mean_at(values, std::array<Vector2f, 4>{o + a1 + b1, o + a1 + b2, o + a2 + b1, o + a2 + b2});
-  if (!both || !first || !second || !none) return std::nullopt;
+  if ((both + first + second + none).hasNaN()) return std::nullopt;
   Eigen::Index k = 0;
-  const double least = first->min(*second).maxCoeff(&k);
+  const float least = first.min(second).maxCoeff(&k);
   // A line counts where it is at least as bright above the dark as the dark itself.
-  if (least < 2 * (*none)[k] || (*both)[k] > kFull) return std::nullopt;
-  return Sum{(*both)[k], (*first)[k], (*second)[k], (*none)[k]};
+  if (least < 2 * none[k] || both[k] > kFull) return std::nullopt;
+  const auto in = [k](const Eigen::Array3f& rgb) { return static_cast<double>(rgb[k]); };
+  return Sum{in(both), in(first), in(second), in(none)};
 }
 
 }  // namespace
@@ -147,10 +130,9 @@ std::optional<GammaTrace> gamma_at_crossings(const GridGraph& graph, const cv::M
   GammaTrace trace;
   trace.gamma = std::exp(middle);
   trace.crossings = logs.size();
-  // Of a normal distribution: the median deviation is .6745 of the standard one, and a median
-  // scatters sqrt(pi / 2) times as much as a mean.
-  trace.deviation = 1.2533 * upper_median(std::move(off)) / 0.6745 /
-                    std::sqrt(static_cast<double>(trace.crossings));
+  // A median of normal values scatters sqrt(pi / 2) times as much as their mean.
+  trace.deviation = kDeviationPerMedian * upper_median(std::move(off)) *
+                    std::sqrt(std::numbers::pi / 2 / static_cast<double>(trace.crossings));
   return trace;
 }
 

@@ -181,7 +181,7 @@ PointResult measure_points(const Rig& stated, const Frame& frame, const PointOpt
   const Rig rig = with_registered_patterns(stated);
   PointResult result = detect_frame(rig, frame, options);
   const StageClock clock(options.progress, result.times);
-  if (std::optional<Warning> warning = interpolation_warning(rig, frame))
+  if (std::optional<Warning> warning = interpolation_warning(rig, result.detections))
     result.warnings.push_back(std::move(*warning));
   if (std::optional<Warning> warning = gamma_warning(rig, frame, result.graphs))
     result.warnings.push_back(std::move(*warning));

@@ -90,10 +90,8 @@ void copy_colors(const TriangleMesh& mesh, TriangleMesh& measured) {
 /// Dense depth of all cameras.
 DepthResult depth_of(const Rig& rig, const Frame& frame, const PointResult& points,
                      const DepthStageOptions& options) {
-  std::vector<Unmixing> unmixings;
-  for (const CameraDetection& detection : points.detections)
-    unmixings.push_back(detection.unmixing);
-  return measure_depth(rig, points.families, frame.images, unmixings, points.points, options);
+  return measure_depth(rig, points.families, frame.images, points.detections, points.points,
+                       options);
 }
 
 /// The depth maps become one closed surface, which lets depth be completed where it was missing and

@@ -5,7 +5,6 @@
 
 #include "pencilscan/core/formatted.h"
 #include "pencilscan/core/parallel.h"
-#include "pencilscan/detection/mosaic_trace.h"
 #include "pencilscan/grid/gamma_trace.h"
 #include "pencilscan/rig/camera_light.h"
 
@@ -57,15 +56,11 @@ std::vector<Warning> detection_warnings(const Rig& rig, const Frame& frame,
   return warnings;
 }
 
-std::optional<Warning> interpolation_warning(const Rig& rig, const Frame& frame) {
-  std::vector<char> filled(rig.cameras.size(), 0);
-  parallel_for(rig.cameras.size(), [&](std::size_t c) {
-    filled[c] = !frame.images[c].empty() && !rig.cameras[c].mosaic &&
-                !rig.cameras[c].sees_texture_only && looks_interpolated(frame.images[c]);
-  });
+std::optional<Warning> interpolation_warning(const Rig& rig,
+                                             std::span<const CameraDetection> detections) {
   std::string names;
-  for (std::size_t c = 0; c < filled.size(); ++c) {
-    if (filled[c] != 0) add_name(names, rig.cameras[c].name, ", ");
+  for (std::size_t c = 0; c < detections.size(); ++c) {
+    if (detections[c].is_filled_in) add_name(names, rig.cameras[c].name, ", ");
   }
   if (names.empty()) return std::nullopt;
   return Warning{WarningCode::kColorsFilledIn,

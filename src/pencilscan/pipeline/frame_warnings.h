@@ -15,7 +15,8 @@ namespace pencilscan {
                                                       std::span<const CameraDetection> detections);
 
 /// Which cameras' colours were filled in behind a mosaic, if any.
-[[nodiscard]] std::optional<Warning> interpolation_warning(const Rig& rig, const Frame& frame);
+[[nodiscard]] std::optional<Warning> interpolation_warning(
+    const Rig& rig, std::span<const CameraDetection> detections);
 
 /// Which cameras' values are not the light that the rig says, and with which gamma they would be
 /// (grid/gamma_trace.h).

@@ -9,6 +9,7 @@
 #include "pencilscan/depth/pattern_view.h"
 #include "pencilscan/geometry/ray_scene.h"
 #include "pencilscan/surface/sight.h"
+#include "pencilscan/view/sample_color.h"
 
 namespace pencilscan {
 namespace {
@@ -29,25 +30,6 @@ double line_profile(double l, double h, double s) {
   const double k = 1 / (std::numbers::sqrt2 * std::max(s, 1e-3));
   const auto box = [&](double x) { return 0.5 * (std::erf((h - x) * k) + std::erf((h + x) * k)); };
   return box(a) + box(1 - a);
-}
-
-/// Value between pixels, or NaN at the border.
-Channels bilinear(const cv::Mat& image, const Vec2& pixel) {
-  const int u = static_cast<int>(std::floor(pixel[0]));
-  const int v = static_cast<int>(std::floor(pixel[1]));
-  if (u < 0 || v < 0 || u + 1 >= image.cols || v + 1 >= image.rows)
-    return Channels::Constant(std::nanf(""));
-  const auto fx = static_cast<float>(pixel[0] - u);
-  const auto fy = static_cast<float>(pixel[1] - v);
-  Channels sum = Channels::Zero();
-  for (int dy = 0; dy < 2; ++dy) {
-    for (int dx = 0; dx < 2; ++dx) {
-      const auto& value = image.at<cv::Vec3f>(v + dy, u + dx);
-      const float weight = (dx == 1 ? fx : 1 - fx) * (dy == 1 ? fy : 1 - fy);
-      sum += weight * Channels(value[0], value[1], value[2]);
-    }
-  }
-  return sum;
 }
 
 class Light {
@@ -138,7 +120,7 @@ std::vector<Sample> collect(const Rig& rig, const RayScene& surface,
       if (!pixel || !camera.contains(*pixel) || !light.sees(camera.center(), x, normals[v]))
         continue;
       Sample sample;
-      sample.image = bilinear(views[k].image, *pixel);
+      sample.image = sample_color(views[k].image, pixel->x(), pixel->y());
       if (!sample.image.isFinite().all()) continue;
       sample.weight = static_cast<float>((camera.center() - x).normalized().dot(normals[v]));
       if (has_plain) {
