@@ -13,6 +13,7 @@
 #include "pencilscan/surface/local_fit.h"
 #include "pencilscan/surface/manifold.h"
 #include "pencilscan/surface/mesh_parts.h"
+#include "pencilscan/surface/node_samples.h"
 #include "pencilscan/surface/node_surface.h"
 #include "pencilscan/surface/sample.h"
 #include "pencilscan/surface/untangle.h"
@@ -56,38 +57,6 @@ std::vector<char> judge_samples(const Rig& rig, const SurfaceOptions& options, S
   }
   drop_small_clusters(set.samples, kClusterGap * set.spacing, kLeastCluster, keep);
   return keep;
-}
-
-/// Samples of the depth maps' nodes; the spacing is the distance of nodes on the surface.
-std::vector<SurfaceSample> dense_samples(const Rig& rig, std::span<const DepthMap> maps,
-                                         double& spacing) {
-  constexpr double kLeastCosine = 0.7;  // stretches the spacing of grazing nodes no further
-  constexpr double kLeastSigma = 0.01;  // footprints; keeps one node from ruling its neighbours
-  std::vector<SurfaceSample> samples;
-  std::vector<double> spacings;
-  for (const DepthMap& map : maps) {
-    const Camera& camera = rig.cameras[static_cast<std::size_t>(map.camera)];
-    for (std::size_t i = 0; i < map.nodes.size(); ++i) {
-      const DepthNode& node = map.nodes[i];
-      if (!node.measured()) continue;
-      SurfaceSample s;
-      s.position = node_point(rig, map, i);
-      s.normal = node_normal(rig, map, i);
-      s.to_camera = (camera.center() - s.position).normalized();
-      s.sheet_normal = s.normal.unitOrthogonal();
-      s.sigma = std::max(static_cast<double>(node.sigma), kLeastSigma);
-      s.confidence = static_cast<double>(node.confidence);
-      s.camera = static_cast<std::uint8_t>(map.camera);
-      s.count = 1;
-      const double depth = 1 / static_cast<double>(node.w);
-      s.spacing =
-          map.stride * depth / camera.K(0, 0) / std::max(s.normal.dot(s.to_camera), kLeastCosine);
-      spacings.push_back(s.spacing);
-      samples.push_back(s);
-    }
-  }
-  spacing = upper_median(std::move(spacings));
-  return samples;
 }
 
 /// Points that the depth of their own pixel bears out.
@@ -213,7 +182,7 @@ SurfaceResult close_depth(const Rig& rig, std::span<const DepthMap> maps,
   const Stopwatch watch;
   SurfaceResult result;
   SurfaceReport& report = result.report;
-  std::vector<SurfaceSample> samples = dense_samples(rig, maps, report.spacing_mm);
+  std::vector<SurfaceSample> samples = node_samples(rig, maps, report.spacing_mm);
   report.samples = report.samples_used = samples.size();
   if (samples.size() < kLeastSamples) {
     report.status = SurfaceStatus::kTooFewPoints;
@@ -248,7 +217,7 @@ void follow_depth(const Rig& rig, std::span<const MeasuredPoint> points,
   report.points = points.size();
   result.used.assign(points.size(), 0);
   if (report.status == SurfaceStatus::kTooFewPoints) return;
-  std::vector<SurfaceSample> samples = dense_samples(rig, maps, report.spacing_mm);
+  std::vector<SurfaceSample> samples = node_samples(rig, maps, report.spacing_mm);
   const double spacing = report.spacing_mm;
   report.samples = report.samples_used = samples.size();
   result.used = points_on_maps(rig, points, maps, spacing);

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <optional>
+#include <span>
+
+#include "pencilscan/depth/depth_map.h"
+#include "pencilscan/rig/rig.h"
+#include "pencilscan/surface/silhouette.h"
+#include "pencilscan/surface/surface.h"
+#include "pencilscan/tracking/tracked_surface.h"
+
+namespace pencilscan {
+
+/// A closed surface that came from the moment before.
+struct CarriedSurface {
+  SurfaceResult surface;
+  RigidTransform motion;  ///< since then
+};
+
+/// How a closed mesh, as coarse as the octree and with confidences, fits the depth maps.
+[[nodiscard]] SurfaceFit surface_fit(const Rig& rig, std::span<const DepthMap> maps,
+                                     const TriangleMesh& mesh);
+
+/// The closed surface of the moment before, moved onto the depth maps of this one: what
+/// close_depth() gives, without making it from nothing. Nothing where it does not fit as one that
+/// is made from nothing did: where nodes lie together off it, where more of it is invented, or its
+/// triangles have become flat. So a jump, a new part or one that has gone is seen from nothing.
+[[nodiscard]] std::optional<CarriedSurface> carry_surface(
+    const Rig& rig, std::span<const DepthMap> maps, const TrackedSurface& before,
+    const FusionOptions& options, std::span<const Silhouette> silhouettes);
+
+}  // namespace pencilscan

@@ -1,0 +1,24 @@
+#pragma once
+
+#include <vector>
+
+#include "pencilscan/geometry/mesh.h"
+#include "pencilscan/tracking/tracked_surface.h"
+
+namespace pencilscan {
+
+/// How many moments the mean of a resting surface goes back. As many come before the first moment
+/// of a chunk, so that the mean is the same on both sides of its border.
+constexpr int kMemoryMoments = 4;
+
+/// Where a surface rests, its noise is not its motion. Each measured vertex moves along its normal
+/// towards where the moment before has the surface: a Kalman filter with one state, its place
+/// (R. Kalman, A new approach to linear filtering and prediction problems, 1960), whose process
+/// noise is what the vertices around moved together beyond their noise. What moves is left alone.
+/// Returns the variance of each vertex's place (0: not measured) for the next moment.
+[[nodiscard]] std::vector<float> steady_surface(const TrackedSurface& before, TriangleMesh& mesh);
+
+/// The variances of a surface without a moment before.
+[[nodiscard]] std::vector<float> first_variance(const TriangleMesh& mesh);
+
+}  // namespace pencilscan
