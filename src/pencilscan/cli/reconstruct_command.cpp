@@ -45,6 +45,7 @@ void reconstruct(const ReconstructOptions& options) {
   sequence.plain_frames = options.plain_frames;
   sequence.refine_rig = options.refine_rig;
   sequence.meshes = !options.no_mesh;
+  sequence.tracks = !options.independent;
   sequence.pictures = !options.no_pictures;
   sequence.depth_maps = options.depth_maps;
   sequence.mesh_formats = options.mesh_formats;
@@ -57,6 +58,7 @@ void reconstruct(const ReconstructOptions& options) {
                          " depth-maps=" + (options.depth_maps ? "yes" : "no") +
                          " refine-rig=" + (options.refine_rig ? "yes" : "no");
   if (options.no_mesh) sequence.description += " mesh=no";
+  if (options.independent) sequence.description += " independent=yes";
   if (!options.plain_frames.empty()) sequence.description += " plain=yes";
   for (const std::string& format : options.mesh_formats) sequence.description += " " + format;
   warn_of(volume_unit_warning(read_rig(options.rig)));
@@ -134,6 +136,8 @@ void add_reconstruct_options(CLI::App& command, ReconstructOptions& options) {
       ->check(one_of({"obj", "stl", "glb"}));
   command.add_flag("--refine-rig", options.refine_rig,
                    "correct the poses of the devices from the lines that cross in the frames");
+  command.add_flag("--independent", options.independent,
+                   "every frame from itself alone, not from the surface of the frame before");
   command.add_flag("--no-pictures", options.no_pictures, "leave overlays and views out");
   command.add_flag("--overwrite", options.overwrite, "replace output of other inputs or options");
 }

@@ -19,6 +19,7 @@ struct ReconstructOptions {
   bool no_pictures = false;
   bool no_depth = false;
   bool no_mesh = false;
+  bool independent = false;
   bool depth_maps = false;
   std::vector<std::string> mesh_formats;
   bool refine_rig = false;

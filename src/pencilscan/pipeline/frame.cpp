@@ -54,6 +54,24 @@ std::string why_nothing(const PointResult& result) {
   return why;
 }
 
+/// Of all cameras; they share their pixels with the detections.
+std::vector<std::vector<cv::Mat>> presence_images(std::span<const CameraDetection> detections) {
+  std::vector<std::vector<cv::Mat>> presence;
+  for (const CameraDetection& detection : detections) presence.push_back(detection.presence);
+  return presence;
+}
+
+/// The share of the curves' points with a name after a second look.
+double guided_share(const Rig& rig, const PointOptions& options, const PointResult& result) {
+  std::vector<GridGraph> graphs = result.graphs;
+  Labeling labeling = result.labeling;
+  second_look(rig, result.families, presence_images(result.detections), graphs, labeling,
+              options.second_look);
+  std::size_t points = 0;
+  for (const GridGraph& graph : graphs) points += curve_points(graph);
+  return static_cast<double>(labelled_points(labeling)) / static_cast<double>(points);
+}
+
 /// Gives the curves their lines. Methods that correct the rig first leave out pictures that do not
 /// fit, and give back the rig that the lines were named with where it is not the one given.
 std::optional<Rig> label_lines(const Rig& rig, const Frame& frame, const PointOptions& options,
@@ -78,20 +96,13 @@ std::optional<Rig> label_lines(const Rig& rig, const Frame& frame, const PointOp
     leave_out(rig, misplaced, result);
     result.labeling = solve();
   }
-  LineNaming naming =
-      name_lines(rig, result.families, result.graphs, std::move(result.labeling), options);
+  LineNaming naming = name_lines(rig, result.families, result.graphs, result.labeling, options,
+                                 [&] { return guided_share(rig, options, result); });
   result.labeling = std::move(naming.labeling);
   result.crossings = naming.crossings;
   result.device_crossings = std::move(naming.device_crossings);
   if (naming.warning) result.warnings.push_back(std::move(*naming.warning));
   return std::move(naming.corrected);
-}
-
-/// Of all cameras; they share their pixels with the detections.
-std::vector<std::vector<cv::Mat>> presence_images(std::span<const CameraDetection> detections) {
-  std::vector<std::vector<cv::Mat>> presence;
-  for (const CameraDetection& detection : detections) presence.push_back(detection.presence);
-  return presence;
 }
 
 /// The nodes of all depth maps.

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -20,6 +21,7 @@
 #include "pencilscan/refinement/crossing_tracks.h"
 #include "pencilscan/surface/holes.h"
 #include "pencilscan/surface/surface.h"
+#include "pencilscan/tracking/tracked_surface.h"
 
 namespace pencilscan {
 
@@ -54,7 +56,11 @@ struct ShapeOptions {
   DepthStageOptions depth;
   FusionOptions fusion;    ///< of dense depth
   SurfaceOptions surface;  ///< of the curves alone, where dense depth is off or finds nothing
-  Progress progress;       ///< as in PointOptions
+  /// The surface of the moment before, asked for when it is needed; null: there is none.
+  std::function<std::shared_ptr<const TrackedSurface>()> before;
+  /// Hears of this moment's surface as soon as it is there; nobody: it is not kept.
+  std::function<void(std::shared_ptr<const TrackedSurface>)> hand_on;
+  Progress progress;  ///< as in PointOptions
 };
 
 /// Labelled points of one frame and everything that led to them.
@@ -94,7 +100,8 @@ struct ShapeResult {
   HoleReport holes;   ///< empty without dense depth
   SurfaceResult surface;
   std::shared_ptr<const RayScene>
-      scene;  ///< of surface.mesh before its colours; null without dense depth
+      scene;              ///< of surface.mesh before its colours; null without dense depth
+  int carried_since = 0;  ///< moments since the closed surface was made from nothing
   std::vector<StageTime> times;
 };
 

@@ -6,7 +6,10 @@
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/pipeline/frame.h"
 #include "pencilscan/rig/camera_light.h"
+#include "pencilscan/surface/untangle.h"
 #include "pencilscan/surface/vertex_color.h"
+#include "pencilscan/tracking/carried_surface.h"
+#include "pencilscan/tracking/steady.h"
 
 namespace pencilscan {
 namespace {
@@ -94,14 +97,64 @@ DepthResult depth_of(const Rig& rig, const Frame& frame, const PointResult& poin
                        options);
 }
 
+/// One closed surface of the depth maps: that of the moment before, moved, where it fits. `next`
+/// takes what stays the same until the surface is made from nothing again. Returns how far the
+/// vertices have come; nothing where the surface is new.
+std::vector<float> close_surface(const Rig& rig, const std::vector<ColorView>& views,
+                                 const ShapeOptions& options, const TrackedSurface* before,
+                                 ShapeResult& result, TrackedSurface& next) {
+  const std::vector<Silhouette> silhouettes = silhouettes_of(rig, views);
+  if (before != nullptr) {
+    if (auto carried =
+            carry_surface(rig, result.depth.maps, *before, options.fusion, silhouettes)) {
+      result.surface = std::move(carried->surface);
+      next.motion = carried->motion;
+      next.fit = before->fit;
+      next.age = before->age + 1;
+      return std::move(carried->traveled);
+    }
+  }
+  result.surface = close_depth(rig, result.depth.maps, options.fusion, silhouettes);
+  if (options.hand_on && !result.surface.mesh.faces.empty())
+    next.fit = surface_fit(rig, result.depth.maps, result.surface.mesh);
+  return {};
+}
+
+/// What rests is held still; the surface goes on to the next moment.
+void hand_on(const ShapeOptions& options, const TrackedSurface* before,
+             std::span<const float> traveled, TrackedSurface next, SurfaceResult& surface) {
+  TriangleMesh& mesh = surface.mesh;
+  if (!traveled.empty()) {
+    const std::vector<Vec3> followed = mesh.vertices;
+    next.variance = steady_surface(*before, traveled, mesh);
+    surface.report.self_intersections = untangle(followed, mesh);
+  } else {
+    next.variance = first_variance(mesh);
+  }
+  next.mesh.vertices = mesh.vertices;
+  next.mesh.faces = mesh.faces;
+  next.mesh.sigma = mesh.sigma;
+  next.mesh.confidence = mesh.confidence;
+  options.hand_on(std::make_shared<const TrackedSurface>(std::move(next)));
+}
+
 /// The depth maps become one closed surface, which lets depth be completed where it was missing and
 /// then follows it.
 void fuse(const Rig& rig, const PointResult& points, const std::vector<ColorView>& views,
           const ShapeOptions& options, ShapeResult& result) {
-  result.surface = close_depth(rig, result.depth.maps, options.fusion, silhouettes_of(rig, views));
-  complete_depth(rig, RayScene(result.surface.mesh), options.depth, result.depth);
+  const std::shared_ptr<const TrackedSurface> before = options.before ? options.before() : nullptr;
+  SurfaceResult& surface = result.surface;
+  TrackedSurface next;
+  const std::vector<float> traveled =
+      close_surface(rig, views, options, before.get(), result, next);
+  next.coarse_faces = surface.mesh.faces;
+  result.carried_since = next.age;
+  complete_depth(rig, RayScene(surface.mesh), options.depth, result.depth);
   result.depth.lights.clear();
-  follow_depth(rig, points.points, result.depth.maps, options.fusion, result.surface);
+  follow_depth(rig, result.depth.maps, options.fusion, surface);
+  if (options.hand_on && !surface.mesh.faces.empty())
+    hand_on(options, before.get(), traveled, std::move(next), surface);
+  finish_surface(rig, points.points, result.depth.maps, options.fusion, surface);
 }
 
 void mark_holes(const Rig& rig, ShapeResult& result) {

@@ -27,8 +27,9 @@ void judge(const Rig& rig, const std::vector<GridGraph>& graphs, LineNaming& nam
 
 LineNaming name_lines(const Rig& rig, const std::vector<ColorFamily>& families,
                       const std::vector<GridGraph>& graphs, Labeling labeling,
-                      const PointOptions& options) {
+                      const PointOptions& options, const std::function<double()>& guided_share) {
   constexpr double kNearlyAll = 0.8;    // of the curves' points; right names reach .9 and more
+  constexpr double kMost = 0.5;         // once guided; the rest are close together, or no lines
   constexpr double kClearlyMore = 1.1;  // points named, of those before
   constexpr double kAsWell = 1.2;       // crossings' misses, of those before
   constexpr double kClearlyLess = 0.8;  // the same
@@ -39,6 +40,8 @@ LineNaming name_lines(const Rig& rig, const std::vector<ColorFamily>& families,
   const auto points = static_cast<double>(labelled_points(result.labeling));
   if (!are_enough(result.crossings)) return result;
   if (!is_off && points > kNearlyAll * static_cast<double>(curve_points(graphs))) return result;
+  const bool meets = !is_off && result.crossings.median_px <= result.crossings.expected_px;
+  if (meets && guided_share && guided_share() > kMost) return result;
 
   const FrameCurves curves{families, graphs};
   RigRefinementOptions refinement;

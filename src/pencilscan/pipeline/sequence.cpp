@@ -22,6 +22,7 @@
 #include "pencilscan/pipeline/repeated_pictures.h"
 #include "pencilscan/pipeline/rig_refinement.h"
 #include "pencilscan/pipeline/run_folder.h"
+#include "pencilscan/pipeline/surface_chain.h"
 
 namespace pencilscan {
 namespace {
@@ -63,17 +64,38 @@ struct PictureHashes {
   std::string all;
 };
 
+bool tracks(const SequenceOptions& options) {
+  return options.tracks && options.meshes && options.shape.depth.enabled;
+}
+
 PictureHashes hashes_of(const FrameSource& frames, std::size_t frame) {
   PictureHashes hashes{frames.picture_hashes(frame), {}};
   hashes.all = hex(frames.hash(frame, hashes.of_cameras));
   return hashes;
 }
 
+/// Of the frames `own` and, where frames start from those before, of these; of the others nothing.
 std::vector<PictureHashes> picture_hashes(const FrameSource& frames,
-                                          const std::vector<std::size_t>& own) {
-  std::vector<PictureHashes> hashes(own.size());
-  parallel_for(own.size(), [&](std::size_t i) { hashes[i] = hashes_of(frames, own[i]); });
+                                          const std::vector<std::size_t>& own,
+                                          const SequenceOptions& options) {
+  std::vector<char> is_asked(frames.size(), 0);
+  for (const std::size_t i : own) {
+    const std::size_t first = tracks(options) ? first_of_chain(i) : i;
+    for (std::size_t k = first; k <= i; ++k) is_asked[k] = 1;
+  }
+  std::vector<PictureHashes> hashes(frames.size());
+  parallel_for(frames.size(), [&](std::size_t i) {
+    if (is_asked[i] != 0) hashes[i] = hashes_of(frames, i);
+  });
   return hashes;
+}
+
+/// What each frame's result depends on.
+std::vector<std::string> frame_keys(const std::vector<PictureHashes>& images,
+                                    const SequenceOptions& options) {
+  std::vector<std::string> keys;
+  for (const PictureHashes& of_frame : images) keys.push_back(of_frame.all);
+  return tracks(options) ? chain_keys(keys) : keys;
 }
 
 /// Warns of cameras that hung; of a shard's frames, within its chunks.
@@ -81,7 +103,7 @@ std::vector<std::string> repetitions(const Rig& rig, const FrameSource& frames,
                                      const std::vector<std::size_t>& own,
                                      const std::vector<PictureHashes>& images) {
   std::vector<std::vector<std::uint64_t>> of_frames(frames.size());
-  for (std::size_t i = 0; i < own.size(); ++i) of_frames[own[i]] = images[i].of_cameras;
+  for (const std::size_t i : own) of_frames[i] = images[i].of_cameras;
   std::vector<std::string> warnings;
   for (const RepeatedPicture& r : repeated_pictures(of_frames))
     warnings.push_back(
@@ -92,8 +114,7 @@ std::vector<std::string> repetitions(const Rig& rig, const FrameSource& frames,
 /// Decides which of the frames `own` are there already; refuses the output of other inputs.
 std::vector<char> resumable(const fs::path& out, const RunInputs& inputs,
                             const std::vector<std::size_t>& own,
-                            const std::vector<PictureHashes>& images,
-                            const SequenceOptions& options) {
+                            const std::vector<std::string>& keys, const SequenceOptions& options) {
   std::vector<char> done(own.size(), 0);
   if (is_new_run(out)) return done;
   const auto refuse = [&](const std::string& what) {
@@ -116,7 +137,7 @@ std::vector<char> resumable(const fs::path& out, const RunInputs& inputs,
   }
   for (std::size_t i = 0; i < own.size(); ++i) {
     const std::string& name = inputs.frames[own[i]];
-    const FrameState state = frame_status(out, name, inputs.settings(), images[i].all).state;
+    const FrameState state = frame_status(out, name, inputs.settings(), keys[own[i]]).state;
     if (state == FrameState::kOther) refuse("holds the output of other images in frame " + name);
     done[i] = state == FrameState::kDone ? 1 : 0;
   }
@@ -134,6 +155,12 @@ void check_images(const Rig& rig, const FrameSource& frames, const Progress& pro
     });
     tell_steps(progress, "checking: frame", first + count, frames.size());
   }
+}
+
+/// A frame that is there, or of the chunk before: its surface goes on, nothing is written.
+void pass_frame(const Rig& rig, const FrameSource& frames, std::size_t index,
+                const SequenceOptions& options) {
+  static_cast<void>(reconstruct_frame(rig, frames.read(rig, index), options.points, options.shape));
 }
 
 void write_frame(const Rig& rig, const FrameSource& frames, std::size_t index,
@@ -224,33 +251,47 @@ Rig refined_rig(const Rig& rig, const FrameSource& frames, const fs::path& out,
   return refinement.rig;
 }
 
-/// A frame into its folder, or why not.
-FrameOutcome frame_outcome(const Rig& rig, const FrameSource& frames, std::size_t index,
-                           const fs::path& out, const std::string& settings,
-                           const PictureHashes& images, const SequenceOptions& options) {
-  FrameOutcome outcome;
-  outcome.name = frames.name(index);
-  FrameFailure failure;
+/// What all frames of a run have in common.
+struct Run {
+  const Rig& rig;
+  const FrameSource& frames;
+  const fs::path& out;
+  std::string settings;
+  const std::vector<PictureHashes>& images;
+  const std::vector<std::string>& keys;
+};
+
+/// A frame into its folder, or why not; one that is not written just passes.
+std::optional<FrameFailure> make_frame(const Run& run, std::size_t index, bool is_written,
+                                       const SequenceOptions& options, FrameOutcome& outcome) {
   try {
-    FrameFolder folder(out, outcome.name, settings, images.all);
-    write_frame(rig, frames, index, images, folder.path(), options, outcome);
+    if (!is_written) {
+      pass_frame(run.rig, run.frames, index, options);
+      return std::nullopt;
+    }
+    FrameFolder folder(run.out, outcome.name, run.settings, run.keys[index]);
+    write_frame(run.rig, run.frames, index, run.images[index], folder.path(), options, outcome);
     folder.publish();
     outcome.done = true;
-    return outcome;
+    return std::nullopt;
   } catch (const InputError& error) {
-    failure = {error.what(), false};
+    return FrameFailure{error.what(), false};
   } catch (const NothingFound& error) {
-    failure = {error.what(), false};
+    return FrameFailure{error.what(), false};
   } catch (const std::exception& error) {
-    failure = {in_plain_words(error), true};
+    return FrameFailure{in_plain_words(error), true};
   }
+}
+
+/// A failure into the frame's folder.
+void note_failure(const Run& run, std::size_t index, const FrameFailure& failure,
+                  FrameOutcome& outcome) {
   outcome.failure = failure.reason;
   try {
-    write_failure(out, outcome.name, settings, images.all, failure);
+    write_failure(run.out, outcome.name, run.settings, run.keys[index], failure);
   } catch (const std::exception&) {
     // What keeps the reason from being written is the reason.
   }
-  return outcome;
 }
 
 /// Tells how far the frames are, from any of the threads that make them.
@@ -285,6 +326,46 @@ class FrameProgress {
   std::size_t done_ = 0;
 };
 
+/// All frames that are not there, several at once.
+std::vector<FrameOutcome> make_frames(const Run& run, const std::vector<std::size_t>& own,
+                                      const std::vector<char>& there,
+                                      const SequenceOptions& options, const Progress& progress) {
+  std::vector<FrameOutcome> outcomes(own.size());
+  std::vector<std::size_t> outcome_of(run.frames.size(), own.size());
+  std::vector<std::size_t> missing;
+  FrameProgress frame_progress(progress, own.size());
+  for (std::size_t i = 0; i < own.size(); ++i) {
+    outcomes[i].name = run.frames.name(own[i]);
+    outcomes[i].done = outcomes[i].resumed = there[i] != 0;
+    outcome_of[own[i]] = i;
+    if (there[i] != 0) frame_progress.done(outcomes[i].name);
+    if (there[i] == 0) missing.push_back(own[i]);
+  }
+  const auto make = [&](std::size_t index, bool is_written, const SequenceOptions& how) {
+    FrameOutcome passed;
+    FrameOutcome& outcome = is_written ? outcomes[outcome_of[index]] : passed;
+    const auto failure = make_frame(run, index, is_written, how, outcome);
+    if (failure && is_written) note_failure(run, index, *failure, outcome);
+    if (is_written) frame_progress.done(outcome.name);
+    return failure && failure->is_passing;
+  };
+  if (!tracks(options)) {
+    run_at_once(missing.size(), frames_at_once(run.rig), [&](std::size_t i) {
+      make(missing[i], true, frame_progress.with_stages(options, outcome_of[missing[i]]));
+    });
+    return outcomes;
+  }
+  SurfaceChain chain(run.out, run.frames.names(), run.keys, own, there);
+  run_at_once(chain.steps().size(), frames_at_once(run.rig), [&](std::size_t k) {
+    const ChainStep& step = chain.steps()[k];
+    SequenceOptions linked =
+        frame_progress.with_stages(options, std::min(outcome_of[step.frame], own.size() - 1));
+    linked.shape = chain.linked(std::move(linked.shape), k);
+    chain.end(k, make(step.frame, step.is_written, linked));
+  });
+  return outcomes;
+}
+
 }  // namespace
 
 std::size_t frames_at_once(const Rig& rig) {
@@ -314,8 +395,9 @@ SequenceOutcome reconstruct_sequence(const fs::path& rig_path, const fs::path& f
   if (!options.shard) check_images(rig, frames, progress);
   const std::vector<std::size_t> own = options.shard.value_or(Shard{}).frames_of(frames.size());
   const RunInputs inputs = describe_inputs(rig_path, frames, options);
-  const std::vector<PictureHashes> images = picture_hashes(frames, own);
-  const std::vector<char> there = resumable(out, inputs, own, images, options);
+  const std::vector<PictureHashes> images = picture_hashes(frames, own, options);
+  const std::vector<std::string> keys = frame_keys(images, options);
+  const std::vector<char> there = resumable(out, inputs, own, keys, options);
 
   // From here on the output may change. What is to be made anew goes first.
   for (std::size_t i = 0; i < own.size(); ++i) {
@@ -332,19 +414,8 @@ SequenceOutcome reconstruct_sequence(const fs::path& rig_path, const fs::path& f
     rig = refined_rig(rig, frames, out, options, progress, result.refinement.emplace());
   // The rig in use, so that the output can be looked at without its input.
   if (!is_output_file(rig_path, out / kDevicesFile)) write_rig(rig, out / kDevicesFile);
-  result.frames.resize(own.size());
-  FrameProgress frame_progress(progress, own.size());
-  run_at_once(own.size(), frames_at_once(rig), [&](std::size_t i) {
-    FrameOutcome& outcome = result.frames[i];
-    if (there[i] != 0) {
-      outcome.name = frames.name(own[i]);
-      outcome.done = outcome.resumed = true;
-    } else {
-      outcome = frame_outcome(rig, frames, own[i], out, inputs.settings(), images[i],
-                              frame_progress.with_stages(options, i));
-    }
-    frame_progress.done(frames.name(own[i]));
-  });
+  const Run run{rig, frames, out, inputs.settings(), images, keys};
+  result.frames = make_frames(run, own, there, options, progress);
   return result;
 }
 

@@ -17,7 +17,8 @@ struct SequenceOptions {
   ShapeOptions shape;
   std::filesystem::path plain_frames;  ///< the same moments without patterns, for colour; or empty
   bool refine_rig = false;             ///< correct the poses of the devices from the frames first
-  bool meshes = true;                  ///< false: points.ply and curves.ply alone, much faster
+  bool tracks = false;  ///< each frame's surface starts from that of the frame before
+  bool meshes = true;   ///< false: points.ply and curves.ply alone, much faster
   bool pictures = true;
   bool depth_maps = false;                ///< depth/ and sigma/ of every camera
   std::vector<std::string> mesh_formats;  ///< of obj, stl, glb: the closed mesh once more

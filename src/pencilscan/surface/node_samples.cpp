@@ -9,7 +9,7 @@
 namespace pencilscan {
 
 std::vector<SurfaceSample> node_samples(const Rig& rig, std::span<const DepthMap> maps,
-                                         double& spacing) {
+                                        double& spacing) {
   constexpr double kLeastCosine = 0.7;  // stretches the spacing of grazing nodes no further
   constexpr double kLeastSigma = 0.01;  // footprints; keeps one node from ruling its neighbours
   std::vector<SurfaceSample> samples;

@@ -209,27 +209,31 @@ SurfaceResult close_depth(const Rig& rig, std::span<const DepthMap> maps,
   return result;
 }
 
-void follow_depth(const Rig& rig, std::span<const MeasuredPoint> points,
-                  std::span<const DepthMap> maps, const FusionOptions& options,
+void follow_depth(const Rig& rig, std::span<const DepthMap> maps, const FusionOptions& options,
                   SurfaceResult& result) {
   const Stopwatch watch;
   SurfaceReport& report = result.report;
-  report.points = points.size();
-  result.used.assign(points.size(), 0);
-  if (report.status == SurfaceStatus::kTooFewPoints) return;
+  if (report.status == SurfaceStatus::kTooFewPoints || result.mesh.faces.empty()) return;
   std::vector<SurfaceSample> samples = node_samples(rig, maps, report.spacing_mm);
-  const double spacing = report.spacing_mm;
   report.samples = report.samples_used = samples.size();
+  fit_local_surfaces(samples, options.fit_spacings * report.spacing_mm);
+  for (int i = 0; i < options.subdivisions; ++i) result.mesh = subdivided(result.mesh);
+  const std::vector<Vec3> closed = result.mesh.vertices;
+  follow_nodes(rig, maps, options.follow, result.mesh);
+  report.self_intersections = untangle(closed, result.mesh);
+  attribute_vertices(samples, options.reach_spacings, report.spacing_mm, result.mesh);
+  report.seconds += watch.seconds();
+}
+
+void finish_surface(const Rig& rig, std::span<const MeasuredPoint> points,
+                    std::span<const DepthMap> maps, const FusionOptions& options,
+                    SurfaceResult& result) {
+  const Stopwatch watch;
+  SurfaceReport& report = result.report;
+  report.points = points.size();
+  const double spacing = report.spacing_mm;
   result.used = points_on_maps(rig, points, maps, spacing);
   for (const char used : result.used) report.points_used += static_cast<std::size_t>(used);
-  fit_local_surfaces(samples, options.fit_spacings * spacing);
-  if (!result.mesh.faces.empty()) {
-    for (int i = 0; i < options.subdivisions; ++i) result.mesh = subdivided(result.mesh);
-    const std::vector<Vec3> closed = result.mesh.vertices;
-    follow_nodes(rig, maps, options.follow, result.mesh);
-    report.self_intersections = untangle(closed, result.mesh);
-    attribute_vertices(samples, options.reach_spacings, spacing, result.mesh);
-  }
   result.measured = measured_part(result.mesh, options.least_island_spacings2 * spacing * spacing);
   note_quality(surface_area(result.mesh), result);
   report.seconds += watch.seconds();

@@ -101,11 +101,15 @@ struct FusionOptions {
                                         std::span<const Silhouette> silhouettes = {});
 
 /// The triangles of a closed surface are cut finer and follow the nodes' quadrics where there is
-/// depth (node_surface.h). `points` only learn whether the surface bears them out. Nothing to do
-/// where the status is kTooFewPoints.
-void follow_depth(const Rig& rig, std::span<const MeasuredPoint> points,
-                  std::span<const DepthMap> maps, const FusionOptions& options,
+/// depth (node_surface.h). Nothing to do where the status is kTooFewPoints.
+void follow_depth(const Rig& rig, std::span<const DepthMap> maps, const FusionOptions& options,
                   SurfaceResult& result);
+
+/// The measured part of a surface that followed the depth, its quality, and which `points` it bears
+/// out.
+void finish_surface(const Rig& rig, std::span<const MeasuredPoint> points,
+                    std::span<const DepthMap> maps, const FusionOptions& options,
+                    SurfaceResult& result);
 
 [[nodiscard]] std::string to_string(SurfaceStatus status);
 

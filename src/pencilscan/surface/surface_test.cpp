@@ -350,7 +350,8 @@ TEST(SelfIntersections, AreTakenBackAndNothingElse) {
 SurfaceResult surface_of(const Rig& rig, std::span<const MeasuredPoint> points,
                          std::span<const DepthMap> maps, const FusionOptions& options = {}) {
   SurfaceResult result = close_depth(rig, maps, options);
-  follow_depth(rig, points, maps, options, result);
+  follow_depth(rig, maps, options, result);
+  finish_surface(rig, points, maps, options, result);
   return result;
 }
 

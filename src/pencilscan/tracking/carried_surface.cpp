@@ -67,8 +67,7 @@ double roundness(const TriangleMesh& mesh, const std::array<int, 3>& face) {
   const Vec3& a = mesh.vertices[static_cast<std::size_t>(face[0])];
   const Vec3& b = mesh.vertices[static_cast<std::size_t>(face[1])];
   const Vec3& c = mesh.vertices[static_cast<std::size_t>(face[2])];
-  const double squares =
-      (b - a).squaredNorm() + (c - b).squaredNorm() + (a - c).squaredNorm();
+  const double squares = (b - a).squaredNorm() + (c - b).squaredNorm() + (a - c).squaredNorm();
   return squares > 0 ? 2 * std::sqrt(3.0) * (b - a).cross(c - a).norm() / squares : 0;
 }
 
@@ -114,10 +113,9 @@ SurfaceFit surface_fit(const Rig& rig, std::span<const DepthMap> maps, const Tri
                                       [](float confidence) { return !(confidence > 0); });
   fit.invented = static_cast<double>(invented) / static_cast<double>(mesh.confidence.size());
   constexpr double kSliver = 0.2;
-  const auto slivers =
-      std::count_if(mesh.faces.begin(), mesh.faces.end(), [&](const std::array<int, 3>& face) {
-        return roundness(mesh, face) < kSliver;
-      });
+  const auto slivers = std::count_if(
+      mesh.faces.begin(), mesh.faces.end(),
+      [&](const std::array<int, 3>& face) { return roundness(mesh, face) < kSliver; });
   fit.slivers = static_cast<double>(slivers) / static_cast<double>(mesh.faces.size());
   return fit;
 }
@@ -136,9 +134,10 @@ std::optional<CarriedSurface> carry_surface(const Rig& rig, std::span<const Dept
   TriangleMesh& mesh = result.surface.mesh;
   mesh = before.coarse();
   const std::vector<Vec3> then = mesh.vertices;
-  Registration registration =
-      register_surface(mesh, samples, report.spacing_mm, before.motion);
+  Registration registration = register_surface(mesh, samples, report.spacing_mm, before.motion);
   result.motion = registration.motion;
+  for (std::size_t v = 0; v < then.size(); ++v)
+    result.traveled.push_back(static_cast<float>((registration.vertices[v] - then[v]).norm()));
   mesh.vertices = std::move(registration.vertices);
   relax(mesh);
   FollowOptions wide = options.follow;

@@ -2,6 +2,7 @@
 
 #include <optional>
 #include <span>
+#include <vector>
 
 #include "pencilscan/depth/depth_map.h"
 #include "pencilscan/rig/rig.h"
@@ -14,7 +15,8 @@ namespace pencilscan {
 /// A closed surface that came from the moment before.
 struct CarriedSurface {
   SurfaceResult surface;
-  RigidTransform motion;  ///< since then
+  RigidTransform motion;        ///< since then
+  std::vector<float> traveled;  ///< how far each vertex has come, along the surface too; footprints
 };
 
 /// How a closed mesh, as coarse as the octree and with confidences, fits the depth maps.
@@ -25,8 +27,10 @@ struct CarriedSurface {
 /// close_depth() gives, without making it from nothing. Nothing where it does not fit as one that
 /// is made from nothing did: where nodes lie together off it, where more of it is invented, or its
 /// triangles have become flat. So a jump, a new part or one that has gone is seen from nothing.
-[[nodiscard]] std::optional<CarriedSurface> carry_surface(
-    const Rig& rig, std::span<const DepthMap> maps, const TrackedSurface& before,
-    const FusionOptions& options, std::span<const Silhouette> silhouettes);
+[[nodiscard]] std::optional<CarriedSurface> carry_surface(const Rig& rig,
+                                                          std::span<const DepthMap> maps,
+                                                          const TrackedSurface& before,
+                                                          const FusionOptions& options,
+                                                          std::span<const Silhouette> silhouettes);
 
 }  // namespace pencilscan

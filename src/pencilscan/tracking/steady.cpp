@@ -10,6 +10,10 @@
 namespace pencilscan {
 namespace {
 
+/// Share of the variance of a vertex's move that the mean over those around it keeps: their windows
+/// overlap.
+constexpr double kSharedNoise = 0.1;
+
 /// The surface of the moment before, along a vertex's normal.
 struct Earlier {
   double gap = 0;       ///< from the vertex to it
@@ -46,6 +50,21 @@ std::vector<double> spread(const TriangleMesh& mesh, std::vector<double> values,
   return values;
 }
 
+/// How far each vertex has come; those between the first ones as far as the farther of their ends.
+std::vector<double> spread_travel(const TriangleMesh& mesh, std::span<const float> traveled) {
+  std::vector<double> far(mesh.vertices.size(), 0.0);
+  std::copy(traveled.begin(), traveled.end(), far.begin());
+  for (const auto& face : mesh.faces) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      const auto a = static_cast<std::size_t>(face[k]);
+      const auto b = static_cast<std::size_t>(face[(k + 1) % 3]);
+      if (a >= traveled.size() && b < traveled.size())
+        far[a] = std::max(far[a], static_cast<double>(traveled[b]));
+    }
+  }
+  return far;
+}
+
 Earlier earlier_at(const RayScene& scene, const TrackedSurface& before, const Vec3& x,
                    const Vec3& normal, double sigma) {
   constexpr double kFarthest = 6;  // deviations
@@ -57,8 +76,8 @@ Earlier earlier_at(const RayScene& scene, const TrackedSurface& before, const Ve
   for (std::size_t k = 0; k < 3; ++k) {
     const auto v = static_cast<std::size_t>(before.mesh.faces[hit->face][k]);
     if (!(before.variance[v] > 0)) return result;
-    variance += hit->barycentric[static_cast<Eigen::Index>(k)] *
-                static_cast<double>(before.variance[v]);
+    variance +=
+        hit->barycentric[static_cast<Eigen::Index>(k)] * static_cast<double>(before.variance[v]);
   }
   result.gap = reach - hit->distance;
   result.variance = variance;
@@ -75,7 +94,8 @@ std::vector<float> first_variance(const TriangleMesh& mesh) {
   return variance;
 }
 
-std::vector<float> steady_surface(const TrackedSurface& before, TriangleMesh& mesh) {
+std::vector<float> steady_surface(const TrackedSurface& before, std::span<const float> traveled,
+                                  TriangleMesh& mesh) {
   const std::vector<Vec3> normals = vertex_normals(mesh);
   std::vector<float> variance = first_variance(mesh);
   const std::size_t count = variance.size();
@@ -83,8 +103,8 @@ std::vector<float> steady_surface(const TrackedSurface& before, TriangleMesh& me
   const RayScene scene(before.mesh);
   parallel_chunks(count, [&](std::size_t v) {
     if (!(variance[v] > 0) || !(normals[v].squaredNorm() > 0.5)) return;
-    earlier[v] = earlier_at(scene, before, mesh.vertices[v], normals[v],
-                            static_cast<double>(mesh.sigma[v]));
+    earlier[v] =
+        earlier_at(scene, before, mesh.vertices[v], normals[v], static_cast<double>(mesh.sigma[v]));
   });
   std::vector<double> gaps(count, 0.0);
   std::vector<double> weights(count, 0.0);
@@ -95,11 +115,13 @@ std::vector<float> steady_surface(const TrackedSurface& before, TriangleMesh& me
     gaps[v] = earlier[v].variance > 0 ? earlier[v].gap : 6 * static_cast<double>(mesh.sigma[v]);
   }
   const std::vector<double> together = spread(mesh, gaps, weights);
+  const std::vector<double> far = spread_travel(mesh, traveled);
   constexpr double kLeastGain = 1.0 / (kMemoryMoments + 1);
   parallel_chunks(count, [&](std::size_t v) {
     if (!(earlier[v].variance > 0)) return;
     const auto now = static_cast<double>(variance[v]);
-    const double motion = std::max(0.0, together[v] * together[v] - 0.1 * (now + earlier[v].variance));
+    const double noise = kSharedNoise * (now + earlier[v].variance);
+    const double motion = std::max(together[v] * together[v] - noise, far[v] * far[v]);
     const double predicted = earlier[v].variance + motion;
     const double gain = std::max(kLeastGain, predicted / (predicted + now));
     mesh.vertices[v] += (1 - gain) * earlier[v].gap * normals[v];

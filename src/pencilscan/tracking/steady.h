@@ -1,5 +1,6 @@
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include "pencilscan/geometry/mesh.h"
@@ -13,10 +14,14 @@ constexpr int kMemoryMoments = 4;
 
 /// Where a surface rests, its noise is not its motion. Each measured vertex moves along its normal
 /// towards where the moment before has the surface: a Kalman filter with one state, its place
-/// (R. Kalman, A new approach to linear filtering and prediction problems, 1960), whose process
-/// noise is what the vertices around moved together beyond their noise. What moves is left alone.
-/// Returns the variance of each vertex's place (0: not measured) for the next moment.
-[[nodiscard]] std::vector<float> steady_surface(const TrackedSurface& before, TriangleMesh& mesh);
+/// (R. Kalman, A new approach to linear filtering and prediction problems, 1960). Its process noise
+/// is how far the vertex has come, along the surface too (`traveled`, of the first vertices; those
+/// between them as far as these), and how far the vertices around it moved together beyond their
+/// noise. What moves is left alone. Returns the variance of each vertex's place (0: not measured)
+/// for the next moment.
+[[nodiscard]] std::vector<float> steady_surface(const TrackedSurface& before,
+                                                std::span<const float> traveled,
+                                                TriangleMesh& mesh);
 
 /// The variances of a surface without a moment before.
 [[nodiscard]] std::vector<float> first_variance(const TriangleMesh& mesh);

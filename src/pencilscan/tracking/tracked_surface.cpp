@@ -32,9 +32,8 @@ std::vector<T> unpacked(const json& value) {
 
 bool has_faces_of(const std::vector<std::array<int, 3>>& faces, std::size_t vertices) {
   return std::all_of(faces.begin(), faces.end(), [&](const std::array<int, 3>& face) {
-    return std::all_of(face.begin(), face.end(), [&](int v) {
-      return v >= 0 && static_cast<std::size_t>(v) < vertices;
-    });
+    return std::all_of(face.begin(), face.end(),
+                       [&](int v) { return v >= 0 && static_cast<std::size_t>(v) < vertices; });
   });
 }
 
