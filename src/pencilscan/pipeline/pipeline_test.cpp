@@ -496,6 +496,48 @@ TEST_F(PipelineTest, AFrameWhosePicturesChangeMeanwhileIsAFailedOneAndIsMadeAnew
   EXPECT_TRUE(again.done) << again.failure;
 }
 
+TEST_F(PipelineTest, TrackedFramesGoOnFromWhereAKilledProgramWas) {
+  // The ball rests, and then is a smaller one elsewhere.
+  const fs::path frames = *folder_ / "tracked";
+  const Frame jumped = render_frame(*rig_, make_sphere(50, 48, {40, 0, 0}));
+  const auto add_frame = [&](const std::string& name, const Frame& frame, double gain) {
+    for (std::size_t c = 0; c < 2; ++c)
+      write_image(frames / name / (rig_->cameras[c].name + ".png"), frame.images[c] * gain, 16);
+  };
+  SequenceOptions options = quick();
+  const fs::path whole = *folder_ / "out_tracked";
+  const fs::path parts = *folder_ / "out_tracked_parts";
+  const fs::path alone = *folder_ / "out_tracked_alone";
+  add_frame("000000", *frame_, 1);
+  add_frame("000001", *frame_, 0.99);
+  options.tracks = true;
+  ASSERT_EQ(run(frames, parts, options).size(), 2U);
+  add_frame("000002", *frame_, 0.98);
+  add_frame("000003", jumped, 1);
+  for (const FrameOutcome& outcome : run(frames, parts, options))
+    EXPECT_TRUE(outcome.done) << outcome.failure;
+  fs::remove_all(parts / "000001");  // its surface decides the next one's, too
+  EXPECT_TRUE(run(frames, parts, options)[1].done);
+  static_cast<void>(run(frames, whole, options));
+  options.tracks = false;
+  static_cast<void>(run(frames, alone, options));
+
+  const auto mesh = [](const fs::path& out, const std::string& frame) {
+    return read_file(out / frame / "mesh.ply");
+  };
+  const auto age = [&](const std::string& frame) {
+    return read_json(whole / frame / "report.json").at("surface").at("carried_since").get<int>();
+  };
+  for (const std::string frame : {"000000", "000001", "000002", "000003"})
+    EXPECT_TRUE(mesh(whole, frame) == mesh(parts, frame)) << frame;
+  EXPECT_EQ(age("000002"), 2);
+  EXPECT_FALSE(mesh(whole, "000001") == mesh(alone, "000001"));
+  // What is not where it was is made from nothing: the bytes are those of a frame alone.
+  EXPECT_EQ(age("000003"), 0);
+  EXPECT_TRUE(mesh(whole, "000003") == mesh(alone, "000003"));
+  EXPECT_FALSE(fs::exists(whole / ".surfaces"));
+}
+
 /// Expects an InputError whose line has all the given parts, and no output.
 void expect_refused(const fs::path& rig, const fs::path& frames,
                     const std::vector<std::string>& parts) {
