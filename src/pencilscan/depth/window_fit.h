@@ -48,16 +48,20 @@ struct WindowFit {
 };
 
 /// Fits inverse depth to the image of a circular window by Gauss-Newton. The image of family f is
-///   I_f = o_f + (1 + e_f . (dx, dy)) * sum over its lit patterns k of A_k P(l_k(dx, dy, w)),
+///   I_f = o_f + (1 + e_f . (x, y)) * sum over its lit patterns k of A_k P(l_k(dx, dy, w)),
 /// P: box of the line's width blurred by a bell of standard deviation s_k (lines), to which camera
 /// blur contributes blur_px * |grad l_k|. The bell is the triweight kernel (1 - u^2)^3, whose
-/// integral is a polynomial. e_f takes the slope of albedo and shading.
+/// integral is a polynomial. e_f takes the slope of albedo and shading. Least are the squares over
+/// the noise's variance, weighted by 1 - (x^2 + y^2) / 2, with weak priors on e_f (0.3) and on the
+/// quadric's bow (6 footprints). The blur follows the slope of w between steps.
 class WindowFitter {
  public:
   /// half: radius, px, in [2, 10].
   WindowFitter(const CameraLight& light, int half);
 
-  /// Nothing where the window leaves the image, is saturated or shows no line that fits.
+  /// Nothing where the window leaves the image, is saturated or shows no line that fits. It rests
+  /// as soon as the middle's depth does: slopes may be a hundredth of a line over the window off
+  /// then.
   [[nodiscard]] std::optional<WindowFit> fit(const Vec2& pixel, const Quadric& start, int rounds);
   /// Mean image value and variance of the residuals of a family, of the last window that did fit.
   [[nodiscard]] float family_mean(std::size_t family) const { return mean_[family]; }

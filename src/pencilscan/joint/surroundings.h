@@ -7,8 +7,9 @@
 namespace pencilscan {
 
 /// What the pieces around one in the same image say of its labels: surfaces are mostly smooth, so
-/// that a label whose depth differs little from theirs gains. Curves that cross it are left out:
-/// crossings say that better.
+/// that a label whose depth differs little from theirs gains. That are the nearest six pieces of
+/// other curves within 16 px of its middle, by every second of their points. Curves that cross it
+/// are left out: crossings say that better.
 class Surroundings {
  public:
   Surroundings(const Camera& camera, const GridGraph& graph, const LabelledPieces& pieces);
