@@ -6,6 +6,7 @@
 
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/core/random.h"
+#include "pencilscan/geometry/as_floats.h"
 #include "pencilscan/geometry/ray_scene.h"
 
 namespace pencilscan {
@@ -51,6 +52,16 @@ TEST(RayScene, LeavesThreadsToOthersWhileItLives) {
   const int before = thread_count();
   const RayScene scene(make_sphere(10));
   EXPECT_EQ(thread_count(), before);
+}
+
+TEST(AsFloats, RoundsEveryCoordinate) {
+  std::vector<Vec3> points(100, Vec3(0.1, 0.3, 0.7));
+  for (Vec3& x : points) x = as_floats(x);
+  for (const Vec3& x : points) {
+    EXPECT_EQ(x[0], 0x1.99999ap-4);
+    EXPECT_EQ(x[1], 0x1.333334p-2);
+    EXPECT_EQ(x[2], 0x1.666666p-1);
+  }
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/lower_case.h"
+#include "pencilscan/geometry/as_floats.h"
 #include "pencilscan/io/file.h"
 #include "pencilscan/io/little_endian.h"
 #include "pencilscan/io/mesh_file.h"
@@ -69,7 +70,7 @@ std::string glb_bytes(const TriangleMesh& mesh) {
   Vec3 low = Vec3::Constant(1e30);
   Vec3 high = -low;
   for (const Vec3& v : mesh.vertices) {
-    const Vec3 p = gltf_position(v).cast<float>().cast<double>();
+    const Vec3 p = as_floats(gltf_position(v));
     low = low.cwiseMin(p);
     high = high.cwiseMax(p);
     append_vector(data, p);

@@ -231,6 +231,8 @@ void finish_surface(const Rig& rig, std::span<const MeasuredPoint> points,
   const Stopwatch watch;
   SurfaceReport& report = result.report;
   report.points = points.size();
+  result.used.assign(points.size(), 0);
+  if (report.status == SurfaceStatus::kTooFewPoints) return;
   const double spacing = report.spacing_mm;
   result.used = points_on_maps(rig, points, maps, spacing);
   for (const char used : result.used) report.points_used += static_cast<std::size_t>(used);

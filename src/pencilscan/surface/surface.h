@@ -106,7 +106,7 @@ void follow_depth(const Rig& rig, std::span<const DepthMap> maps, const FusionOp
                   SurfaceResult& result);
 
 /// The measured part of a surface that followed the depth, its quality, and which `points` it bears
-/// out.
+/// out. None of it where the status is kTooFewPoints.
 void finish_surface(const Rig& rig, std::span<const MeasuredPoint> points,
                     std::span<const DepthMap> maps, const FusionOptions& options,
                     SurfaceResult& result);

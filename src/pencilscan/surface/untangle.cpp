@@ -9,6 +9,7 @@
 
 #include "pencilscan/core/check.h"
 #include "pencilscan/core/parallel.h"
+#include "pencilscan/geometry/as_floats.h"
 #include "pencilscan/surface/mesh_parts.h"
 
 namespace pencilscan {
@@ -213,8 +214,7 @@ std::size_t untangle(std::span<const Vec3> before, TriangleMesh& mesh) {
   constexpr int kRounds = 12;
   constexpr int kFarthest = 1 + (kRounds - kSmoothings) / 2;  // edges around faces
   PENCILSCAN_CHECK(before.size() == mesh.vertices.size());
-  const auto as_in_files = [](Vec3& x) { x = x.cast<float>().cast<double>(); };
-  for (Vec3& x : mesh.vertices) as_in_files(x);
+  for (Vec3& x : mesh.vertices) x = as_floats(x);
   std::vector<std::size_t> faces = self_intersections(mesh);
   if (faces.empty()) return 0;
   TriangleMesh near;  // fewer and fewer faces: those around what is left
@@ -228,7 +228,7 @@ std::size_t untangle(std::span<const Vec3> before, TriangleMesh& mesh) {
     for (std::size_t v = 0; v < marked.size(); ++v) {
       if (marked[v] == 0) continue;
       if (round >= kSmoothings) near.vertices[v] = 0.5 * (before[v] + near.vertices[v]);
-      as_in_files(near.vertices[v]);
+      near.vertices[v] = as_floats(near.vertices[v]);
     }
     faces = self_intersections(near);
   }

@@ -5,6 +5,7 @@
 #include <filesystem>
 
 #include "pencilscan/core/random.h"
+#include "pencilscan/geometry/as_floats.h"
 #include "pencilscan/io/file.h"
 #include "pencilscan/tracking/registration.h"
 #include "pencilscan/tracking/steady.h"
@@ -163,7 +164,7 @@ TEST(TrackedSurfaceFile, GivesBackTheSameOrNothing) {
       fs::temp_directory_path() / ("tracked_surface_" + std::to_string(::getpid()));
   Random random(5);
   TriangleMesh mesh = noisy(random, 0.1);
-  for (Vec3& x : mesh.vertices) x = x.cast<float>().cast<double>();
+  for (Vec3& x : mesh.vertices) x = as_floats(x);
   TrackedSurface surface = tracked(mesh, first_variance(mesh));
   surface.motion.translation = {1, 2, 3.25};
   surface.fit = {12, 0.25, 0.125};
