@@ -94,10 +94,12 @@ void relax(TriangleMesh& mesh) {
 
 /// True where a carried surface is as good as one that was made from nothing.
 bool is_as_good(const SurfaceFit& carried, const SurfaceFit& made) {
-  // Counts scatter by their root; a new part of some nodes is more than three of it.
+  // Windows overlap, so that what is off is off by patches of so many nodes; the number of patches
+  // scatters by its root. A new part is more than three of it.
   constexpr double kScatter = 3;
+  constexpr double kPatch = 9;
   constexpr double kShare = 0.02;  // of the surface: what turning brings to light and hides
-  const double most = made.unexplained + kScatter * std::sqrt(made.unexplained + 1);
+  const double most = made.unexplained + kScatter * std::sqrt(kPatch * (made.unexplained + kPatch));
   return carried.unexplained <= most && carried.invented <= made.invented + kShare &&
          carried.slivers <= made.slivers + kShare;
 }
