@@ -61,15 +61,20 @@ std::vector<std::vector<cv::Mat>> presence_images(std::span<const CameraDetectio
   return presence;
 }
 
-/// The share of the curves' points with a name after a second look.
+/// The share of a camera's curve points with a name after a second look, least of all cameras: one
+/// that stands elsewhere has few, and says nothing where it has none.
 double guided_share(const Rig& rig, const PointOptions& options, const PointResult& result) {
   std::vector<GridGraph> graphs = result.graphs;
   Labeling labeling = result.labeling;
   second_look(rig, result.families, presence_images(result.detections), graphs, labeling,
               options.second_look);
-  std::size_t points = 0;
-  for (const GridGraph& graph : graphs) points += curve_points(graph);
-  return static_cast<double>(labelled_points(labeling)) / static_cast<double>(points);
+  double least = 1;
+  for (std::size_t c = 0; c < graphs.size(); ++c) {
+    const auto points = static_cast<double>(curve_points(graphs[c]));
+    if (points > 0)
+      least = std::min(least, static_cast<double>(labelled_points(labeling.runs[c])) / points);
+  }
+  return least;
 }
 
 /// Gives the curves their lines. Methods that correct the rig first leave out pictures that do not

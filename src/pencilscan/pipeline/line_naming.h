@@ -21,9 +21,10 @@ struct LineNaming {
 /// gave with the rig as given. Where their crossings then miss each other, or many curves stay
 /// without a name, with the rig as the crossings correct it (refine_rig_on_frames), if its own
 /// crossings agree, or agree better, or clearly more curves have a name. Where crossings meet as
-/// closely as noise lets expect, and most curves have a name once the surface of the others has
-/// guided them (`guided_share`, of their points, asked only then; nobody to ask: none has), the rig
-/// is not doubted: curves that are close together wait for their surface.
+/// closely as noise lets expect, and most curves of every camera have a name once the surface of
+/// the others has guided them (`guided_share`: of the points of the camera that has fewest, asked
+/// only then; nobody to ask: none has), the rig is not doubted: curves that are close together wait
+/// for their surface.
 [[nodiscard]] LineNaming name_lines(const Rig& rig, const std::vector<ColorFamily>& families,
                                     const std::vector<GridGraph>& graphs, Labeling labeling,
                                     const PointOptions& options,
