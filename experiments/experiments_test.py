@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+import acceptance
 import common
 import fig7_hand
 import heldout
@@ -200,6 +201,47 @@ class HeldOutTest(unittest.TestCase):
         self.assertAlmostEqual(np.linalg.norm(vertices - [10, 0, 0], axis=1).max(), 0.95 * 170, places=6)
         vertices, _ = heldout.placed(heldout.SPLITS["held"]["person"], 1, {"center": [0, 0, 0], "radius": 950})
         self.assertAlmostEqual(np.ptp(vertices[:, 2]), 1702, delta=15)
+
+
+class AcceptanceTest(unittest.TestCase):
+    def test_artefacts_have_their_size_and_lie_in_the_volume(self):
+        for position in range(acceptance.POSITIONS):
+            turn, place = acceptance.pose(position)
+            np.testing.assert_allclose(turn @ turn.T, np.eye(3), atol=1e-12)
+            self.assertGreater(np.linalg.det(turn), 0)
+            for make, _, _ in acceptance.ARTEFACTS.values():
+                vertices, _ = make(turn, place)
+                self.assertLess(np.linalg.norm(vertices, axis=1).max(), 160)
+        vertices, _ = acceptance.sphere(turn, place)
+        np.testing.assert_allclose(np.linalg.norm(vertices - place, axis=1), acceptance.DIAMETER / 2, rtol=1e-6)
+        vertices, _ = acceptance.ball_bar(turn, place)
+        along = ((vertices - place) @ turn)[:, 1]
+        self.assertAlmostEqual(np.ptp(along), acceptance.LENGTH + acceptance.BALL, places=3)
+        vertices, _ = acceptance.plate(turn, place)
+        np.testing.assert_allclose(np.ptp((vertices - place) @ turn, axis=0), [10, 160, 120])
+
+    def test_speeds_go_from_10_to_500_mm_a_second(self):
+        speeds = [np.linalg.norm(acceptance.velocity(k)) for k in range(acceptance.POSITIONS)]
+        self.assertAlmostEqual(speeds[0], 10)
+        self.assertAlmostEqual(speeds[-1], 500)
+
+    def test_the_worst_is_the_greatest_by_size_and_a_position_without_a_figure_counts(self):
+        with tempfile.TemporaryDirectory() as folder:
+            rows = common.Rows(Path(folder) / "r.csv", ["position"], ["SD_mm"])
+            rows.add(position=0, SD_mm=0.01)
+            rows.add(position=1, SD_mm=-0.03)
+            self.assertAlmostEqual(acceptance.worst(rows, "SD_mm"), 0.03)
+            rows.add(position=2)
+            self.assertTrue(np.isnan(acceptance.worst(rows, "SD_mm")))
+
+    def test_two_balls_count_with_their_points(self):
+        def ball(count, below):
+            return {"left_out": 2, "z": {"count": count, "below_1": below, "below_2": below, "below_3": 1.0,
+                                         "rms": 1.0, "greatest": count}}
+        row = acceptance.figures_of({"worst": {"SD_mm": -0.1, "points": 5, "coverage": 0.5},
+                                     "positions": [{"balls": [ball(300, 0.6), ball(100, 0.8)]}]})
+        self.assertAlmostEqual(row["z_below_1"], 0.65)
+        self.assertEqual((row["SD_mm"], row["z_count"], row["left_out"]), (-0.1, 400, 4))
 
 
 class FilesTest(unittest.TestCase):

@@ -38,6 +38,8 @@ struct SimulateOptions {
   int frame_count = 1;
   double rotate_deg = 0;
   std::vector<double> translate_mm = {0, 0, 0};
+  std::vector<double> speed_mm_s = {0, 0, 0};
+  double exposure_ms = 1;
 
   bool gray_code = false;
   bool color_captures = false;
@@ -123,16 +125,19 @@ void write_truth_maps(const fs::path& folder, const Rig& rig, std::size_t c,
   }
 }
 
+Vec3 vector_of(const std::vector<double>& three) { return {three[0], three[1], three[2]}; }
+
 void write_frames(const SimulateOptions& options, const Rig& rig, const TriangleMesh& mesh,
                   const Progress& progress) {
   const fs::path out(options.out);
-  const Motion motion{
-      options.rotate_deg * M_PI / 180,
-      Vec3(options.translate_mm[0], options.translate_mm[1], options.translate_mm[2]),
-      working_volume(rig).center};
+  const Motion motion{options.rotate_deg * M_PI / 180, vector_of(options.translate_mm),
+                      working_volume(rig).center};
+  const Vec3 in_exposure = options.exposure_ms / 1000 * vector_of(options.speed_mm_s);
   const std::size_t total = static_cast<std::size_t>(options.frame_count) * rig.cameras.size();
   for (int frame = 0; frame < options.frame_count; ++frame) {
     const SimulatedObject object(mesh, options.surface, motion.at(frame));
+    const std::vector<SimulatedObject> moments =
+        through_exposure(mesh, options.surface, motion.at(frame), in_exposure, footprint(rig));
     const std::string name = six_digits(static_cast<std::size_t>(frame));
     const fs::path truth = options.frame_count == 1 ? out / "truth" : out / "truth" / name;
     write_mesh(truth / "mesh.ply", object.mesh());
@@ -141,7 +146,7 @@ void write_frames(const SimulateOptions& options, const Rig& rig, const Triangle
       const auto image =
           static_cast<std::uint32_t>(static_cast<std::size_t>(frame) * rig.cameras.size() + c);
       tell_steps(progress, "rendering frames: image", image, total);
-      const cv::Mat picture = photograph(rig, c, object, options.photo, image);
+      const cv::Mat picture = photograph(rig, c, moments, options.photo, image);
       const fs::path stem = out / "frames" / name / camera.name;
       if (options.jpeg) {
         write_jpeg(stem.string() + ".jpg", picture, *options.jpeg);
@@ -251,6 +256,15 @@ void add_scene_options(CLI::App& command, SimulateOptions& options) {
   command.add_option("--translate-mm", options.translate_mm, "Shift x y z per frame")
       ->expected(3)
       ->check(any_number<double>());
+  command
+      .add_option("--motion-mm-s", options.speed_mm_s,
+                  "Speed x y z within the exposure of every frame, whose truth is its middle; "
+                  "Gray-code captures stand still")
+      ->expected(3)
+      ->check(any_number<double>());
+  command.add_option("--exposure-ms", options.exposure_ms, "Of a frame, for --motion-mm-s")
+      ->check(above_zero())
+      ->capture_default_str();
   command
       .add_option("--albedo", options.surface.albedo,
                   "Share of the light that the surface gives back")

@@ -153,6 +153,9 @@ SettledPoints settle_on_surface(const Rig& rig, const RayScene& surface,
                                 std::span<const MeasuredPoint> points,
                                 std::span<const std::array<float, 3>> colors) {
   constexpr double kFarthest = 4;  // deviations of the difference
+  // Beyond, one of both is wrong, and the surface rests on the light of all pixels and cameras
+  // around; as many as settle_points() allows.
+  constexpr double kLeftOut = 6;
   constexpr double kLeastCosine = 0.2;
   // Shares of what the surface says and of its difference from the point: on rendered bunnies, a
   // statue, a hand and a knot errors are then as large as they should be. So they are for points
@@ -188,7 +191,9 @@ SettledPoints settle_on_surface(const Rig& rig, const RayScene& surface,
     const double of_point = static_cast<double>(points[i].sigma);
     const Vec3 x(static_cast<double>(p.x), static_cast<double>(p.y), static_cast<double>(p.z));
     const double difference = hit->distance - (x - ray.origin).dot(ray.direction);
-    if (std::abs(difference) > kFarthest * std::hypot(of_surface, of_point)) return;
+    const double deviations = std::abs(difference) / std::hypot(of_surface, of_point);
+    if (deviations > kLeftOut) keep[i] = 0;
+    if (deviations > kFarthest) return;
     settled.on_surface[i] = 1;
     p.x = static_cast<float>(hit->point.x());
     p.y = static_cast<float>(hit->point.y());

@@ -28,10 +28,11 @@ struct SettledPoints {
 };
 
 /// The points, moved along their camera rays onto the surface, which has a sigma at each vertex and
-/// knows the light of all pixels and cameras around, unless it is too far off for both to be right.
-/// Their sigma is that of the surface, and grows with how far they were off; their normal is its,
-/// and their colour, where `colors` has the albedo of each of its vertices (linear light, as
-/// TriangleMesh::color). Without those whose line the surface contradicts, as above.
+/// knows the light of all pixels and cameras around. Their sigma is that of the surface, and grows
+/// with how far they were off; their normal is its, and their colour, where `colors` has the albedo
+/// of each of its vertices (linear light, as TriangleMesh::color). Without those whose line the
+/// surface contradicts, as above, and those that are too far off it for both to be right. Points
+/// that are odd, or whose rays miss the surface, stay where they were.
 [[nodiscard]] SettledPoints settle_on_surface(const Rig& rig, const RayScene& surface,
                                               std::span<const MeasuredPoint> points,
                                               std::span<const std::array<float, 3>> colors = {});

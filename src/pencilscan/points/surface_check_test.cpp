@@ -111,6 +111,30 @@ TEST_F(SurfaceCheckTest, PointsSettleOnTheSurfaceAndTheirSigmaTellsOfTheWayThere
   EXPECT_LT(upper_median(std::move(errors)), 0.01);
 }
 
+TEST_F(SurfaceCheckTest, PointsTooFarOffTheSurfaceAreLeftOutThoughTheirLineFits) {
+  // A tenth of the points is off by 1 mm along the ray: less than half a line, 20 deviations.
+  std::vector<MeasuredPoint> moved = points();
+  const Vec3 eye = rig.cameras[0].center();
+  std::size_t off = 0;
+  for (std::size_t i = 0; i < moved.size(); ++i) {
+    MeasuredPoint& p = moved[i];
+    p.sigma = 0.04F;
+    if (i % 10 != 0) continue;
+    const Vec3 x(p.x, p.y, p.z);
+    const Vec3 y = x + (x - eye).normalized();
+    p.x = static_cast<float>(y.x());
+    p.y = static_cast<float>(y.y());
+    p.z = static_cast<float>(y.z());
+    ++off;
+  }
+  const SettledPoints settled = settle_on_surface(rig, RayScene(mesh_), moved);
+  EXPECT_GE(settled.contradicted, off);
+  EXPECT_LT(settled.contradicted, off + moved.size() / 20);
+  EXPECT_EQ(std::count_if(settled.points.begin(), settled.points.end(),
+                          [](const MeasuredPoint& p) { return error(p) > 0.5; }),
+            0);
+}
+
 TEST_F(SurfaceCheckTest, PointsHaveTheNormalAndTheColourOfTheSurface) {
   // Lighter from one side of the surface to the other.
   std::vector<std::array<float, 3>> colors;

@@ -1,8 +1,10 @@
 #include "pencilscan/simulation/photography.h"
 
+#include <algorithm>
+#include <cmath>
 #include <sstream>
-#include <vector>
 
+#include "pencilscan/core/check.h"
 #include "pencilscan/core/error.h"
 
 namespace pencilscan {
@@ -49,14 +51,39 @@ RenderOptions scene_light(const PhotographyOptions& options) {
   return render;
 }
 
-cv::Mat photograph(const Rig& rig, std::size_t c, const SimulatedObject& object,
+std::vector<SimulatedObject> through_exposure(const TriangleMesh& mesh, const Reflectance& surface,
+                                              const RigidTransform& middle, const Vec3& shift,
+                                              double footprint_mm) {
+  PENCILSCAN_CHECK(footprint_mm > 0);
+  constexpr double kStep = 0.5;  // footprints
+  const int count = std::max(1, static_cast<int>(std::ceil(shift.norm() / (kStep * footprint_mm))));
+  std::vector<SimulatedObject> moments;
+  for (int k = 0; k < count; ++k) {
+    RigidTransform at = middle;
+    at.translation += ((k + 0.5) / count - 0.5) * shift;
+    moments.emplace_back(mesh, surface, at);
+  }
+  return moments;
+}
+
+cv::Mat photograph(const Rig& rig, std::size_t c, std::span<const SimulatedObject> moments,
                    const PhotographyOptions& options, std::uint32_t image) {
+  PENCILSCAN_CHECK(!moments.empty());
   const Camera& camera = rig.cameras[c];
   FilmOptions film = options.film;
   film.black_level = options.black_level.value_or(0);
-  const cv::Mat light =
-      render_camera(rig, c, object, lights_for(camera, rig, film), scene_light(options));
+  const std::vector<PanelLight> lights = lights_for(camera, rig, film);
+  const RenderOptions render = scene_light(options);
+  cv::Mat light = render_camera(rig, c, moments.front(), lights, render);
+  for (const SimulatedObject& moment : moments.subspan(1))
+    light += render_camera(rig, c, moment, lights, render);
+  light /= static_cast<double>(moments.size());
   return apply_sensor(light, camera_sensor(options, camera), options.seed, image);
+}
+
+cv::Mat photograph(const Rig& rig, std::size_t camera, const SimulatedObject& object,
+                   const PhotographyOptions& options, std::uint32_t image) {
+  return photograph(rig, camera, std::span(&object, 1), options, image);
 }
 
 void check_scene(const Rig& rig, const TriangleMesh& mesh, const std::string& name,

@@ -3,7 +3,9 @@
 #include <cstdint>
 #include <opencv2/core.hpp>
 #include <optional>
+#include <span>
 #include <string>
+#include <vector>
 
 #include "pencilscan/simulation/placement.h"
 #include "pencilscan/simulation/render.h"
@@ -34,9 +36,23 @@ struct PhotographyOptions {
 /// options.render with the ambient light of the preset, unless it is stated.
 [[nodiscard]] RenderOptions scene_light(const PhotographyOptions& options);
 
+/// An object at even steps through an exposure, in which it goes `shift` (mm, world) at even speed
+/// without turning; `middle`: where half of the exposure has it. A step is at most half a footprint
+/// (mm), below what a pixel resolves: the mean of the moments' light is that of the exposure. One
+/// moment where nothing moves.
+[[nodiscard]] std::vector<SimulatedObject> through_exposure(const TriangleMesh& mesh,
+                                                            const Reflectance& surface,
+                                                            const RigidTransform& middle,
+                                                            const Vec3& shift, double footprint_mm);
+
 /// What camera `camera` of the rig stores of the rig's patterns on the object: 8U or 16U, RGB, or
-/// one channel of a camera with a mosaic. A texture camera sees white light instead. `image`: a
-/// number of its own for every picture of a run, which its noise depends on.
+/// one channel of a camera with a mosaic. A texture camera sees white light instead. The
+/// `moments` of the object share the exposure: the light is their mean. `image`: a number of its
+/// own for every picture of a run, which its noise depends on.
+[[nodiscard]] cv::Mat photograph(const Rig& rig, std::size_t camera,
+                                 std::span<const SimulatedObject> moments,
+                                 const PhotographyOptions& options, std::uint32_t image);
+/// The same of an object that stands still.
 [[nodiscard]] cv::Mat photograph(const Rig& rig, std::size_t camera, const SimulatedObject& object,
                                  const PhotographyOptions& options, std::uint32_t image);
 
