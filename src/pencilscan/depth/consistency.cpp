@@ -6,6 +6,7 @@
 
 #include "pencilscan/core/chunks.h"
 #include "pencilscan/core/median.h"
+#include "pencilscan/core/tally.h"
 #include "pencilscan/depth/pruning.h"
 
 namespace pencilscan {
@@ -21,7 +22,7 @@ struct Node {
 /// Another node that agrees or disagrees, with the device through which that was found.
 struct Link {
   std::uint32_t other;
-  std::uint16_t group;      ///< camera, or cameras + projector
+  std::uint16_t group;      ///< camera; cameras + projector; or these + a map that contradicts
   float disagreement = -1;  ///< of a support: distance across the surface over its deviation
 };
 
@@ -73,12 +74,14 @@ class Comparison {
     links.contradiction.resize(nodes_.size());
     parallel_chunks(nodes_.size(), [&](std::size_t i) { compare_with_cameras(i, links); });
     for (std::size_t p = 0; p < rig_.projectors.size(); ++p) compare_with_projector(p, links);
-    // Whoever contradicts is contradicted.
+    // Whoever contradicts is contradicted: by groups of their own, after those of cameras and
+    // projectors.
+    const std::size_t voices = rig_.cameras.size() + rig_.projectors.size();
     std::vector<std::vector<Link>> heard(nodes_.size());
     for (std::size_t i = 0; i < nodes_.size(); ++i) {
       for (const Link& link : links.contradiction[i]) {
         heard[link.other].push_back(
-            {static_cast<std::uint32_t>(i), static_cast<std::uint16_t>(1000 + nodes_[i].map)});
+            {static_cast<std::uint32_t>(i), static_cast<std::uint16_t>(voices + nodes_[i].map)});
       }
     }
     for (std::size_t i = 0; i < nodes_.size(); ++i) {
@@ -213,20 +216,6 @@ class Comparison {
   std::vector<std::vector<std::int32_t>> id_of_;
 };
 
-/// Sum over the groups of the most believed link of each.
-float tally(const std::vector<Link>& links, const std::vector<float>& belief) {
-  float total = 0;
-  float best = 0;
-  for (std::size_t k = 0; k < links.size(); ++k) {
-    if (k > 0 && links[k].group != links[k - 1].group) {
-      total += best;
-      best = 0;
-    }
-    best = std::max(best, belief[links[k].other]);
-  }
-  return total + best;
-}
-
 /// What the stated deviations must be multiplied with so that cameras disagree as they should: 1.48
 /// times the median of the absolute normalised differences is 1 for normal errors.
 double sigma_scale(const Links& links) {
@@ -298,10 +287,11 @@ ConsistencyReport check_consistency(const Rig& rig, std::span<const int> pattern
   std::vector<float> support(count);
   std::vector<float> contradiction(count);
   const auto weight = static_cast<float>(options.contradiction_weight);
+  const auto belief_of = [&](const Link& link) { return belief[link.other]; };
   for (int round = 0; round < options.rounds; ++round) {
     parallel_chunks(count, [&](std::size_t i) {
-      support[i] = tally(links.support[i], belief);
-      contradiction[i] = tally(links.contradiction[i], belief);
+      support[i] = tally(links.support[i], belief_of);
+      contradiction[i] = tally(links.contradiction[i], belief_of);
     });
     parallel_chunks(count, [&](std::size_t i) {
       const Node& node = comparison.nodes()[i];

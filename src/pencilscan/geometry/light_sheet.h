@@ -16,7 +16,7 @@ enum class Axis { kColumn = 0, kRow = 1 };
 ///
 /// With the plane pi(c) = a + c b (4-vectors, rows of the projector's 3x4 matrix in the camera
 /// frame: b = -P row 3, a = P row 1 or 2) every c gives n . x + d = 0, so omega(c) = -n(c) / d(c).
-/// Valid without lens distortion of the projector; LightSheet below is exact with it.
+/// Valid without lens distortion of the projector; RayInProjector below is exact with it.
 struct PencilOfPlanes {
   Eigen::Vector4d a = Eigen::Vector4d::Zero();
   Eigen::Vector4d b = Eigen::Vector4d::Zero();

@@ -1,8 +1,8 @@
 #include "pencilscan/grid/grid_graph.h"
 
 #include <algorithm>
-#include <numeric>
 
+#include "pencilscan/core/disjoint_sets.h"
 #include "pencilscan/grid/local_ids.h"
 #include "pencilscan/grid/projector_votes.h"
 
@@ -55,16 +55,7 @@ void identify(const Rig& rig, const std::vector<ColorFamily>& families, const Gr
 }
 
 void find_components(GridGraph& graph) {
-  std::vector<int> parent(graph.curves.size());
-  std::iota(parent.begin(), parent.end(), 0);
-  const auto root = [&](int c) {
-    while (parent[static_cast<std::size_t>(c)] != c) {
-      parent[static_cast<std::size_t>(c)] =
-          parent[static_cast<std::size_t>(parent[static_cast<std::size_t>(c)])];
-      c = parent[static_cast<std::size_t>(c)];
-    }
-    return c;
-  };
+  DisjointSets sets(graph.curves.size());
   std::vector<char> connected(graph.curves.size(), 0);
   for (const Crossing& x : graph.crossings) {
     if (!graph.identities.empty()) {
@@ -74,16 +65,14 @@ void find_components(GridGraph& graph) {
     }
     connected[static_cast<std::size_t>(x.curve_a)] =
         connected[static_cast<std::size_t>(x.curve_b)] = 1;
-    const int ra = root(x.curve_a);
-    const int rb = root(x.curve_b);
-    parent[static_cast<std::size_t>(std::max(ra, rb))] = std::min(ra, rb);
+    sets.join(x.curve_a, x.curve_b);
   }
   std::vector<int> number(graph.curves.size(), -1);
   graph.component_of_curve.assign(graph.curves.size(), -1);
   graph.component_count = 0;
   for (std::size_t c = 0; c < graph.curves.size(); ++c) {
     if (connected[c] == 0) continue;
-    int& n = number[static_cast<std::size_t>(root(static_cast<int>(c)))];
+    int& n = number[static_cast<std::size_t>(sets.root(static_cast<int>(c)))];
     if (n < 0) n = graph.component_count++;
     graph.component_of_curve[c] = n;
   }

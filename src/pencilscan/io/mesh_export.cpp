@@ -62,37 +62,54 @@ std::uint16_t unorm16(float value) {
   return static_cast<std::uint16_t>(std::lround(65535 * std::clamp(value, 0.F, 1.F)));
 }
 
-/// glTF 2.0, "GLB File Format Specification": a header, a chunk of JSON padded with spaces and one
-/// of binary data padded with zeros, each to four bytes.
-std::string glb_bytes(const TriangleMesh& mesh) {
-  using nlohmann::json;
-  std::string data;
-  Vec3 low = Vec3::Constant(1e30);
+/// The binary data of a glTF mesh, and where its parts begin.
+struct GltfData {
+  std::string bytes;
+  Vec3 low = Vec3::Constant(1e30);  ///< smallest and largest coordinates
   Vec3 high = -low;
+  std::size_t normals = 0;
+  std::size_t colors = 0;
+  std::size_t indices = 0;
+};
+
+GltfData gltf_data(const TriangleMesh& mesh) {
+  GltfData data;
   for (const Vec3& v : mesh.vertices) {
     const Vec3 p = as_floats(gltf_position(v));
-    low = low.cwiseMin(p);
-    high = high.cwiseMax(p);
-    append_vector(data, p);
+    data.low = data.low.cwiseMin(p);
+    data.high = data.high.cwiseMax(p);
+    append_vector(data.bytes, p);
   }
-  const std::size_t position_bytes = data.size();
+  data.normals = data.bytes.size();
   const std::vector<Vec3> normals = vertex_normals(mesh);
   for (const Vec3& n : normals) {
     // Validators want unit normals, also of a vertex without area.
     const Vec3 up(n[0], n[2], -n[1]);
-    append_vector(data, up.squaredNorm() > 0.5 ? up : Vec3::UnitY());
+    append_vector(data.bytes, up.squaredNorm() > 0.5 ? up : Vec3::UnitY());
   }
   // glTF wants linear colours; 16 bits keep dark ones apart. Four channels, as rows align to four
   // bytes.
-  const std::size_t color_start = data.size();
+  data.colors = data.bytes.size();
   for (const auto& color : mesh.color) {
-    for (const float c : color) append_little_endian(data, unorm16(c));
-    append_little_endian(data, unorm16(1));
+    for (const float c : color) append_little_endian(data.bytes, unorm16(c));
+    append_little_endian(data.bytes, unorm16(1));
   }
-  const std::size_t index_start = data.size();
+  data.indices = data.bytes.size();
   for (const auto& f : mesh.faces) {
-    for (const int v : f) append_little_endian(data, static_cast<std::uint32_t>(v));
+    for (const int v : f) append_little_endian(data.bytes, static_cast<std::uint32_t>(v));
   }
+  return data;
+}
+
+using nlohmann::json;
+
+/// Bytes [begin, end) of the data.
+json gltf_view(std::size_t begin, std::size_t end, int target) {
+  return {{"buffer", 0}, {"byteOffset", begin}, {"byteLength", end - begin}, {"target", target}};
+}
+
+/// What the data are.
+json gltf_description(const TriangleMesh& mesh, const GltfData& data) {
   json root;
   root["asset"] = {{"version", "2.0"}, {"generator", "pencilscan"}};
   root["scene"] = 0;
@@ -104,27 +121,20 @@ std::string glb_bytes(const TriangleMesh& mesh) {
       json::array({{{"primitives", json::array({{{"attributes", {{"POSITION", 0}, {"NORMAL", 1}}},
                                                  {"indices", 2},
                                                  {"material", 0}}})}}});
-  root["buffers"] = json::array({{{"byteLength", data.size()}}});
+  root["buffers"] = json::array({{{"byteLength", data.bytes.size()}}});
   constexpr int kArrayBuffer = 34962;
   constexpr int kElementBuffer = 34963;
-  root["bufferViews"] = json::array(
-      {{{"buffer", 0}, {"byteOffset", 0}, {"byteLength", position_bytes}, {"target", kArrayBuffer}},
-       {{"buffer", 0},
-        {"byteOffset", position_bytes},
-        {"byteLength", position_bytes},
-        {"target", kArrayBuffer}},
-       {{"buffer", 0},
-        {"byteOffset", index_start},
-        {"byteLength", data.size() - index_start},
-        {"target", kElementBuffer}}});
+  root["bufferViews"] = json::array({gltf_view(0, data.normals, kArrayBuffer),
+                                     gltf_view(data.normals, data.colors, kArrayBuffer),
+                                     gltf_view(data.indices, data.bytes.size(), kElementBuffer)});
   constexpr int kFloat = 5126;
   constexpr int kUnsignedInt = 5125;
   root["accessors"] = json::array({{{"bufferView", 0},
                                     {"componentType", kFloat},
                                     {"count", mesh.vertices.size()},
                                     {"type", "VEC3"},
-                                    {"min", {low[0], low[1], low[2]}},
-                                    {"max", {high[0], high[1], high[2]}}},
+                                    {"min", {data.low[0], data.low[1], data.low[2]}},
+                                    {"max", {data.high[0], data.high[1], data.high[2]}}},
                                    {{"bufferView", 1},
                                     {"componentType", kFloat},
                                     {"count", mesh.vertices.size()},
@@ -133,30 +143,34 @@ std::string glb_bytes(const TriangleMesh& mesh) {
                                     {"componentType", kUnsignedInt},
                                     {"count", 3 * mesh.faces.size()},
                                     {"type", "SCALAR"}}});
-  if (!mesh.color.empty()) {
-    constexpr int kUnsignedShort = 5123;
-    root["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = 3;
-    root["bufferViews"].push_back({{"buffer", 0},
-                                   {"byteOffset", color_start},
-                                   {"byteLength", index_start - color_start},
-                                   {"target", kArrayBuffer}});
-    root["accessors"].push_back({{"bufferView", 3},
-                                 {"componentType", kUnsignedShort},
-                                 {"normalized", true},
-                                 {"count", mesh.vertices.size()},
-                                 {"type", "VEC4"}});
-  }
-  std::string text = root.dump();
+  if (mesh.color.empty()) return root;
+  constexpr int kUnsignedShort = 5123;
+  root["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = 3;
+  root["bufferViews"].push_back(gltf_view(data.colors, data.indices, kArrayBuffer));
+  root["accessors"].push_back({{"bufferView", 3},
+                               {"componentType", kUnsignedShort},
+                               {"normalized", true},
+                               {"count", mesh.vertices.size()},
+                               {"type", "VEC4"}});
+  return root;
+}
+
+/// glTF 2.0, "GLB File Format Specification": a header, a chunk of JSON padded with spaces and one
+/// of binary data padded with zeros, each to four bytes.
+std::string glb_bytes(const TriangleMesh& mesh) {
+  GltfData data = gltf_data(mesh);
+  std::string text = gltf_description(mesh, data).dump();
   text.resize((text.size() + 3) / 4 * 4, ' ');
-  data.resize((data.size() + 3) / 4 * 4, '\0');
+  data.bytes.resize((data.bytes.size() + 3) / 4 * 4, '\0');
   std::string bytes = "glTF";
   append_little_endian(bytes, std::uint32_t{2});
-  append_little_endian(bytes, static_cast<std::uint32_t>(12 + 8 + text.size() + 8 + data.size()));
+  append_little_endian(bytes,
+                       static_cast<std::uint32_t>(12 + 8 + text.size() + 8 + data.bytes.size()));
   append_little_endian(bytes, static_cast<std::uint32_t>(text.size()));
   bytes += "JSON" + text;
-  append_little_endian(bytes, static_cast<std::uint32_t>(data.size()));
+  append_little_endian(bytes, static_cast<std::uint32_t>(data.bytes.size()));
   bytes.append("BIN\0", 4);
-  return bytes + data;
+  return bytes + data.bytes;
 }
 
 }  // namespace

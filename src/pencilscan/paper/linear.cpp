@@ -28,6 +28,50 @@ void attach_leaves(const std::vector<CrossingEquation>& leaves, std::vector<char
   }
 }
 
+/// Place of each known curve among the known ones; -1 for the others.
+std::vector<int> compact_indices(const std::vector<char>& known, int& size) {
+  std::vector<int> compact(known.size(), -1);
+  size = 0;
+  for (std::size_t i = 0; i < known.size(); ++i) {
+    if (known[i] != 0) compact[i] = size++;
+  }
+  return compact;
+}
+
+/// e, the direction that the equations determine least, and the two smallest singular values of M.
+/// Empty where the equations are singular.
+Eigen::VectorXd least_determined(const Eigen::MatrixXd& matrix, LinearSolution& solution) {
+  const Eigen::LDLT<Eigen::MatrixXd> factor(matrix);
+  Eigen::VectorXd e_min = smallest_eigenvector(factor, {});
+  if (e_min.size() == 0) return e_min;
+  const auto singular_value = [&](const Eigen::VectorXd& e) {
+    return std::sqrt(std::max(0.0, e.dot(matrix * e)));
+  };
+  solution.sigma_min = singular_value(e_min);
+  if (matrix.rows() > 1) {
+    const Eigen::VectorXd e_second = smallest_eigenvector(factor, e_min);
+    if (e_second.size() > 0) solution.sigma_second = singular_value(e_second);
+  }
+  return e_min;
+}
+
+/// The known curves alone, with `direction` scaled to a largest value of 1.
+void keep_known(const std::vector<int>& curves, const std::vector<char>& known,
+                const Eigen::VectorXd& x, const Eigen::VectorXd& direction,
+                LinearSolution& solution) {
+  std::vector<Eigen::Index> kept;
+  for (std::size_t i = 0; i < known.size(); ++i) {
+    if (known[i] == 0) continue;
+    kept.push_back(static_cast<Eigen::Index>(i));
+    solution.curves.push_back(curves[i]);
+  }
+  solution.mu = x(kept);
+  solution.direction = direction(kept);
+  const double largest = solution.direction.cwiseAbs().maxCoeff();
+  if (largest > 0) solution.direction /= largest;
+  solution.solved = true;
+}
+
 }  // namespace
 
 LinearSolution solve_component(const Rig& rig, const GridGraph& graph, int component) {
@@ -43,11 +87,8 @@ LinearSolution solve_component(const Rig& rig, const GridGraph& graph, int compo
   std::vector<char> known(system.curves.size(), 0);
   for (const CrossingEquation& e : system.equations)
     known[static_cast<std::size_t>(e.i)] = known[static_cast<std::size_t>(e.j)] = 1;
-  std::vector<int> compact(system.curves.size(), -1);
   int size = 0;
-  for (std::size_t i = 0; i < known.size(); ++i) {
-    if (known[i] != 0) compact[i] = size++;
-  }
+  const std::vector<int> compact = compact_indices(known, size);
   if (size == 0 || static_cast<int>(system.equations.size()) < size) {
     solution.reason = "fewer crossings than curves: the planes are not determined";
     return solution;
@@ -72,19 +113,10 @@ LinearSolution solve_component(const Rig& rig, const GridGraph& graph, int compo
       if (known[i] != 0) x[static_cast<Eigen::Index>(i)] = mu[compact[i]];
     }
     if (pass + 1 < kPasses) continue;
-    const Eigen::LDLT<Eigen::MatrixXd> factor(normal.matrix);
-    e_min = smallest_eigenvector(factor, {});
+    e_min = least_determined(normal.matrix, solution);
     if (e_min.size() == 0) {
       solution.reason = "the equations are singular";
       return solution;
-    }
-    const auto singular_value = [&](const Eigen::VectorXd& e) {
-      return std::sqrt(std::max(0.0, e.dot(normal.matrix * e)));
-    };
-    solution.sigma_min = singular_value(e_min);
-    if (size > 1) {
-      const Eigen::VectorXd e_second = smallest_eigenvector(factor, e_min);
-      if (e_second.size() > 0) solution.sigma_second = singular_value(e_second);
     }
   }
   solution.residual_rms_px = system.rms_residual_px(x);
@@ -93,18 +125,7 @@ LinearSolution solve_component(const Rig& rig, const GridGraph& graph, int compo
     if (known[i] != 0) direction[static_cast<Eigen::Index>(i)] = e_min[compact[i]];
   }
   attach_leaves(leaves, known, x, direction);
-  // Keep the known curves only.
-  std::vector<Eigen::Index> kept;
-  for (std::size_t i = 0; i < known.size(); ++i) {
-    if (known[i] == 0) continue;
-    kept.push_back(static_cast<Eigen::Index>(i));
-    solution.curves.push_back(system.curves[i]);
-  }
-  solution.mu = x(kept);
-  solution.direction = direction(kept);
-  const double largest = solution.direction.cwiseAbs().maxCoeff();
-  if (largest > 0) solution.direction /= largest;
-  solution.solved = true;
+  keep_known(system.curves, known, x, direction, solution);
   return solution;
 }
 

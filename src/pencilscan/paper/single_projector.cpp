@@ -6,6 +6,7 @@
 #include <map>
 #include <numeric>
 
+#include "pencilscan/core/disjoint_sets.h"
 #include "pencilscan/grid/line_candidates.h"
 #include "pencilscan/paper/crossing_equations.h"
 
@@ -14,29 +15,21 @@ namespace {
 
 /// Crossings of each connected grid of one projector, in the order of their first one.
 std::vector<std::vector<int>> connected_grids(const GridGraph& graph) {
-  std::vector<int> parent(graph.curves.size());
-  std::iota(parent.begin(), parent.end(), 0);
-  const auto root = [&](int c) {
-    while (parent[static_cast<std::size_t>(c)] != c) c = parent[static_cast<std::size_t>(c)];
-    return c;
-  };
+  DisjointSets sets(graph.curves.size());
   const auto in_grid = [&](const Crossing& x) {
     const auto& a = graph.identities[static_cast<std::size_t>(x.curve_a)].pattern;
     const auto& b = graph.identities[static_cast<std::size_t>(x.curve_b)].pattern;
     return a && b && a->projector == b->projector && a->pattern != b->pattern;
   };
   for (const Crossing& x : graph.crossings) {
-    if (!in_grid(x)) continue;
-    const int ra = root(x.curve_a);
-    const int rb = root(x.curve_b);
-    parent[static_cast<std::size_t>(std::max(ra, rb))] = std::min(ra, rb);
+    if (in_grid(x)) sets.join(x.curve_a, x.curve_b);
   }
   std::vector<std::vector<int>> grids;
   std::map<int, std::size_t> grid_of_root;
   for (std::size_t k = 0; k < graph.crossings.size(); ++k) {
     if (!in_grid(graph.crossings[k])) continue;
     const auto [it, fresh] =
-        grid_of_root.try_emplace(root(graph.crossings[k].curve_a), grids.size());
+        grid_of_root.try_emplace(sets.root(graph.crossings[k].curve_a), grids.size());
     if (fresh) grids.emplace_back();
     grids[it->second].push_back(static_cast<int>(k));
   }

@@ -7,6 +7,7 @@
 #include <unordered_map>
 
 #include "pencilscan/core/chunks.h"
+#include "pencilscan/core/tally.h"
 
 namespace pencilscan {
 namespace {
@@ -30,19 +31,6 @@ struct Vote {
 
 /// All votes of one kind, per receiving sample, sorted by group.
 using Votes = std::vector<std::vector<Vote>>;
-
-double tally(const std::vector<Vote>& votes, const std::vector<double>& belief) {
-  double total = 0;
-  double best = 0;
-  for (std::size_t i = 0; i < votes.size(); ++i) {
-    if (i > 0 && votes[i].group != votes[i - 1].group) {
-      total += best;
-      best = 0;
-    }
-    best = std::max(best, belief[votes[i].other] * static_cast<double>(votes[i].weight));
-  }
-  return total + best;
-}
 
 /// Keeps, for each group, the nearest (smallest d2) candidates only, to bound the work.
 struct Candidate {
@@ -222,10 +210,13 @@ std::vector<double> vote(const Rig& rig, std::span<const SurfaceSample> samples,
   std::vector<double> belief(samples.size(), 1.0);
   std::vector<double> s(samples.size());
   std::vector<double> c(samples.size());
+  const auto believed = [&](const Vote& vote) {
+    return belief[vote.other] * static_cast<double>(vote.weight);
+  };
   for (int round = 0; round < kRounds; ++round) {
     parallel_chunks(samples.size(), [&](std::size_t i) {
-      s[i] = tally(support[i], belief);
-      c[i] = tally(contradictions[i], belief);
+      s[i] = tally(support[i], believed);
+      c[i] = tally(contradictions[i], believed);
     });
     parallel_chunks(samples.size(), [&](std::size_t i) {
       double s_mean = 0;

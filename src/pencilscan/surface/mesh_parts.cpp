@@ -3,31 +3,25 @@
 #include <algorithm>
 #include <cstdint>
 #include <map>
-#include <numeric>
 #include <unordered_map>
 #include <utility>
 
 #include "pencilscan/core/check.h"
+#include "pencilscan/core/disjoint_sets.h"
 
 namespace pencilscan {
 
 std::vector<int> face_components(const TriangleMesh& mesh) {
-  std::vector<int> parent(mesh.vertices.size());
-  std::iota(parent.begin(), parent.end(), 0);
-  const auto at = [&](int v) -> int& { return parent[static_cast<std::size_t>(v)]; };
-  const auto find = [&](int v) {
-    while (at(v) != v) v = at(v) = at(at(v));
-    return v;
-  };
+  DisjointSets sets(mesh.vertices.size());
   for (const auto& face : mesh.faces) {
-    at(find(face[1])) = find(face[0]);
-    at(find(face[2])) = find(face[0]);
+    sets.join(face[0], face[1]);
+    sets.join(face[0], face[2]);
   }
   std::vector<int> name(mesh.vertices.size(), -1);
   std::vector<int> component(mesh.faces.size());
   int count = 0;
   for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
-    int& id = name[static_cast<std::size_t>(find(mesh.faces[f][0]))];
+    int& id = name[static_cast<std::size_t>(sets.root(mesh.faces[f][0]))];
     if (id < 0) id = count++;
     component[f] = id;
   }
