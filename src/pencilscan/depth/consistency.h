@@ -25,14 +25,15 @@ struct ConsistencyReport {
   std::size_t islands = 0;       ///< nodes removed as small islands
 };
 
-/// What the depth maps say of each other. A measured node proves two segments empty: from its
-/// camera and from every projector whose light was found there. A node of another map on such a
-/// segment, more than a margin before its end, contradicts and is contradicted; a node of another
-/// map at the same place supports. Belief b = (1 + S) / (1 + S + weight C), S and C summed over
-/// cameras (and projectors for C) with the believed nodes counting most, averaged over neighbouring
-/// nodes of one surface since errors are shifts of whole patches. Nodes below min_confidence lose
-/// their depth (reason kContradicted); what nobody confirms stays. `pattern_projector`: projector
-/// per lit bit.
+/// Checks the depth maps against each other. A measured node proves that two segments are empty:
+/// the one to its camera, and the one to every projector whose light was found there. A node of
+/// another map that lies on such a segment, more than a margin before its end, contradicts this
+/// node and is contradicted by it. A node of another map at the same place supports this node. The
+/// belief in a node is b = (1 + S) / (1 + S + weight C). S and C are sums over cameras (C also over
+/// projectors) of the most believed node of each. They are averaged over neighbouring nodes of one
+/// surface, because whole patches are wrong together. A node below min_confidence loses its depth
+/// (reason kContradicted). A node that nobody confirms stays. `pattern_projector`: projector per
+/// lit bit.
 ConsistencyReport check_consistency(const Rig& rig, std::span<const int> pattern_projector,
                                     std::span<DepthMap> maps,
                                     const ConsistencyOptions& options = {});

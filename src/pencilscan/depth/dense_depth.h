@@ -23,8 +23,8 @@ struct DepthOptions {
   double max_move = 2;                  ///< footprints; of a node started from the closed surface
 };
 
-/// Completes the light of one camera, whose images are there: its patterns, and blur and noise as
-/// measured from the images at the seeds.
+/// Fills in the light of one camera whose images are there already: its patterns, and the blur and
+/// noise that its images show at the seeds.
 void measure_light(const Rig& rig, int camera, const std::vector<ColorFamily>& families,
                    std::span<const MeasuredPoint> points, const DepthOptions& options,
                    CameraLight& light);
@@ -33,9 +33,10 @@ void measure_light(const Rig& rig, int camera, const std::vector<ColorFamily>& f
                                    std::span<const MeasuredPoint> points, const ObjectSpace& space,
                                    const DepthOptions& options);
 
-/// Fits the windows of nodes without depth whose rays meet `surface`, starting from its tangent
-/// plane there, and keeps those that stay near it: a surface that is off by a line does not. Their
-/// sigma is widened by `sigma_factor`. Returns the number of nodes that found their depth.
+/// Fits the windows of nodes without depth whose rays meet `surface`. Each fit starts from the
+/// surface's tangent plane. It is kept if it ends near the surface; a fit that is off by a line
+/// does not end there. sigma is multiplied by `sigma_factor`. Returns the number of nodes that got
+/// depth.
 std::size_t complete_map(const CameraLight& light, const RayScene& surface,
                          const ObjectSpace& space, double sigma_factor, const DepthOptions& options,
                          DepthMap& map);

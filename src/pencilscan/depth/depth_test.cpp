@@ -213,7 +213,7 @@ TEST(DenseDepth, ASurfaceNearbyGivesDepthBackAndOneThatIsOffDoesNot) {
   ASSERT_GT(hole.size(), 30u);
   const auto found_of_hole = [&](double radius_mm) {
     DepthResult completed = result;
-    complete_depth(scene.rig, RayScene(make_sphere(radius_mm, 96)), {}, completed);
+    guided_depth(scene.rig, RayScene(make_sphere(radius_mm, 96)), {}, completed);
     std::size_t found = 0;
     for (const std::size_t i : hole) {
       const DepthNode& node = completed.maps[0].nodes[i];
@@ -234,6 +234,7 @@ TEST(DenseDepth, ASurfaceNearbyGivesDepthBackAndOneThatIsOffDoesNot) {
 
 TEST(DenseDepth, BlurIsFound) {
   const DepthResult result = ball_scene().measure();
+  ASSERT_EQ(result.report.cameras.size(), ball_scene().rig.cameras.size());
   // Sensor 0.6 px and the pixel's own box, 0.29 px.
   for (const CameraDepthReport& camera : result.report.cameras)
     EXPECT_NEAR(camera.blur_px, std::hypot(0.6, 0.29), 0.12);
@@ -270,15 +271,19 @@ TEST(DepthImage, NodesAreInTheirPixelsAndHolesAreNaN) {
   const BallScene& scene = ball_scene();
   const DepthMap map = scene.measure().maps[0];
   const DepthImage image = depth_image(scene.rig.cameras[0], map);
+  std::size_t measured = 0;
   for (std::size_t i = 0; i < map.nodes.size(); ++i) {
     const Vec2 pixel = map.pixel(i);
     const float z = image.depth.at<float>(static_cast<int>(pixel[1]), static_cast<int>(pixel[0]));
     if (map.nodes[i].measured()) {
       EXPECT_FLOAT_EQ(z, 1 / map.nodes[i].w);
+      ++measured;
     } else {
       EXPECT_TRUE(std::isnan(z));
     }
   }
+  EXPECT_GT(measured, 500U);
+  EXPECT_LT(measured, map.nodes.size());
 }
 
 TEST(DenseDepth, SameBytesForAnyThreadCount) {
@@ -288,6 +293,8 @@ TEST(DenseDepth, SameBytesForAnyThreadCount) {
     const ThreadLimit limit(threads);
     results.push_back(scene.measure());
   }
+  ASSERT_EQ(results[0].maps.size(), scene.rig.cameras.size());
+  ASSERT_EQ(results[1].maps.size(), results[0].maps.size());
   for (std::size_t m = 0; m < results[0].maps.size(); ++m) {
     for (std::size_t i = 0; i < results[0].maps[m].nodes.size(); ++i) {
       const DepthNode& a = results[0].maps[m].nodes[i];

@@ -33,20 +33,22 @@ void for_each_neighbor(const DepthMap& map, std::size_t i, int reach, Visit&& vi
   }
 }
 
-// What a map may keep although no other view contradicts it, once support and confidence of its
-// nodes are known. Each returns the number of nodes that lost their depth.
+// These remove nodes that no other view contradicts, but that nothing confirms either. Support and
+// confidence of the nodes have to be known. Each returns the number of nodes that lost their depth.
 
-/// Lines of one projector fit a surface that is off by a whole line as well as the true one. So a
-/// node that shows one projector only, and that no other camera confirms, must continue into its
-/// neighbours, on nearly all sides where no labelled curve passes through it.
+/// The lines of one projector alone fit a surface that is off by a whole line as well as the true
+/// one. A node with one projector's light that no other camera confirms therefore has to continue
+/// into its neighbours, on nearly all sides unless a labelled curve passes through it.
 std::size_t drop_lone_nodes(DepthMap& map);
 
-/// Patches of one projector's lines that no other camera confirms: growth that slipped by a line
-/// looks the same there. They stay where labelled curves hold them and nothing speaks against them.
+/// Removes patches of one projector's lines that no other camera confirms: growth that slipped by a
+/// line looks just like them. A patch stays if it rests on labelled curves and nothing contradicts
+/// it.
 std::size_t drop_unconfirmed_patches(DepthMap& map);
 
-/// Islands of fewer than `min_nodes` nodes of which other cameras confirm less than half, and those
-/// that neither they nor a labelled curve hold: growth keeps to one surface and slipped there.
+/// Removes islands of fewer than `min_nodes` nodes if other cameras confirm less than half of them,
+/// and islands of any size that neither other cameras nor a labelled curve confirm: growth jumped
+/// from a surface to get there.
 std::size_t drop_islands(int min_nodes, DepthMap& map);
 
 }  // namespace pencilscan

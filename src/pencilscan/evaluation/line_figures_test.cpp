@@ -143,14 +143,17 @@ TEST_F(SphereFigures, BandsOfConfidenceHoldTheShareThatIsRight) {
     points[i].confidence = i < 1000 ? 0.85F : 1.F;
     verdicts[i].right = i < 1000 ? i % 5 != 0 : i % 100 != 0;
   }
+  int bands = 0;
   for (const ConfidenceBand& band : label_figures(truth, points, verdicts).right_by_confidence) {
     const bool is_low = band.low == 0.8;
     const bool is_high = band.low == 0.999;
+    bands += is_low || is_high ? 1 : 0;
     EXPECT_EQ(band.right.count, is_low || is_high ? 1000U : 0U) << band.low;
     if (!is_low && !is_high) continue;
     EXPECT_NEAR(band.confidence_sum, is_low ? 850 : 1000, 1e-3);
     EXPECT_NEAR(band.right.value(), is_low ? 0.8 : 0.99, 1e-9);
   }
+  EXPECT_EQ(bands, 2);
 }
 
 TEST_F(SphereFigures, RepeatedVerticesCountOnce) {

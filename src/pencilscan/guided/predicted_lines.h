@@ -25,8 +25,9 @@ struct PredictionOptions {
   double min_incidence_cos = 0.17;  ///< to the projector
 };
 
-/// One point per image row (column for lines flatter than 45 degrees) of every line of the patterns
-/// on those patches of the surface that its last add() fitted. Ordered by patch.
+/// Predicts every line of the patterns on the patches of the surface that its last add() fitted.
+/// A line has one point per image row, or per column if it is flatter than 45 degrees. The points
+/// are ordered by patch.
 [[nodiscard]] std::vector<PredictedPoint> predict_lines(const Rig& rig, const Camera& camera,
                                                         const LocalSurface& surface,
                                                         std::span<const PatternRef> patterns,

@@ -11,10 +11,11 @@ namespace pencilscan {
 /// Decides (projector, line) or "undecided" for short pieces of all curves of all cameras together,
 /// over discrete labels.
 ///
-/// Energy: colour code and slant of each piece; crossings, whose two planes must meet in one point
-/// of the ray (also for two projectors of one colour); continuity along a curve; the same line seen
-/// by other cameras. Minimised by message passing within each camera; what the cameras say of each
-/// other enters between two passes.
+/// The energy has these terms: colour code and slant of each piece (piece_labels.h); crossings,
+/// whose two planes must meet in one point of the ray, also for two projectors of one colour;
+/// continuity along a curve; smoothness (surroundings.h); the same line in other cameras
+/// (other_views.h). Message passing within each camera minimises it (min_sum.h). The terms that
+/// join cameras are added between two passes.
 [[nodiscard]] Labeling solve_joint(const Rig& rig, const std::vector<ColorFamily>& families,
                                    std::span<const GridGraph> graphs, const JointOptions& options);
 

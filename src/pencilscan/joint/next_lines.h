@@ -15,18 +15,18 @@ struct NextPiece {
   float side = 1;  ///< +1: b lies on the side of the normal (tangent.y, -tangent.x), else -1
 };
 
-/// True where so few curves cross that crossings cannot decide the lines: one projector alone. Its
-/// lines then follow from their order and the code only, as in Zhang, Curless and Seitz 2002.
+/// True where so few curves cross that crossings cannot decide the lines, as with one projector
+/// alone. The lines then follow from their order and their code (Zhang, Curless and Seitz 2002).
 [[nodiscard]] bool lacks_crossings(const PieceGraph& graph);
 
-/// The next piece of its family on both sides of each that nothing crosses: of another curve, from
-/// 1.5 to 48 px away from its middle, within 1 px of square to it, and of its own direction within
-/// 32 degrees. Every pair once.
+/// The neighbours of all pieces that no curve crosses: on each side, the next piece of the same
+/// family. It belongs to another curve, lies 1.5 to 48 px from the piece's middle, at most 1 px
+/// off the normal there, and differs by at most 32 degrees in direction. Each pair comes once.
 [[nodiscard]] std::vector<NextPiece> next_pieces(const Camera& camera, const GridGraph& graph,
                                                  const PieceGraph& pieces);
 
-/// Cost of two pieces side by side having these labels; `order` is by how many lines the label
-/// grows, by sign, from a to b (0: unknown).
+/// Cost of these labels for two pieces side by side. `order`: +1 where line numbers grow from a to
+/// b in the image, -1 where they fall, 0 where that is not known.
 [[nodiscard]] float next_piece_cost(const PieceLabel& a, const PieceLabel& b, int order);
 
 }  // namespace pencilscan

@@ -8,9 +8,9 @@
 
 namespace pencilscan {
 
-/// What the other cameras say of the labels of one: a true label puts the piece where another
-/// camera, if nothing is in its way, sees a curve of the same family, direction and line. It is
-/// seen there where a point lies within 1.8 px across, 1 px along and 26 degrees.
+/// The multi-view term: a label places its piece in space, and another camera should see a curve of
+/// the same family, direction and line there, unless something hides it. The other camera sees it
+/// if one of its curve points lies within 1.8 px across, 1 px along and 26 degrees.
 class OtherViews {
  public:
   OtherViews(const Rig& rig, std::span<const GridGraph> graphs,

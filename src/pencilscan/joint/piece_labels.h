@@ -32,16 +32,17 @@ struct LabelledPieces {
 /// Probability of each label of each piece of one camera; what is missing to 1 is "no line".
 using PieceBeliefs = std::vector<std::vector<float>>;
 
-/// All lines of the piece's family whose depth lies in the volume, with the cost of the piece's
-/// colours and of the slant that the line would give the surface; then those that its crossings
-/// support best (options.max_labels).
+/// The labels that a piece may have. First these are all lines of its family whose depth lies in
+/// the volume. Each has the cost of the piece's colours and of the slant that the line would give
+/// the surface. Then only those that the crossings support best are kept (options.max_labels).
 [[nodiscard]] LabelledPieces possible_labels(const Rig& rig,
                                              const std::vector<ColorFamily>& families,
                                              const GridGraph& graph, const JointOptions& options);
 
-/// Energy of two crossing pieces having these labels: both give the crossing a depth, which agree
-/// for the true ones, and the surface through both curves faces both projectors. The negative
-/// logarithm of its likelihood against depths at random. Keeps a reference to `pieces`.
+/// The crossing term: cost of the labels of two pieces that cross. Each label gives the crossing a
+/// depth; the depths of the true labels agree, and the surface through both curves faces both
+/// projectors. The cost is the negative logarithm of the likelihood ratio to random depths. Keeps
+/// a reference to `pieces`.
 class CrossingCost {
  public:
   CrossingCost(const LabelledPieces& pieces, const JointOptions& options);

@@ -6,16 +6,16 @@
 
 namespace pencilscan {
 
-/// What the pieces around one in the same image say of its labels: surfaces are mostly smooth, so
-/// that a label whose depth differs little from theirs gains. That are the nearest six pieces of
-/// other curves within 16 px of its middle, by every second of their points. Curves that cross it
-/// are left out: crossings say that better.
+/// The smoothness term: a label costs less if its depth is near the depth of the pieces around.
+/// The neighbours of a piece are the nearest six pieces of other curves within 16 px of its middle
+/// (every second point of them is looked at). Curves that cross the piece are not among them:
+/// the crossing term compares those more exactly.
 class Surroundings {
  public:
   Surroundings(const Camera& camera, const GridGraph& graph, const LabelledPieces& pieces);
 
-  /// Cost of every label of every piece, given the beliefs in the labels of all; empty beliefs say
-  /// nothing.
+  /// Cost of every label of every piece, given the beliefs in the labels of all pieces. Without
+  /// beliefs all costs are 0.
   [[nodiscard]] std::vector<std::vector<float>> costs(const PieceBeliefs& beliefs) const;
 
  private:

@@ -10,13 +10,14 @@
 
 namespace pencilscan {
 
-/// `surface` below: a mesh whose vertices of confidence 0 were not measured; only where all three
-/// of a face were does it say anything.
-///
-/// Takes the labels of curve points away that the surface contradicts: on none of the rays
-/// through the point and a pixel beside it does the light of the labelled line, to half a line,
-/// meet the surface where the ray does. Points whose rays all miss the surface keep their labels.
-/// One of three points speaks for all three. What loses its label is undecided, as contradicted.
+// `surface` below is a mesh. Its vertices of confidence 0 were not measured. A face tells something
+// only if all three of its vertices were measured.
+
+/// Removes the labels of curve points that the surface contradicts. The test takes the rays through
+/// the point and through the pixels beside it. The surface contradicts the label if, on every ray,
+/// the labelled line's light is more than half a line away from where the ray meets the surface. A
+/// point whose rays all miss the surface keeps its label. One point of three is tested, for all
+/// three. A point that loses its label is undecided, with the reason kContradicted.
 /// Returns the number of such points.
 std::size_t drop_contradicted(const Rig& rig, const RayScene& surface,
                               std::span<const GridGraph> graphs, Labeling& labeling);
@@ -27,12 +28,13 @@ struct SettledPoints {
   std::size_t contradicted = 0;  ///< points left out
 };
 
-/// The points, moved along their camera rays onto the surface, which has a sigma at each vertex and
-/// knows the light of all pixels and cameras around. Their sigma is that of the surface, and grows
-/// with how far they were off; their normal is its, and their colour, where `colors` has the albedo
-/// of each of its vertices (linear light, as TriangleMesh::color). Without those whose line the
-/// surface contradicts, as above, and those that are too far off it for both to be right. Points
-/// that are odd, or whose rays miss the surface, stay where they were.
+/// Moves the points along their camera rays onto the surface. The surface is more certain than a
+/// point, because it rests on all pixels and cameras around. A moved point takes its sigma from the
+/// surface's vertices; the sigma grows with the way that the point moved. It takes its normal from
+/// the surface, too, and its colour where `colors` has the albedo of each vertex (linear light, as
+/// TriangleMesh::color). Two kinds of points are left out: those that the surface contradicts (as
+/// above), and those so far off it that one of the two must be wrong. Points that are odd, or whose
+/// rays miss the surface, stay where they were.
 [[nodiscard]] SettledPoints settle_on_surface(const Rig& rig, const RayScene& surface,
                                               std::span<const MeasuredPoint> points,
                                               std::span<const std::array<float, 3>> colors = {});

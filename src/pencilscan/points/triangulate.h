@@ -20,10 +20,10 @@ struct TriangulationOptions {
   double footprint_sigma_px = 0.1;  ///< of the surface within a pixel, in pixel footprints
 };
 
-/// Camera ray meets light sheet, for every pixel of every labelled curve. sigma: position noise,
-/// projector error and the footprint of a pixel, carried along the ray by the slope of the line
-/// coordinate. At most one point per (camera, projector, pattern, line, pixel): the most certain
-/// one.
+/// Intersects camera ray and light sheet for every pixel of every labelled curve. sigma adds the
+/// noise of the curve's position, the error of the projector and the footprint of a pixel; the
+/// slope of the line coordinate carries them along the ray. Of several points of one (camera,
+/// projector, pattern, line, pixel) only the most certain one is kept.
 [[nodiscard]] std::vector<MeasuredPoint> triangulate(const Rig& rig,
                                                      std::span<const GridGraph> graphs,
                                                      const Labeling& labeling,

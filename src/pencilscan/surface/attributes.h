@@ -8,9 +8,9 @@
 
 namespace pencilscan {
 
-/// Sets sigma and confidence of every vertex from the samples near it. A vertex is measured when a
-/// sample of its own side lies within the reach, which grows where the sheets graze the surface,
-/// and samples surround it; beyond the last line only a part of the reach counts.
+/// Sets sigma and confidence of every vertex from the samples near it. A vertex is measured if a
+/// sample of its own side lies within the reach and if samples surround it. The reach grows where
+/// the light sheets graze the surface. Beyond the last line only a part of it counts.
 void attribute_vertices(std::span<const SurfaceSample> samples, double reach_spacings,
                         double spacing, TriangleMesh& mesh);
 

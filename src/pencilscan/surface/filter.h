@@ -23,9 +23,9 @@ namespace pencilscan {
 [[nodiscard]] std::vector<double> vote(const Rig& rig, std::span<const SurfaceSample> samples,
                                        const PointGrid& grid, double spacing);
 
-/// Clears keep[i] of samples in small clusters: chains of kept samples with gaps up to `gap_mm`
-/// that have less than min_share of the largest cluster's samples. What floats far off would also
-/// stretch the octree and with it every cell.
+/// Clears keep[i] of samples in small clusters. A cluster is a chain of kept samples with gaps up
+/// to `gap_mm`; it is small if it has less than min_share of the largest cluster's samples.
+/// Clusters far away would stretch the octree, and with it every cell.
 void drop_small_clusters(std::span<const SurfaceSample> samples, double gap_mm, double min_share,
                          std::vector<char>& keep);
 

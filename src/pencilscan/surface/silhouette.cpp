@@ -150,8 +150,8 @@ Silhouette silhouette(int camera, const cv::Mat& image, double reach_px) {
   return result;
 }
 
-std::size_t draw_in(const Rig& rig, std::span<const Silhouette> silhouettes,
-                    const DrawInOptions& options, TriangleMesh& mesh) {
+std::size_t carve(const Rig& rig, std::span<const Silhouette> silhouettes,
+                  const CarvingOptions& options, TriangleMesh& mesh) {
   if (silhouettes.empty() || mesh.confidence.empty()) return 0;
   const auto is_invented = [&](std::size_t v) { return !(mesh.confidence[v] > 0); };
   TriangleMesh loose;  // the faces that may move

@@ -203,7 +203,7 @@ SurfaceResult close_depth(const Rig& rig, std::span<const DepthMap> maps,
   take(closed_surface(samples, closing), result);
   report.seconds_poisson = poisson_watch.seconds();
   const std::vector<Vec3> closed = result.mesh.vertices;
-  draw_in(rig, silhouettes, options.draw_in, result.mesh);
+  carve(rig, silhouettes, options.carving, result.mesh);
   untangle(closed, result.mesh);
   report.seconds = watch.seconds();
   return result;

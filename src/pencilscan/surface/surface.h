@@ -86,7 +86,7 @@ struct FusionOptions {
   double cell_spacings = 0.9;          ///< wished octree cell in node spacings, > 0
   double fit_spacings = 1.5;           ///< radius of local quadrics in node spacings, > 0
   int subdivisions = 1;                ///< of the octree's triangles, before they follow the depth
-  DrawInOptions draw_in;               ///< of what was invented, into the silhouettes
+  CarvingOptions carving;              ///< of what was invented, by the silhouettes
   FollowOptions follow;                ///< how vertices follow the depth
   double reach_spacings = 2;           ///< a vertex farther from all nodes was not measured, > 0
   double min_component_share = 0.05;   ///< of the largest component's measured area, in [0, 1]
@@ -94,8 +94,8 @@ struct FusionOptions {
 };
 
 /// The nodes of all depth maps, each weighted by its variance, move onto local quadrics through the
-/// nodes of all cameras (local_fit.h); screened Poisson closes them; what was invented is drawn
-/// into the silhouettes. The mesh is as coarse as the octree.
+/// nodes of all cameras (local_fit.h); screened Poisson closes them; silhouettes carve what was
+/// invented. The mesh is as coarse as the octree.
 [[nodiscard]] SurfaceResult close_depth(const Rig& rig, std::span<const DepthMap> maps,
                                         const FusionOptions& options = {},
                                         std::span<const Silhouette> silhouettes = {});

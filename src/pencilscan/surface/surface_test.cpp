@@ -182,6 +182,7 @@ TEST(Surface, SameBytesForAnyThreadCount) {
     const ThreadLimit limit(threads);
     results.push_back(reconstruct_surface(rig, points, test_options()));
   }
+  ASSERT_FALSE(results[0].measured.faces.empty());
   for (std::size_t i = 1; i < results.size(); ++i) {
     EXPECT_TRUE(equal_bytes(results[0].mesh, results[i].mesh));
     EXPECT_TRUE(equal_bytes(results[0].measured, results[i].measured));
@@ -346,7 +347,7 @@ TEST(SelfIntersections, AreTakenBackAndNothingElse) {
   EXPECT_NEAR(mesh.vertices[bulge].z(), before[bulge].z() + 1, 1e-5);
 }
 
-/// Closed and followed, with no second look at the images in between.
+/// Closed and followed, without guided depth in between.
 SurfaceResult surface_of(const Rig& rig, std::span<const MeasuredPoint> points,
                          std::span<const DepthMap> maps, const FusionOptions& options = {}) {
   SurfaceResult result = close_depth(rig, maps, options);
@@ -412,6 +413,12 @@ TEST(FollowNodes, NoStepWhereDepthEnds) {
     const double b = mesh.vertices[static_cast<std::size_t>(face[1])].norm();
     EXPECT_LT(std::abs(a - b), 0.5 * kOff);
   }
+  // It did follow where depth is, and stayed where none is near.
+  const auto [nearest, farthest] =
+      std::minmax_element(mesh.vertices.begin(), mesh.vertices.end(),
+                          [](const Vec3& a, const Vec3& b) { return a.norm() < b.norm(); });
+  EXPECT_NEAR(nearest->norm(), kRadius, 0.1 * kOff);
+  EXPECT_GT(farthest->norm(), kRadius + 0.5 * kOff);
 }
 
 TEST(FuseDepth, TooFewDepthsIsAStatus) {
@@ -482,7 +489,7 @@ TEST(Silhouettes, InventedBulgeIsDrawnIn) {
   const TriangleMesh bulged = mesh;
   ASSERT_TRUE(self_intersections(bulged).empty());
   // A millimetre a round: the devices of this test see 0.4 mm a pixel.
-  EXPECT_GT(draw_in(rig, silhouettes, {.step = 1}, mesh), 100U);
+  EXPECT_GT(carve(rig, silhouettes, {.step = 1}, mesh), 100U);
   EXPECT_EQ(count_edges(mesh).boundary, 0U);
   const double excess = signed_volume(bulged) - signed_volume(ball);
   EXPECT_LT(signed_volume(mesh) - signed_volume(ball), 0.35 * excess);
@@ -496,7 +503,7 @@ TEST(Silhouettes, InventedBulgeIsDrawnIn) {
   // What is within the silhouettes stays.
   TriangleMesh still = ball;
   still.confidence.assign(still.vertices.size(), 0.F);
-  EXPECT_EQ(draw_in(rig, silhouettes, {}, still), 0U);
+  EXPECT_EQ(carve(rig, silhouettes, {}, still), 0U);
 }
 
 /// Images of the ball under all patterns: albedo times light, one sample per pixel.

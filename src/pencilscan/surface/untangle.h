@@ -11,11 +11,11 @@ namespace pencilscan {
 /// in rising order. Faces with a common vertex do not count.
 [[nodiscard]] std::vector<std::size_t> self_intersections(const TriangleMesh& mesh);
 
-/// Mends moves of vertices that made the mesh cut itself: around faces that do, vertices first move
-/// as their neighbours do; where that is not enough, they go half of the way back, again and again.
-/// Coordinates become floats, as mesh files hold them: rounding can make faces cut each other, too.
-/// `before`: positions of the vertices when the mesh did not cut itself. Returns how many faces
-/// still do.
+/// Repairs self-intersections that moving the vertices caused. Around faces that intersect,
+/// vertices first take the mean move of their neighbours. Where that is not enough, they go half of
+/// the way back, and again. Coordinates are rounded to floats as in mesh files, because rounding
+/// can cause intersections, too. `before`: positions of the vertices when no faces intersected.
+/// Returns how many faces still do.
 std::size_t untangle(std::span<const Vec3> before, TriangleMesh& mesh);
 
 }  // namespace pencilscan

@@ -27,15 +27,15 @@ struct ColorView {
   bool is_plain = false;  ///< no patterns in the image: taken without them, or by a texture camera
 };
 
-/// Albedo per vertex (linear red, green, blue in [0, 1], up to one common factor, which no frame
-/// tells) from images of the patterns: the surface is known and so is its light,
+/// Albedo per vertex from images of the patterns: linear red, green and blue in [0, 1], up to one
+/// common factor that no frame tells. The surface is known, and so is the light on it:
 ///   I_c = rho (sum_p E_p P_p + a_c),  E_p = cosine / distance^2 where p is not shadowed,
 /// P_p: the pattern's colour at the vertex with its lines as blurred as in the image, a_c: ambient
-/// light of camera c, estimated where no line falls. Least squares per vertex and channel; what is
-/// in the dark of a channel, or invented, is filled from its neighbours (the weighted Laplace
-/// equation on the mesh). Where there are plain views, they alone count, their light taken as even.
-/// Empty when no camera gives a colour. All projectors are taken as
-/// equally bright at the centre of the volume.
+/// light of camera c, estimated where no line falls. rho is a least-squares fit per vertex and
+/// channel. A vertex that a channel does not light, or that is invented, gets the colour of its
+/// neighbours (the weighted Laplace equation on the mesh). Where there are plain views, only they
+/// count, and their light is taken as even. All projectors are taken as equally bright at the
+/// centre of the volume. Empty when no camera gives a colour.
 [[nodiscard]] std::vector<std::array<float, 3>> vertex_colors(const Rig& rig,
                                                               const RayScene& surface,
                                                               std::span<const ColorView> views,

@@ -151,7 +151,7 @@ std::optional<CarriedSurface> carry_surface(const Rig& rig, std::span<const Dept
   report.seconds_filter = watch.seconds();
   std::vector<Vec3> whole = then;  // moved rigidly, it did not cut itself
   for (Vec3& x : whole) x = result.motion * x;
-  draw_in(rig, silhouettes, options.draw_in, mesh);
+  carve(rig, silhouettes, options.carving, mesh);
   untangle(whole, mesh);
   report.seconds = watch.seconds();
   return result;

@@ -23,10 +23,11 @@ struct CarriedSurface {
 [[nodiscard]] SurfaceFit surface_fit(const Rig& rig, std::span<const DepthMap> maps,
                                      const TriangleMesh& mesh);
 
-/// The closed surface of the moment before, moved onto the depth maps of this one: what
-/// close_depth() gives, without making it from nothing. Nothing where it does not fit as one that
-/// is made from nothing did: where nodes lie together off it, where more of it is invented, or its
-/// triangles have become flat. So a jump, a new part or one that has gone is seen from nothing.
+/// Moves the closed surface of the moment before onto the depth maps of this one. The result is
+/// that of close_depth(), without a new Poisson reconstruction. There is no result where the moved
+/// surface fits worse than a new one did: where nodes lie together off it, where more of it is
+/// invented, or where its triangles have become flat. A jump, a new part or a lost part is
+/// therefore reconstructed anew.
 [[nodiscard]] std::optional<CarriedSurface> carry_surface(const Rig& rig,
                                                           std::span<const DepthMap> maps,
                                                           const TrackedSurface& before,
