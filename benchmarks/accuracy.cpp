@@ -119,7 +119,7 @@ void print_reliability(const LabelFigures& labels) {
 struct MethodChoice {
   const char* name;
   MethodOptions method;
-  bool has_second_look = true;
+  bool is_guided = true;
 };
 
 int run(const std::filesystem::path& rig_path, const std::filesystem::path& frames,
@@ -152,17 +152,18 @@ int run(const std::filesystem::path& rig_path, const std::filesystem::path& fram
       {"multiview published", published},
       {"multiview", MultiviewOptions{}},
       {"joint", JointOptions{}},
-      {"joint, first look", JointOptions{}, false},
-      {"clusters, first look", clusters, false},
+      {"joint, not guided", JointOptions{}, false},
+      {"clusters, not guided", clusters, false},
       {"clusters", clusters},
   };
   bool is_first = true;
   for (std::size_t k = 0; k < std::size(choices); ++k) {
     if (!methods.empty() && methods != choices[k].name) continue;
-    PointOptions options;
-    options.method = choices[k].method;
-    if (!choices[k].has_second_look) options.second_look.passes = 0;
-    const PointResult result = reconstruct_frame(rig, frame, options, {}, false).points;
+    FrameOptions options;
+    options.meshes = false;
+    options.points.method = choices[k].method;
+    if (!choices[k].is_guided) options.points.guided.passes = 0;
+    const PointResult result = reconstruct_frame(rig, frame, options).points;
     if (is_first) {
       print_detection(rig, result, true_lines);
       print_identities(truth, rig, result);

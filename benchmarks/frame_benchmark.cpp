@@ -88,17 +88,18 @@ void print_row(const std::string& stage, double seconds, double blur_seconds,
 /// Seconds a frame when several are made at once, as a sequence makes them.
 double seconds_at_once(const Rig& rig, const Frame& frame, bool with_shape) {
   constexpr std::size_t kFrames = 8;
+  FrameOptions options;
+  options.meshes = with_shape;
   const Stopwatch watch;
-  run_at_once(kFrames, frames_at_once(rig), [&](std::size_t) {
-    static_cast<void>(reconstruct_frame(rig, frame, {}, {}, with_shape));
-  });
+  run_at_once(kFrames, frames_at_once(rig),
+              [&](std::size_t) { static_cast<void>(reconstruct_frame(rig, frame, options)); });
   return watch.seconds() / kFrames;
 }
 
 void run(const Rig& stated, const std::filesystem::path& folder, int threads, int runs,
          bool with_shape) {
   const ThreadLimit limit(threads);
-  const Rig rig = scaled(stated, 1 / footprint(stated));
+  const Rig rig = in_footprints(stated);
   cv::setNumThreads(1);  // the cameras share the threads
 
   // The reference before and after, so that a machine that became slower in between is seen.
@@ -112,19 +113,18 @@ void run(const Rig& stated, const std::filesystem::path& folder, int threads, in
   Frame frame;
   for (int i = 0; i <= runs; ++i) {  // the first run warms up
     reading.measure([&] { frame = read_frame(rig, folder); });
-    PointResult result;
-    points.measure([&] { result = measure_points(rig, frame); });
-    std::vector<StageTime> times = result.times;
+    FrameResult result;
+    std::vector<StageTime> times;
+    const StageClock clock({}, times);
+    points.measure([&] { result.points = measure_points(rig, frame, {}, clock); });
     shape.measure([&] {
       if (!with_shape) return;
-      ShapeResult made = measure_shape(rig, frame, result);
-      look_again(rig, {}, result, made);
-      times.insert(times.end(), made.times.begin(), made.times.end());
-      times.push_back(result.times.back());
+      result.shape = measure_shape(rig, frame, result.points, {}, {}, clock);
+      result = match_on_surface(rig, std::move(result), {}, clock);
     });
     if (i == 0) {
       for (const StageTime& time : times) stages.push_back(time.stage);
-      point_count = result.points.size();
+      point_count = result.points.points.size();
       continue;
     }
     for (const StageTime& time : times) seconds_by_stage[time.stage].push_back(time.seconds);

@@ -169,8 +169,8 @@ test('a figure has the same digits everywhere, and words are explained', async (
   assert.match(bar, share);
   await page.click('#words summary');
   const text = await page.locator('#words').innerText();
-  for (const word of ['second look', 'too compressed', 'no crossing', 'local ID', 'Line recall']) assert.ok(text.includes(word), word);
-  assert.match(await page.locator('.bar-name', {hasText: 'second look'}).getAttribute('title'), /surface lets expect/);
+  for (const word of ['guided matching', 'too compressed', 'no crossing', 'local ID', 'Line recall']) assert.ok(text.includes(word), word);
+  assert.match(await page.locator('.bar-name', {hasText: /^guided matching$/}).getAttribute('title'), /surface lets expect/);
   await page.selectOption('#color-mode', 'hole');
   assert.match(await page.locator('.legend .key', {hasText: 'not seen'}).getAttribute('title'), /any camera/);
   await page.context().close();

@@ -5,6 +5,7 @@
 #include "pencilscan/core/child_process.h"
 #include "pencilscan/core/error.h"
 #include "pencilscan/io/file.h"
+#include "pencilscan/io/hash.h"
 
 namespace pencilscan::cli {
 namespace {
@@ -46,5 +47,7 @@ nlohmann::ordered_json run_own_command(const OwnCommand& command,
   if (!fs::exists(command.json)) return {};
   return nlohmann::ordered_json(read_json(command.json));
 }
+
+std::string own_hash() { return hex(hash_bytes(read_file("/proc/self/exe"))); }
 
 }  // namespace pencilscan::cli

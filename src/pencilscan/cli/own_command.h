@@ -23,4 +23,7 @@ struct OwnCommand {
 [[nodiscard]] nlohmann::ordered_json run_own_command(const OwnCommand& command,
                                                      const std::function<bool()>& go_on);
 
+/// Hash of this program's file: it tells one build from another.
+[[nodiscard]] std::string own_hash();
+
 }  // namespace pencilscan::cli

@@ -3,6 +3,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "pencilscan/cli/own_command.h"
 #include "pencilscan/cli/reconstruct_options.h"
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/parallel.h"
@@ -38,29 +39,22 @@ void reconstruct(const ReconstructOptions& options) {
   const ThreadLimit limit(options.common.threads);
   SequenceOptions sequence;
   const SolutionMethod& method = *find_method(options.method);
-  sequence.points.method = method.defaults;
-  if (!set_multiview_cost(options.cost, sequence.points.method))
+  FrameOptions& frame = sequence.output.frame;
+  frame.points.method = method.defaults;
+  if (!set_multiview_cost(options.cost, frame.points.method))
     throw InputError("--multiview-cost", "", options.cost, "must be published or normalized");
-  sequence.shape.depth.enabled = !options.no_depth && method.capabilities.allows_dense_depth;
+  frame.shape.depth.enabled = !options.no_depth && method.capabilities.allows_dense_depth;
   sequence.plain_frames = options.plain_frames;
-  sequence.refine_rig = options.refine_rig;
-  sequence.meshes = !options.no_mesh;
-  sequence.tracks = !options.independent;
-  sequence.pictures = !options.no_pictures;
-  sequence.depth_maps = options.depth_maps;
-  sequence.mesh_formats = options.mesh_formats;
+  sequence.output.refine_rig = options.refine_rig;
+  frame.meshes = !options.no_mesh;
+  sequence.output.tracks = !options.independent;
+  sequence.output.pictures = !options.no_pictures;
+  sequence.output.depth_maps = options.depth_maps;
+  sequence.output.mesh_formats = options.mesh_formats;
   sequence.overwrite = options.overwrite;
   if (!options.shard.empty())
     sequence.shard = shard_from_text(options.shard, process_environment());
-  sequence.description = "method=" + options.method + " multiview-cost=" + options.cost +
-                         " pictures=" + (options.no_pictures ? "no" : "yes") +
-                         " depth=" + (sequence.shape.depth.enabled ? "yes" : "no") +
-                         " depth-maps=" + (options.depth_maps ? "yes" : "no") +
-                         " refine-rig=" + (options.refine_rig ? "yes" : "no");
-  if (options.no_mesh) sequence.description += " mesh=no";
-  if (options.independent) sequence.description += " independent=yes";
-  if (!options.plain_frames.empty()) sequence.description += " plain=yes";
-  for (const std::string& format : options.mesh_formats) sequence.description += " " + format;
+  sequence.program = own_hash();
   warn_of(volume_unit_warning(read_rig(options.rig)));
   const auto [outcomes, refinement, warnings] =
       reconstruct_sequence(options.rig, options.frames, options.out, sequence,

@@ -95,8 +95,8 @@ DepthResult measure_depth(const Rig& rig, const std::vector<ColorFamily>& famili
   return result;
 }
 
-void complete_depth(const Rig& rig, const RayScene& surface, const DepthStageOptions& options,
-                    DepthResult& result) {
+void guided_depth(const Rig& rig, const RayScene& surface, const DepthStageOptions& options,
+                  DepthResult& result) {
   PENCILSCAN_CHECK(result.lights.size() == result.maps.size());
   const ObjectSpace space(rig);
   std::vector<std::size_t> found(result.maps.size());

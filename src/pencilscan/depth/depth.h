@@ -51,11 +51,11 @@ struct DepthResult {
                                         std::span<const MeasuredPoint> points,
                                         const DepthStageOptions& options = {});
 
-/// Nodes without depth look once more where the closed surface says that they should: growth does
-/// not get there across a gap, and patches that nobody confirmed agree with it now or stay out.
-/// Adds to the maps of `result` what the images bear out (dense_depth.h); `surface`: mesh in mm,
-/// world.
-void complete_depth(const Rig& rig, const RayScene& surface, const DepthStageOptions& options,
-                    DepthResult& result);
+/// Guided depth: windows of nodes without depth are fitted once more, started from the closed
+/// surface. Growth from neighbours does not cross a gap; the surface bridges it. A patch that no
+/// other camera confirmed enters only if it agrees with the surface. Only what the images show
+/// (dense_depth.h) is added to the maps of `result`. `surface`: in world coordinates, mm.
+void guided_depth(const Rig& rig, const RayScene& surface, const DepthStageOptions& options,
+                  DepthResult& result);
 
 }  // namespace pencilscan

@@ -73,4 +73,10 @@ CameraDetection detect_curves(const Camera& camera, const Rig& rig,
   return result;
 }
 
+std::vector<std::vector<cv::Mat>> presence_images(std::span<const CameraDetection> detections) {
+  std::vector<std::vector<cv::Mat>> presence;
+  for (const CameraDetection& detection : detections) presence.push_back(detection.presence);
+  return presence;
+}
+
 }  // namespace pencilscan

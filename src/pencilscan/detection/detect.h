@@ -1,5 +1,6 @@
 #pragma once
 
+#include <span>
 #include <string>
 #include <vector>
 
@@ -34,5 +35,9 @@ struct CameraDetection {
                                             const std::vector<ColorFamily>& families,
                                             const cv::Mat& image,
                                             const DetectionOptions& options = {});
+
+/// Of all cameras; they share their pixels with the detections.
+[[nodiscard]] std::vector<std::vector<cv::Mat>> presence_images(
+    std::span<const CameraDetection> detections);
 
 }  // namespace pencilscan

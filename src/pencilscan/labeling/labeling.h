@@ -50,7 +50,8 @@ enum class UndecidedReason {
   kOutsideVolume,  ///< no line meets its rays in the volume
 };
 
-/// A stretch of a curve that a solution left undecided; a second look may have labelled some of it.
+/// A stretch of a curve that a solution left undecided. Guided matching may have labelled some of
+/// it.
 struct UndecidedRun {
   int curve = 0;
   int begin = 0;  ///< first point

@@ -12,7 +12,7 @@
 #include "pencilscan/depth/depth.h"
 #include "pencilscan/detection/detect.h"
 #include "pencilscan/grid/grid_graph.h"
-#include "pencilscan/guided/second_look.h"
+#include "pencilscan/guided/guided_matching.h"
 #include "pencilscan/labeling/measured_point.h"
 #include "pencilscan/pipeline/method.h"
 #include "pencilscan/pipeline/stage_clock.h"
@@ -41,29 +41,40 @@ struct Frame {
   std::optional<FrameTiming> timing;  ///< where the pictures have time stamps
 };
 
+/// What decides the labelled points.
 struct PointOptions {
   DetectionOptions detection;
   GridOptions grid;
   MethodOptions method;
-  SecondLookOptions second_look;  ///< of methods that may be guided
+  GuidedMatchingOptions guided;  ///< of methods that may be guided
   TriangulationOptions triangulation;
   SettleOptions settle;  ///< of the same; others are triangulated as they are
-  Progress progress;     ///< hears of every stage as it starts, with fraction 0
 };
 
-/// How the labelled points become a surface.
+/// What decides how the labelled points become a surface.
 struct ShapeOptions {
   DepthStageOptions depth;
   FusionOptions fusion;    ///< of dense depth
   SurfaceOptions surface;  ///< of the curves alone, where dense depth is off or finds nothing
+};
+
+/// All that decides the result of one frame. Plain values, which core/fields.h lists one by one.
+struct FrameOptions {
+  PointOptions points;
+  ShapeOptions shape;
+  bool meshes = true;  ///< false: labelled points alone
+};
+
+/// Whom a frame talks to while it is made.
+struct FrameLinks {
+  Progress progress;  ///< hears of every stage as it starts, with fraction 0
   /// The surface of the moment before, asked for when it is needed; null: there is none.
   std::function<std::shared_ptr<const TrackedSurface>()> before;
   /// Hears of this moment's surface as soon as it is there; nobody: it is not kept.
   std::function<void(std::shared_ptr<const TrackedSurface>)> hand_on;
-  Progress progress;  ///< as in PointOptions
 };
 
-/// Labelled points of one frame and everything that led to them.
+/// Labelled points of one frame and everything that led to them. Each stage fills in its part.
 struct PointResult {
   std::vector<ColorFamily> families;
   std::vector<char> left_out;  ///< per camera: 1 where its picture is wrong; warnings say how
@@ -72,27 +83,13 @@ struct PointResult {
   Labeling labeling;
   CrossingDisagreement crossings;  ///< joint only: the paper's two have none by construction
   std::vector<CrossingDisagreement> device_crossings;  ///< the same: cameras, then projectors
-  bool rig_is_off = false;       ///< lines were named with the devices as the frame corrects them
-  bool looked_again = false;     ///< after the dense surface
+  /// The rig as the frame corrects it, which lines were named with, where the one given is off.
+  std::optional<Rig> corrected;
+  bool is_on_surface = false;    ///< matched once more, and settled, on the dense surface
   std::size_t contradicted = 0;  ///< labelled curve points that the dense surface contradicted
   std::vector<MeasuredPoint> points;
-  std::vector<StageTime> times;
   std::vector<Warning> warnings;
 };
-
-/// The first half of measure_points(): curves and grid graphs, which do not depend on where the
-/// devices stand (joint), without labels and points.
-[[nodiscard]] PointResult detect_frame(const Rig& rig, const Frame& frame,
-                                       const PointOptions& options = {});
-
-/// The steps below take lengths in footprints; reconstruct_frame() scales the rig.
-///
-/// The paper's Fig. 3 for one frame: detection and grid per camera, one solution over all cameras,
-/// triangulation. Joint: where crossing lines say that the rig is off, lines are named with the
-/// devices as the frame corrects them; points are triangulated with the rig as given, their sigma
-/// grows by its error, and a warning says so.
-[[nodiscard]] PointResult measure_points(const Rig& rig, const Frame& frame,
-                                         const PointOptions& options = {});
 
 /// Dense depth and surface of one frame.
 struct ShapeResult {
@@ -102,25 +99,13 @@ struct ShapeResult {
   std::shared_ptr<const RayScene>
       scene;              ///< of surface.mesh before its colours; null without dense depth
   int carried_since = 0;  ///< moments since the closed surface was made from nothing
-  std::vector<StageTime> times;
 };
-
-/// Dense depth from the labelled points, checked between the views and fused into one closed
-/// surface.
-[[nodiscard]] ShapeResult measure_shape(const Rig& rig, const Frame& frame,
-                                        const PointResult& points,
-                                        const ShapeOptions& options = {});
-
-/// What the dense surface says of the labels (joint): those that it contradicts go, lines that it
-/// lets expect are looked for once more, and the points settle on it. Replaces the points; those of
-/// the paper's methods, and all where the rig is off, stay as they are.
-void look_again(const Rig& rig, const PointOptions& options, PointResult& points,
-                ShapeResult& shape);
 
 /// What a whole frame gives.
 struct FrameResult {
   PointResult points;
   ShapeResult shape;  ///< empty without meshes
+  std::vector<StageTime> times;
 };
 
 /// No curve of a frame could be given its line: the pictures themselves are why.
@@ -128,11 +113,64 @@ struct NothingFound : StageError {
   using StageError::StageError;
 };
 
-/// All of the above in order, in footprints (rig/rig.h), so that the rig's unit does not matter;
-/// the result is in the rig's unit, without `scene`. NothingFound when no camera has a picture, or
-/// no curve a label.
+/// The shape in one frame: the stages below in order. They work in footprints (rig/rig.h), so that
+/// the rig's unit does not matter; the result is in the rig's unit, without `scene`. NothingFound
+/// when no camera has a picture, or no curve a label.
 [[nodiscard]] FrameResult reconstruct_frame(const Rig& rig, const Frame& frame,
-                                            const PointOptions& points, const ShapeOptions& shape,
-                                            bool meshes = true);
+                                            const FrameOptions& options = {},
+                                            const FrameLinks& links = {});
+
+// ---- its stages ---------------------------------------------------------------------------------
+
+/// The rig as the stages take it: lengths in footprints, lines where their mean colour is.
+[[nodiscard]] Rig in_footprints(const Rig& rig);
+
+/// Detection and grid: the curves of each camera and their graph.
+[[nodiscard]] PointResult detect_frame(const Rig& rig, const Frame& frame,
+                                       const PointOptions& options = {},
+                                       const StageClock& clock = {});
+
+/// What the pictures themselves say: warnings; those that are plainly wrong are left out.
+[[nodiscard]] PointResult check_pictures(const Rig& rig, const Frame& frame, PointResult curves);
+
+/// Solution: the line of each curve. Of a method that may correct the rig (joint), pictures that do
+/// not fit are left out, and where crossing lines say that the rig is off, lines are named with the
+/// devices as the frame corrects them. StageError when two projectors are exchanged.
+[[nodiscard]] PointResult solve_frame(const Rig& rig, const Frame& frame, PointResult curves,
+                                      const PointOptions& options = {},
+                                      const StageClock& clock = {});
+
+/// From lines to points: guided matching on the surface that the labels show, then camera rays meet
+/// light sheets. Points are triangulated with the rig as given; where it is off, their sigma grows
+/// by its error.
+[[nodiscard]] PointResult place_points(const Rig& rig, PointResult lines,
+                                       const PointOptions& options = {},
+                                       const StageClock& clock = {});
+
+/// Dense depth from the labelled points, checked between the views and fused into one closed
+/// surface.
+[[nodiscard]] ShapeResult measure_shape(const Rig& rig, const Frame& frame,
+                                        const PointResult& points, const ShapeOptions& options = {},
+                                        const FrameLinks& links = {}, const StageClock& clock = {});
+
+/// Guided matching on the dense surface (of methods that may be guided): labels that it contradicts
+/// go, lines that it lets expect are looked for, and the points settle on it. Where the rig is off
+/// everything stays as it is.
+[[nodiscard]] FrameResult match_on_surface(const Rig& rig, FrameResult result,
+                                           const PointOptions& options = {},
+                                           const StageClock& clock = {});
+
+/// From lines to the whole result, in footprints. NothingFound when there are no points.
+[[nodiscard]] FrameResult measure_frame(const Rig& rig, const Frame& frame, PointResult lines,
+                                        const FrameOptions& options, const FrameLinks& links,
+                                        const StageClock& clock);
+
+/// The points of a frame without a surface. `rig`: of any unit, which lengths are then taken in.
+[[nodiscard]] PointResult measure_points(const Rig& rig, const Frame& frame,
+                                         const PointOptions& options = {},
+                                         const StageClock& clock = {});
+
+/// A result in footprints in the unit that a footprint is `unit` of, without `scene`.
+[[nodiscard]] FrameResult in_unit(double unit, FrameResult result);
 
 }  // namespace pencilscan

@@ -211,7 +211,7 @@ nlohmann::ordered_json frame_report(const Rig& rig, const Frame& frame, const Po
   for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
     report["cameras"].push_back(camera_report(rig, frame, points, c));
   }
-  if (points.looked_again) report["points_contradicted"] = points.contradicted;
+  if (points.is_on_surface) report["points_contradicted"] = points.contradicted;
   if (points.crossings.crossings > 0) {
     report["crossing_disagreement"] = {{"crossings", points.crossings.crossings},
                                        {"median_px", number(points.crossings.median_px)},

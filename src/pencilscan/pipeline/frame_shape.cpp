@@ -101,8 +101,9 @@ DepthResult depth_of(const Rig& rig, const Frame& frame, const PointResult& poin
 /// takes what stays the same until the surface is made from nothing again. Returns how far the
 /// vertices have come; nothing where the surface is new.
 std::vector<float> close_surface(const Rig& rig, const std::vector<ColorView>& views,
-                                 const ShapeOptions& options, const TrackedSurface* before,
-                                 ShapeResult& result, TrackedSurface& next) {
+                                 const ShapeOptions& options, bool is_handed_on,
+                                 const TrackedSurface* before, ShapeResult& result,
+                                 TrackedSurface& next) {
   const std::vector<Silhouette> silhouettes = silhouettes_of(rig, views);
   if (before != nullptr) {
     if (auto carried =
@@ -115,14 +116,14 @@ std::vector<float> close_surface(const Rig& rig, const std::vector<ColorView>& v
     }
   }
   result.surface = close_depth(rig, result.depth.maps, options.fusion, silhouettes);
-  if (options.hand_on && !result.surface.mesh.faces.empty())
+  if (is_handed_on && !result.surface.mesh.faces.empty())
     next.fit = surface_fit(rig, result.depth.maps, result.surface.mesh);
   return {};
 }
 
 /// What rests is held still; the surface goes on to the next moment.
-void hand_on(const ShapeOptions& options, const TrackedSurface* before,
-             std::span<const float> traveled, TrackedSurface next, SurfaceResult& surface) {
+void hand_on(const FrameLinks& links, const TrackedSurface* before, std::span<const float> traveled,
+             TrackedSurface next, SurfaceResult& surface) {
   TriangleMesh& mesh = surface.mesh;
   if (!traveled.empty()) {
     const std::vector<Vec3> followed = mesh.vertices;
@@ -135,25 +136,25 @@ void hand_on(const ShapeOptions& options, const TrackedSurface* before,
   next.mesh.faces = mesh.faces;
   next.mesh.sigma = mesh.sigma;
   next.mesh.confidence = mesh.confidence;
-  options.hand_on(std::make_shared<const TrackedSurface>(std::move(next)));
+  links.hand_on(std::make_shared<const TrackedSurface>(std::move(next)));
 }
 
 /// The depth maps become one closed surface, which lets depth be completed where it was missing and
 /// then follows it.
 void fuse(const Rig& rig, const PointResult& points, const std::vector<ColorView>& views,
-          const ShapeOptions& options, ShapeResult& result) {
-  const std::shared_ptr<const TrackedSurface> before = options.before ? options.before() : nullptr;
+          const ShapeOptions& options, const FrameLinks& links, ShapeResult& result) {
+  const std::shared_ptr<const TrackedSurface> before = links.before ? links.before() : nullptr;
   SurfaceResult& surface = result.surface;
   TrackedSurface next;
-  const std::vector<float> traveled =
-      close_surface(rig, views, options, before.get(), result, next);
+  const std::vector<float> traveled = close_surface(
+      rig, views, options, static_cast<bool>(links.hand_on), before.get(), result, next);
   next.coarse_faces = surface.mesh.faces;
   result.carried_since = next.age;
-  complete_depth(rig, RayScene(surface.mesh), options.depth, result.depth);
+  guided_depth(rig, RayScene(surface.mesh), options.depth, result.depth);
   result.depth.lights.clear();
   follow_depth(rig, result.depth.maps, options.fusion, surface);
-  if (options.hand_on && !surface.mesh.faces.empty())
-    hand_on(options, before.get(), traveled, std::move(next), surface);
+  if (links.hand_on && !surface.mesh.faces.empty())
+    hand_on(links, before.get(), traveled, std::move(next), surface);
   finish_surface(rig, points.points, result.depth.maps, options.fusion, surface);
 }
 
@@ -166,17 +167,16 @@ void mark_holes(const Rig& rig, ShapeResult& result) {
 
 }  // namespace
 
-ShapeResult measure_shape(const Rig& stated, const Frame& frame, const PointResult& points,
-                          const ShapeOptions& options) {
-  const Rig rig = with_registered_patterns(stated);
+ShapeResult measure_shape(const Rig& rig, const Frame& frame, const PointResult& points,
+                          const ShapeOptions& options, const FrameLinks& links,
+                          const StageClock& clock) {
   ShapeResult result;
-  const StageClock clock(options.progress, result.times);
   if (options.depth.enabled) {
     clock("depth", [&] { result.depth = depth_of(rig, frame, points, options.depth); });
     std::vector<ColorView> views;
     clock("surface", [&] {
       views = color_views(rig, frame, points, result.depth.report);
-      fuse(rig, points, views, options, result);
+      fuse(rig, points, views, options, links, result);
     });
     if (result.surface.report.status != SurfaceStatus::kTooFewPoints) {
       clock("holes", [&] { mark_holes(rig, result); });

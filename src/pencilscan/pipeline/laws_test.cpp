@@ -29,10 +29,16 @@ Frame picture(const Rig& rig, const TriangleMesh& mesh) {
   return frame;
 }
 
-ShapeOptions coarse() {
-  ShapeOptions options;
-  options.surface.max_depth = 5;
-  options.fusion.max_depth = 5;
+FrameOptions coarse() {
+  FrameOptions options;
+  options.shape.surface.max_depth = 5;
+  options.shape.fusion.max_depth = 5;
+  return options;
+}
+
+FrameOptions points_alone() {
+  FrameOptions options;
+  options.meshes = false;
   return options;
 }
 
@@ -41,7 +47,7 @@ class Laws : public testing::Test {
   static void SetUpTestSuite() {
     rig_ = new Rig(sample::small_rig(480, 360, 110));
     frame_ = new Frame(picture(*rig_, make_sphere(95, 48)));
-    result_ = new FrameResult(reconstruct_frame(*rig_, *frame_, {}, coarse()));
+    result_ = new FrameResult(reconstruct_frame(*rig_, *frame_, coarse()));
   }
   static void TearDownTestSuite() {
     delete result_;
@@ -95,7 +101,7 @@ TEST_F(Laws, TheRigsUnitDoesNotMatter) {
   const double of_mm = error(*result_);
   ASSERT_LT(of_mm, 0.3);
   for (const double scale : {0.001, 0.01, 30.0}) {
-    const FrameResult other = reconstruct_frame(scaled(*rig_, scale), *frame_, {}, coarse());
+    const FrameResult other = reconstruct_frame(scaled(*rig_, scale), *frame_, coarse());
     EXPECT_GT(agreement(result_->points.points, other.points.points), 0.999) << scale;
     EXPECT_NEAR(error(other, scale), of_mm, 0.01 * of_mm) << scale;
     EXPECT_NEAR(median_sigma(other) / scale, median_sigma(*result_), 0.01 * median_sigma(*result_));
@@ -108,8 +114,8 @@ TEST_F(Laws, TheRigsUnitDoesNotMatter) {
 TEST_F(Laws, TheGainDecidesNothing) {
   Frame darker = *frame_;
   for (cv::Mat& image : darker.images) image = cv::Mat(0.5 * image);
-  const FrameResult other = reconstruct_frame(*rig_, darker, {}, coarse(), false);
-  const FrameResult same = reconstruct_frame(*rig_, *frame_, {}, coarse(), false);
+  const FrameResult other = reconstruct_frame(*rig_, darker, points_alone());
+  const FrameResult same = reconstruct_frame(*rig_, *frame_, points_alone());
   EXPECT_GT(agreement(same.points.points, other.points.points), 0.98);
 }
 
@@ -144,7 +150,7 @@ TEST_F(Laws, AGammaThatIsNotStatedIsNamed) {
 /// What a gamma was put on and taken off again is the same light, in every stage.
 TEST_F(Laws, GammaIsTakenOutOnce) {
   const Rig coded_rig = with_gamma(*rig_);
-  const FrameResult other = reconstruct_frame(coded_rig, coded(*frame_), {}, coarse());
+  const FrameResult other = reconstruct_frame(coded_rig, coded(*frame_), coarse());
   EXPECT_GT(agreement(result_->points.points, other.points.points), 0.98);
   EXPECT_NEAR(error(other), error(*result_), 0.02 * error(*result_));
   EXPECT_NEAR(other.shape.surface.report.measured_share,
@@ -157,8 +163,8 @@ TEST_F(Laws, TheOrderOfDevicesDoesNotMatter) {
   std::swap(turned.projectors[0], turned.projectors[1]);
   Frame frame = *frame_;
   std::swap(frame.images[0], frame.images[1]);
-  FrameResult other = reconstruct_frame(turned, frame, {}, coarse(), false);
-  FrameResult same = reconstruct_frame(*rig_, *frame_, {}, coarse(), false);
+  FrameResult other = reconstruct_frame(turned, frame, points_alone());
+  FrameResult same = reconstruct_frame(*rig_, *frame_, points_alone());
   for (MeasuredPoint& p : other.points.points) {
     p.camera = static_cast<std::uint8_t>(1 - p.camera);
     p.projector = static_cast<std::uint8_t>(1 - p.projector);
@@ -179,7 +185,7 @@ TEST_F(Laws, TheWorldMayTurnAndMove) {
   for (Camera& camera : moved.cameras) move(camera);
   for (Projector& projector : moved.projectors) move(projector);
   moved.volume->center = world.translation;
-  const FrameResult other = reconstruct_frame(moved, *frame_, {}, coarse());
+  const FrameResult other = reconstruct_frame(moved, *frame_, coarse());
   EXPECT_GT(agreement(result_->points.points, other.points.points), 0.97);
   EXPECT_NEAR(error(other, 1, world.translation), error(*result_), 0.1 * error(*result_));
 }
@@ -208,7 +214,7 @@ TEST_F(Laws, SixteenColorFamiliesAndEightyPatternsBreakNothing) {
     projector.patterns.push_back(pattern);
   }
   try {
-    static_cast<void>(reconstruct_frame(many, small, {}, coarse()));
+    static_cast<void>(reconstruct_frame(many, small, coarse()));
   } catch (const NothingFound&) {
     // The pictures show two of the patterns: nothing need be found, and nothing may break.
   }
@@ -224,7 +230,7 @@ TEST_F(Laws, SixteenColorFamiliesAndEightyPatternsBreakNothing) {
   }
   EXPECT_EQ(color_families(families).size(), 16U);
   try {
-    static_cast<void>(reconstruct_frame(families, small, {}, coarse()));
+    static_cast<void>(reconstruct_frame(families, small, coarse()));
   } catch (const NothingFound&) {
   }
 }

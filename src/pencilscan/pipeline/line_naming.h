@@ -17,14 +17,18 @@ struct LineNaming {
   std::optional<Warning> warning;
 };
 
-/// Of a method that may correct the rig (MethodCapabilities). Keeps the names that the solution
-/// gave with the rig as given. Where their crossings then miss each other, or many curves stay
-/// without a name, with the rig as the crossings correct it (refine_rig_on_frames), if its own
-/// crossings agree, or agree better, or clearly more curves have a name. Where crossings meet as
-/// closely as noise lets expect, and most curves of every camera have a name once the surface of
-/// the others has guided them (`guided_share`: of the points of the camera that has fewest, asked
-/// only then; nobody to ask: none has), the rig is not doubted: curves that are close together wait
-/// for their surface.
+/// Decides whether lines keep the names that the solution gave with the rig as given, or get names
+/// with a corrected rig. For methods that may correct the rig (MethodCapabilities).
+///
+/// The rig is doubted where crossings miss each other, or where many curves have no name. It is not
+/// doubted where crossings meet as closely as noise lets expect and most curves of every camera
+/// have a name after guided matching: curves that are close together only need the surface.
+/// (`guided_share` gives the share of points with a name, of the camera where it is least. It is
+/// asked only then. Without it, the share counts as 0.)
+///
+/// A rig in doubt is corrected from the crossings (refine_rig_on_frames). The names with the
+/// corrected rig are taken if its crossings agree, or agree better, or if clearly more curves have
+/// a name.
 [[nodiscard]] LineNaming name_lines(const Rig& rig, const std::vector<ColorFamily>& families,
                                     const std::vector<GridGraph>& graphs, Labeling labeling,
                                     const PointOptions& options,

@@ -120,7 +120,6 @@ double named_share(const Labeling& labeling, std::size_t c) {
 class PictureTrial {
  public:
   PictureTrial(const Rig& rig, const PointOptions& options) : rig_(rig), options_(options) {
-    options_.progress = {};
     // The pictures come as linear light of three colours.
     for (Camera& camera : rig_.cameras) {
       camera.gamma = 1;

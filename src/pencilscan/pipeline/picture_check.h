@@ -34,17 +34,17 @@ struct PictureFinding {
 /// Faults that show without looking for lines: black, grey, repeated. One a camera at most.
 [[nodiscard]] std::vector<PictureFinding> plain_faults(const Rig& rig, const Frame& frame);
 
-/// Cameras of which the solution could name few curves while it names many elsewhere, or few
-/// everywhere, and why: each of the faults above is undone and the camera's curves are named alone;
-/// what then names most of them was the fault. `labeling`: of all cameras (joint).
+/// Finds the fault of cameras whose curves the solution could not name. Each of the faults above is
+/// undone in turn, and the camera's curves are named alone. The one after which most curves have a
+/// name was the fault. `labeling`: of all cameras (joint).
 [[nodiscard]] std::vector<PictureFinding> misplaced_pictures(const Rig& rig, const Frame& frame,
                                                              const std::vector<GridGraph>& graphs,
                                                              const Labeling& labeling,
                                                              const PointOptions& options);
 
-/// Two projectors that show each other's pictures: where several cameras have few names, and get
-/// many with the patterns of those two exchanged. `labeling` as above; only projectors of one panel
-/// size can be.
+/// Finds two projectors that show each other's pictures: several cameras have few names, and get
+/// many once the patterns of the two are exchanged. `labeling` as above. Only projectors with the
+/// same panel size are tried.
 [[nodiscard]] std::optional<std::pair<int, int>> exchanged_projectors(
     const Rig& rig, const Frame& frame, const std::vector<GridGraph>& graphs,
     const Labeling& labeling, const PointOptions& options);

@@ -82,10 +82,10 @@ class PipelineTest : public testing::Test {
 
   static SequenceOptions quick() {
     SequenceOptions options;
-    options.pictures = false;
-    options.shape.surface.max_depth = 5;
-    options.shape.fusion.max_depth = 5;
-    options.description = "quick";
+    options.output.pictures = false;
+    options.output.frame.shape.surface.max_depth = 5;
+    options.output.frame.shape.fusion.max_depth = 5;
+    options.program = "test";
     return options;
   }
 
@@ -142,9 +142,10 @@ TEST_F(PipelineTest, TheSurfaceTakesWrongLabelsAwayAndFindsTheirLinesAgain) {
   const auto recall = [&](const PointResult& result) {
     return line_recall(*rig_, lines, result.points).recall.value();
   };
-  const ShapeOptions shape_options = quick().shape;
-  PointResult result = measure_points(*rig_, *frame_);
-  ShapeResult shape = measure_shape(*rig_, *frame_, result, shape_options);
+  const ShapeOptions shape_options = quick().output.frame.shape;
+  FrameResult made{measure_points(*rig_, *frame_), {}, {}};
+  made.shape = measure_shape(*rig_, *frame_, made.points, shape_options);
+  PointResult& result = made.points;
   const double recall_before = recall(result);
   // Every tenth run gets its neighbour's line.
   for (auto& runs : result.labeling.runs) {
@@ -155,11 +156,11 @@ TEST_F(PipelineTest, TheSurfaceTakesWrongLabelsAwayAndFindsTheirLinesAgain) {
   }
   result.points = triangulate(*rig_, result.graphs, result.labeling);
   ASSERT_GT(wrong(result), 0.03);
-  look_again(*rig_, {}, result, shape);
+  made = match_on_surface(*rig_, std::move(made));
   EXPECT_LT(wrong(result), 0.003);
   EXPECT_GT(recall(result), recall_before - 0.01);
   EXPECT_GT(result.contradicted, 100U);
-  EXPECT_EQ(shape.surface.used.size(), result.points.size());
+  EXPECT_EQ(made.shape.surface.used.size(), result.points.size());
 }
 
 TEST_F(PipelineTest, LinesWithoutACodeAreToldApartWhereFourProjectorsShareAColour) {
@@ -228,17 +229,17 @@ TEST_F(PipelineTest, SingleProjectorLabelsTheGridOfOneProjector) {
 
 TEST_F(PipelineTest, SingleProjectorRefusesARigWithoutAGrid) {
   SequenceOptions options = quick();
-  options.points.method = SingleProjectorOptions{};
+  options.output.frame.points.method = SingleProjectorOptions{};
   EXPECT_THROW(static_cast<void>(run(*folder_ / "frames", *folder_ / "out_without_grid", options)),
                InputError);
 }
 
 TEST_F(PipelineTest, PointsAloneAreThoseOfTheWholeResult) {
   SequenceOptions options = quick();
-  options.points.method = MultiviewOptions{};
-  options.shape.depth.enabled = false;
+  options.output.frame.points.method = MultiviewOptions{};
+  options.output.frame.shape.depth.enabled = false;
   ASSERT_TRUE(run(*folder_ / "frames", *folder_ / "out_whole", options).front().done);
-  options.meshes = false;
+  options.output.frame.meshes = false;
   ASSERT_TRUE(run(*folder_ / "frames", *folder_ / "out_points", options).front().done);
   EXPECT_EQ(read_file(*folder_ / "out_points" / "000000" / "points.ply"),
             read_file(*folder_ / "out_whole" / "000000" / "points.ply"));
@@ -284,7 +285,7 @@ TEST_F(PipelineTest, ResumesItsOwnOutputAndRefusesThatOfOtherOptions) {
   const std::string report = read_file(out / "000000" / "report.json");
   EXPECT_TRUE(run(*folder_ / "frames", out, quick()).front().resumed);
   SequenceOptions other = quick();
-  other.description = "other";
+  other.output.frame.points.detection.trace.min_points = 7;
   EXPECT_THROW(static_cast<void>(run(*folder_ / "frames", out, other)), InputError);
   EXPECT_EQ(read_file(out / "000000" / "report.json"), report);
   // An aborted frame (no report yet) is made again.
@@ -309,8 +310,8 @@ TEST_F(PipelineTest, RefinedRigIsWrittenUsedAndResumed) {
   const fs::path folder = *folder_ / "refine";
   write_rig(corrected_rig(*rig_, {one, other, other, one}), folder / "rig.json");
   SequenceOptions options = quick();
-  options.refine_rig = true;
-  options.shape.depth.enabled = false;
+  options.output.refine_rig = true;
+  options.output.frame.shape.depth.enabled = false;
   std::vector<std::string> rigs;
   for (const int threads : {1, 2}) {
     const ThreadLimit limit(threads);
@@ -335,7 +336,7 @@ TEST_F(PipelineTest, RefinedRigIsWrittenUsedAndResumed) {
   EXPECT_THROW(
       static_cast<void>(reconstruct_sequence(out / "rig.json", *folder_ / "frames", out, options)),
       InputError);
-  options.refine_rig = false;
+  options.output.refine_rig = false;
   EXPECT_TRUE(reconstruct_sequence(out / "rig.json", *folder_ / "frames", out, options)
                   .frames.front()
                   .done);
@@ -370,8 +371,8 @@ TEST_F(PipelineTest, RigOfOneProjectorIsNotRefinedAndStaysAsItIs) {
   const fs::path folder = *folder_ / "refuse";
   write_rig(rig, folder / "rig.json");
   SequenceOptions options = quick();
-  options.refine_rig = true;
-  options.shape.depth.enabled = false;
+  options.output.refine_rig = true;
+  options.output.frame.shape.depth.enabled = false;
   const auto outcome =
       reconstruct_sequence(folder / "rig.json", *folder_ / "frames", folder / "out", options);
   ASSERT_TRUE(outcome.refinement);
@@ -466,7 +467,7 @@ TEST_F(PipelineTest, MissingCameraIsAWarningAndNotAFailure) {
   fs::copy_file(*folder_ / "frames" / "000000" / "cam0.png", frames / "000000" / "cam0.png",
                 fs::copy_options::overwrite_existing);
   SequenceOptions options = quick();
-  options.points.method = LinearOptions{};
+  options.output.frame.points.method = LinearOptions{};
   const auto outcomes = run(frames, *folder_ / "out_missing", options);
   ASSERT_TRUE(outcomes.front().done) << outcomes.front().failure;
   EXPECT_THAT(outcomes.front().warnings, testing::Contains(testing::HasSubstr("cam1")));
@@ -477,8 +478,8 @@ TEST_F(PipelineTest, AFrameWhosePicturesChangeMeanwhileIsAFailedOneAndIsMadeAnew
   fs::create_directories(frames);
   fs::copy(*folder_ / "frames" / "000000", frames / "000000");
   SequenceOptions options = quick();
-  options.points.method = LinearOptions{};
-  options.meshes = false;
+  options.output.frame.points.method = LinearOptions{};
+  options.output.frame.meshes = false;
   const auto reconstruct = [&](const Progress& progress) {
     return reconstruct_sequence(*folder_ / "rig.json", frames, *folder_ / "out_changing", options,
                                 progress)
@@ -510,7 +511,7 @@ TEST_F(PipelineTest, TrackedFramesGoOnFromWhereAKilledProgramWas) {
   const fs::path alone = *folder_ / "out_tracked_alone";
   add_frame("000000", *frame_, 1);
   add_frame("000001", *frame_, 0.99);
-  options.tracks = true;
+  options.output.tracks = true;
   ASSERT_EQ(run(frames, parts, options).size(), 2U);
   add_frame("000002", *frame_, 0.98);
   add_frame("000003", jumped, 1);
@@ -519,7 +520,7 @@ TEST_F(PipelineTest, TrackedFramesGoOnFromWhereAKilledProgramWas) {
   fs::remove_all(parts / "000001");  // its surface decides the next one's, too
   EXPECT_TRUE(run(frames, parts, options)[1].done);
   static_cast<void>(run(frames, whole, options));
-  options.tracks = false;
+  options.output.tracks = false;
   static_cast<void>(run(frames, alone, options));
 
   const auto mesh = [](const fs::path& out, const std::string& frame) {

@@ -8,6 +8,7 @@
 
 #include "pencilscan/core/counted_progress.h"
 #include "pencilscan/core/error.h"
+#include "pencilscan/core/fields.h"
 #include "pencilscan/core/memory.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/core/stopwatch.h"
@@ -43,15 +44,26 @@ std::vector<std::size_t> refinement_frames(std::size_t frames) {
   return picked;
 }
 
+/// The options in words that tell most of them apart, and a hash of all of their values.
+std::string options_text(const SequenceOptions& options) {
+  const OutputOptions& output = options.output;
+  const std::string_view method = solution_method(output.frame.points.method).name;
+  return "method=" + std::string(method) + (output.frame.meshes ? "" : " mesh=no") +
+         (output.frame.shape.depth.enabled ? "" : " depth=no") +
+         (output.refine_rig ? " refine-rig=yes" : "") + (output.tracks ? "" : " independent=yes") +
+         (options.plain_frames.empty() ? "" : " plain=yes") +
+         " all=" + hex(hash_bytes(fields_text(output)));
+}
+
 /// What decides the output: the program, rig bytes, options, the frames that refine the rig.
 RunInputs describe_inputs(const fs::path& rig_path, const FrameSource& frames,
                           const SequenceOptions& options) {
   RunInputs inputs;
-  inputs.program = hex(hash_bytes(read_file("/proc/self/exe")));
+  inputs.program = options.program;
   inputs.rig = hex(hash_bytes(read_file(rig_path)));
-  inputs.options = options.description;
+  inputs.options = options_text(options);
   inputs.frames = frames.names();
-  if (!options.refine_rig) return inputs;
+  if (!options.output.refine_rig) return inputs;
   std::string hashes;
   for (const std::size_t i : refinement_frames(frames.size())) hashes += hex(frames.hash(i));
   inputs.refined_from = hex(hash_bytes(hashes));
@@ -65,7 +77,8 @@ struct PictureHashes {
 };
 
 bool tracks(const SequenceOptions& options) {
-  return options.tracks && options.meshes && options.shape.depth.enabled;
+  const OutputOptions& output = options.output;
+  return output.tracks && output.frame.meshes && output.frame.shape.depth.enabled;
 }
 
 PictureHashes hashes_of(const FrameSource& frames, std::size_t frame) {
@@ -159,39 +172,38 @@ void check_images(const Rig& rig, const FrameSource& frames, const Progress& pro
 
 /// A frame that is there, or of the chunk before: its surface goes on, nothing is written.
 void pass_frame(const Rig& rig, const FrameSource& frames, std::size_t index,
-                const SequenceOptions& options) {
-  static_cast<void>(reconstruct_frame(rig, frames.read(rig, index), options.points, options.shape));
+                const OutputOptions& options, const FrameLinks& links) {
+  static_cast<void>(reconstruct_frame(rig, frames.read(rig, index), options.frame, links));
 }
 
 void write_frame(const Rig& rig, const FrameSource& frames, std::size_t index,
-                 const PictureHashes& images, const fs::path& folder,
-                 const SequenceOptions& options, FrameOutcome& outcome) {
+                 const PictureHashes& images, const fs::path& folder, const OutputOptions& options,
+                 const FrameLinks& links, FrameOutcome& outcome) {
   const Stopwatch total;
   const Frame frame = frames.read(rig, index);
   const double reading = total.seconds();
-  auto [points, shape] =
-      reconstruct_frame(rig, frame, options.points, options.shape, options.meshes);
+  auto [points, shape, times] = reconstruct_frame(rig, frame, options.frame, links);
   const SurfaceResult& surface = shape.surface;
   write_points(folder / "points.ply", points.points);
   write_curves(folder / "curves.ply", describe_curves(rig, points));
-  if (options.meshes) {
+  if (options.frame.meshes) {
     write_mesh(folder / "mesh.ply", surface.mesh);
     write_mesh(folder / "mesh_measured.ply", surface.measured);
     for (const std::string& format : options.mesh_formats)
       export_mesh(folder / ("mesh." + format), surface.mesh);
   }
-  if (options.meshes && options.depth_maps) write_depth_maps(folder, rig, shape);
+  if (options.frame.meshes && options.depth_maps) write_depth_maps(folder, rig, shape);
   if (options.pictures) {
     const Stopwatch picture_watch;
     write_camera_pictures(folder / "pictures", rig, frame);
     write_frame_pictures(folder / "pictures", rig, frame, points, shape);
-    if (options.meshes) write_hole_pictures(folder / "pictures", rig, shape);
-    points.times.push_back({"pictures", picture_watch.seconds()});
+    if (options.frame.meshes) write_hole_pictures(folder / "pictures", rig, shape);
+    times.push_back({"pictures", picture_watch.seconds()});
   }
   ordered_json timing;
   timing["threads"] = thread_count();
   timing["seconds"] = {{"reading", reading}};
-  for (const StageTime& t : points.times) timing["seconds"][t.stage] = t.seconds;
+  for (const StageTime& t : times) timing["seconds"][t.stage] = t.seconds;
   timing["seconds"]["total"] = total.seconds();
   write_json(folder / "timing.json", timing);
   ordered_json report = frame_report(rig, frame, points, shape);
@@ -234,7 +246,7 @@ Rig refined_rig(const Rig& rig, const FrameSource& frames, const fs::path& out,
   std::vector<std::string> names;
   for (const std::size_t i : picked) {
     tell_steps(progress, "lines for the rig: frame", names.size(), picked.size());
-    PointOptions joint = options.points;
+    PointOptions joint = options.output.frame.points;
     joint.method = JointOptions{};
     PointResult detected = detect_frame(rig, frames.read(rig, i), joint);
     curves.push_back({std::move(detected.families), std::move(detected.graphs)});
@@ -242,7 +254,7 @@ Rig refined_rig(const Rig& rig, const FrameSource& frames, const fs::path& out,
   }
   if (progress) progress("refining the rig", 0);
   RigRefinementOptions refinement_options;
-  refinement_options.points = options.points;
+  refinement_options.points = options.output.frame.points;
   const RigRefinement refinement = refine_rig_on_frames(rig, curves, refinement_options);
   const ordered_json report = refinement_report(refinement, names);
   write_json(out / kRefinementFile, report);
@@ -263,14 +275,16 @@ struct Run {
 
 /// A frame into its folder, or why not; one that is not written just passes.
 std::optional<FrameFailure> make_frame(const Run& run, std::size_t index, bool is_written,
-                                       const SequenceOptions& options, FrameOutcome& outcome) {
+                                       const OutputOptions& options, const FrameLinks& links,
+                                       FrameOutcome& outcome) {
   try {
     if (!is_written) {
-      pass_frame(run.rig, run.frames, index, options);
+      pass_frame(run.rig, run.frames, index, options, links);
       return std::nullopt;
     }
     FrameFolder folder(run.out, outcome.name, run.settings, run.keys[index]);
-    write_frame(run.rig, run.frames, index, run.images[index], folder.path(), options, outcome);
+    write_frame(run.rig, run.frames, index, run.images[index], folder.path(), options, links,
+                outcome);
     folder.publish();
     outcome.done = true;
     return std::nullopt;
@@ -300,17 +314,16 @@ class FrameProgress {
   FrameProgress(const Progress& progress, std::size_t frames)
       : progress_(progress), frames_(frames) {}
 
-  /// The options of the i-th frame, whose stages are told as part of it.
-  SequenceOptions with_stages(const SequenceOptions& options, std::size_t i) {
-    if (!progress_) return options;
-    SequenceOptions telling = options;
+  /// Links of the i-th frame, whose stages are told as part of it.
+  FrameLinks links(std::size_t i) {
+    FrameLinks telling;
+    if (!progress_) return telling;
     const std::string frame = "frame " + std::to_string(i + 1) + " of " + std::to_string(frames_);
-    const Progress tell = [this, frame](std::string_view stage, double) {
+    telling.progress = [this, frame](std::string_view stage, double) {
       const std::lock_guard lock(mutex_);
       progress_(frame + ": " + std::string(stage),
                 static_cast<double>(done_) / static_cast<double>(frames_));
     };
-    telling.points.progress = telling.shape.progress = tell;
     return telling;
   }
 
@@ -341,27 +354,25 @@ std::vector<FrameOutcome> make_frames(const Run& run, const std::vector<std::siz
     if (there[i] != 0) frame_progress.done(outcomes[i].name);
     if (there[i] == 0) missing.push_back(own[i]);
   }
-  const auto make = [&](std::size_t index, bool is_written, const SequenceOptions& how) {
+  const auto make = [&](std::size_t index, bool is_written, const FrameLinks& links) {
     FrameOutcome passed;
     FrameOutcome& outcome = is_written ? outcomes[outcome_of[index]] : passed;
-    const auto failure = make_frame(run, index, is_written, how, outcome);
+    const auto failure = make_frame(run, index, is_written, options.output, links, outcome);
     if (failure && is_written) note_failure(run, index, *failure, outcome);
     if (is_written) frame_progress.done(outcome.name);
     return failure && failure->is_passing;
   };
   if (!tracks(options)) {
     run_at_once(missing.size(), frames_at_once(run.rig), [&](std::size_t i) {
-      make(missing[i], true, frame_progress.with_stages(options, outcome_of[missing[i]]));
+      make(missing[i], true, frame_progress.links(outcome_of[missing[i]]));
     });
     return outcomes;
   }
   SurfaceChain chain(run.out, run.frames.names(), run.keys, own, there);
   run_at_once(chain.steps().size(), frames_at_once(run.rig), [&](std::size_t k) {
     const ChainStep& step = chain.steps()[k];
-    SequenceOptions linked =
-        frame_progress.with_stages(options, std::min(outcome_of[step.frame], own.size() - 1));
-    linked.shape = chain.linked(std::move(linked.shape), k);
-    chain.end(k, make(step.frame, step.is_written, linked));
+    const FrameLinks links = frame_progress.links(std::min(outcome_of[step.frame], own.size() - 1));
+    chain.end(k, make(step.frame, step.is_written, chain.linked(links, k)));
   });
   return outcomes;
 }
@@ -385,11 +396,11 @@ SequenceOutcome reconstruct_sequence(const fs::path& rig_path, const fs::path& f
   Rig rig = read_rig(rig_path);
   FrameSource frames = FrameSource::open(rig, frames_path);
   if (!options.plain_frames.empty()) frames.add_plain(rig, options.plain_frames);
-  if (options.refine_rig && is_output_rig(rig_path, out)) {
+  if (options.output.refine_rig && is_output_rig(rig_path, out)) {
     throw InputError("--rig", "", rig_path.string(),
                      "must not be the rig.json in --out, where the refined rig is written");
   }
-  const std::string_view rule = broken_rule(rig, options.points.method);
+  const std::string_view rule = broken_rule(rig, options.output.frame.points.method);
   if (!rule.empty()) throw InputError(rig_path.string(), "projectors", "", std::string(rule));
   // One of several shards leaves the other frames to the others, and a broken one is a failed one.
   if (!options.shard) check_images(rig, frames, progress);
@@ -410,7 +421,7 @@ SequenceOutcome reconstruct_sequence(const fs::path& rig_path, const fs::path& f
 
   SequenceOutcome result;
   result.warnings = repetitions(rig, frames, own, images);
-  if (options.refine_rig)
+  if (options.output.refine_rig)
     rig = refined_rig(rig, frames, out, options, progress, result.refinement.emplace());
   // The rig in use, so that the output can be looked at without its input.
   if (!is_output_file(rig_path, out / kDevicesFile)) write_rig(rig, out / kDevicesFile);

@@ -12,19 +12,23 @@
 
 namespace pencilscan {
 
-struct SequenceOptions {
-  PointOptions points;
-  ShapeOptions shape;
-  std::filesystem::path plain_frames;  ///< the same moments without patterns, for colour; or empty
-  bool refine_rig = false;             ///< correct the poses of the devices from the frames first
-  bool tracks = false;  ///< each frame's surface starts from that of the frame before
-  bool meshes = true;   ///< false: points.ply and curves.ply alone, much faster
+/// All that decides the bytes of a sequence's output, beside rig and pictures. Output of other
+/// values is not resumed. Plain values, which core/fields.h lists one by one.
+struct OutputOptions {
+  FrameOptions frame;       ///< without meshes: points.ply and curves.ply alone, much faster
+  bool refine_rig = false;  ///< correct the poses of the devices from the frames first
+  bool tracks = false;      ///< each frame's surface starts from that of the frame before
   bool pictures = true;
   bool depth_maps = false;                ///< depth/ and sigma/ of every camera
   std::vector<std::string> mesh_formats;  ///< of obj, stl, glb: the closed mesh once more
-  bool overwrite = false;                 ///< replace the results of other inputs or options
-  std::optional<Shard> shard;  ///< of several programs that share the frames; nothing: all
-  std::string description;     ///< of the options: output of another description is not resumed
+};
+
+struct SequenceOptions {
+  OutputOptions output;
+  std::filesystem::path plain_frames;  ///< the same moments without patterns, for colour; or empty
+  bool overwrite = false;              ///< replace the results of other inputs or options
+  std::optional<Shard> shard;          ///< of several programs that share the frames; nothing: all
+  std::string program;                 ///< which program this is: output of another is not resumed
 };
 
 struct FrameOutcome {

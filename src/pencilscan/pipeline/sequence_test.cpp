@@ -220,7 +220,7 @@ class Sequence : public ::testing::Test {
   SequenceOutcome run(const fs::path& from, const fs::path& out, std::optional<Shard> shard,
                       bool overwrite = false) {
     SequenceOptions options;
-    options.meshes = options.pictures = false;
+    options.output.frame.meshes = options.output.pictures = false;
     options.overwrite = overwrite;
     options.shard = shard;
     return reconstruct_sequence(rig_file(), from, out, options);

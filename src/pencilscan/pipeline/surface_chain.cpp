@@ -83,10 +83,10 @@ SurfaceChain::Surface SurfaceChain::before(std::size_t step) const {
   return steps_[step].follows ? surfaces_[step - 1].get() : steps_[step].first;
 }
 
-ShapeOptions SurfaceChain::linked(ShapeOptions shape, std::size_t step) {
-  shape.before = [this, step] { return before(step); };
-  shape.hand_on = [this, step](Surface surface) { hand_on(step, std::move(surface)); };
-  return shape;
+FrameLinks SurfaceChain::linked(FrameLinks links, std::size_t step) {
+  links.before = [this, step] { return before(step); };
+  links.hand_on = [this, step](Surface surface) { hand_on(step, std::move(surface)); };
+  return links;
 }
 
 void SurfaceChain::hand_on(std::size_t step, Surface surface) {

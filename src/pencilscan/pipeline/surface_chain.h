@@ -45,8 +45,8 @@ class SurfaceChain {
                const std::vector<char>& there);
 
   [[nodiscard]] const std::vector<ChainStep>& steps() const { return steps_; }
-  /// `shape` with the surface that the step starts from, and handing on what it makes.
-  [[nodiscard]] ShapeOptions linked(ShapeOptions shape, std::size_t step);
+  /// `links` with the surface that the step starts from, and handing on what it makes.
+  [[nodiscard]] FrameLinks linked(FrameLinks links, std::size_t step);
   /// The step is over. One that handed nothing on hands on what it got; one that is `broken` makes
   /// those that follow throw ChainBroken.
   void end(std::size_t step, bool broken);

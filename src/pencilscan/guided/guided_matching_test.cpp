@@ -1,4 +1,4 @@
-#include "pencilscan/guided/second_look.h"
+#include "pencilscan/guided/guided_matching.h"
 
 #include <gtest/gtest.h>
 
@@ -136,7 +136,7 @@ TEST_F(LabeledScene, UndecidedCurveOnAPredictedLineGetsItsLabel) {
   remove_label(curve);
   ASSERT_EQ(label_of(curve), -1);
   const std::vector<std::vector<cv::Mat>> no_images(1);
-  second_look(rig, families, no_images, {&graph_, 1}, labeling_);
+  match_guided(rig, families, no_images, {&graph_, 1}, labeling_);
   EXPECT_EQ(label_of(curve), true_lines[0][curve]);
 }
 
@@ -146,7 +146,7 @@ TEST_F(LabeledScene, UndecidedCurveBetweenLinesStaysUndecided) {
   // Half a line aside: no line is there.
   for (CurvePoint& p : graph_.curves[curve].points) p.position += 6.F * p.normal;
   const std::vector<std::vector<cv::Mat>> no_images(1);
-  second_look(rig, families, no_images, {&graph_, 1}, labeling_);
+  match_guided(rig, families, no_images, {&graph_, 1}, labeling_);
   EXPECT_EQ(label_of(curve), -1);
 }
 
@@ -154,7 +154,7 @@ TEST_F(LabeledScene, CurveMuchWiderThanThePredictedLineGetsNoLabel) {
   const std::size_t curve = middle_curve(0);
   remove_label(curve);
   for (CurvePoint& p : graph_.curves[curve].points) p.width_px *= 2;
-  second_look(rig, families, std::vector<std::vector<cv::Mat>>(1), {&graph_, 1}, labeling_);
+  match_guided(rig, families, std::vector<std::vector<cv::Mat>>(1), {&graph_, 1}, labeling_);
   EXPECT_EQ(label_of(curve), -1);
 }
 
@@ -168,11 +168,11 @@ TEST_F(LabeledScene, TentativeLabelIsConfirmedWhereTheSurfaceAgreesOnly) {
                                       static_cast<int>(graph_.curves[k].points.size()),
                                       CurveLabel{{k == bad ? 1 : 0, 0}, line, 1.0 * line, 0.8F}});
   }
-  SecondLookOptions options;
+  GuidedMatchingOptions options;
   options.min_adopted = 1000000;  // nothing but tentative labels
   options.min_whole = 1000000;
-  second_look(rig, families, std::vector<std::vector<cv::Mat>>(1), {&graph_, 1}, labeling_,
-              options);
+  match_guided(rig, families, std::vector<std::vector<cv::Mat>>(1), {&graph_, 1}, labeling_,
+               options);
   EXPECT_EQ(label_of(good), true_lines[0][good]);
   EXPECT_EQ(label_of(bad), -1);
 }
@@ -203,7 +203,7 @@ TEST_F(LabeledScene, MissedLineIsFoundInTheImageWhereItIsAndNotWhereItIsDark) {
   }
   const std::size_t before = graph_.curves.size();
   const std::vector<std::vector<cv::Mat>> images = {presence};
-  second_look(rig, families, images, {&graph_, 1}, labeling_);
+  match_guided(rig, families, images, {&graph_, 1}, labeling_);
   std::size_t found = 0;
   for (const LabeledRun& run : labeling_.runs[0]) {
     if (run.curve < static_cast<int>(before)) continue;

@@ -1,4 +1,4 @@
-#include "pencilscan/guided/second_look.h"
+#include "pencilscan/guided/guided_matching.h"
 
 #include <algorithm>
 #include <cmath>
@@ -45,13 +45,13 @@ void for_each_stretch(const Values& values, Visit visit) {
   }
 }
 
-/// One camera's second look.
-class CameraLook {
+/// Guided matching in one camera.
+class CameraMatching {
  public:
-  CameraLook(const Rig& rig, const std::vector<ColorFamily>& families,
-             const std::vector<cv::Mat>& presence, GridGraph& graph, std::vector<LabeledRun>& runs,
-             std::span<const LabeledRun> tentative, const SecondLookOptions& options,
-             std::span<const MeasuredPoint> dense);
+  CameraMatching(const Rig& rig, const std::vector<ColorFamily>& families,
+                 const std::vector<cv::Mat>& presence, GridGraph& graph,
+                 std::vector<LabeledRun>& runs, std::span<const LabeledRun> tentative,
+                 const GuidedMatchingOptions& options, std::span<const MeasuredPoint> dense);
 
   /// Predicts all lines on the surface of what is labelled; keeps those that no labelled point
   /// shows.
@@ -96,7 +96,7 @@ class CameraLook {
   GridGraph& graph_;
   std::vector<LabeledRun>& runs_;
   std::span<const LabeledRun> tentative_;
-  const SecondLookOptions& options_;
+  const GuidedMatchingOptions& options_;
   std::vector<PatternRef> patterns_;  ///< that the camera can see
   std::vector<cv::Mat> unexplained_;  ///< per family; empty without images
   LocalSurface surface_;
@@ -107,10 +107,11 @@ class CameraLook {
   Places<PredictedPoint> missing_places_;
 };
 
-CameraLook::CameraLook(const Rig& rig, const std::vector<ColorFamily>& families,
-                       const std::vector<cv::Mat>& presence, GridGraph& graph,
-                       std::vector<LabeledRun>& runs, std::span<const LabeledRun> tentative,
-                       const SecondLookOptions& options, std::span<const MeasuredPoint> dense)
+CameraMatching::CameraMatching(const Rig& rig, const std::vector<ColorFamily>& families,
+                               const std::vector<cv::Mat>& presence, GridGraph& graph,
+                               std::vector<LabeledRun>& runs, std::span<const LabeledRun> tentative,
+                               const GuidedMatchingOptions& options,
+                               std::span<const MeasuredPoint> dense)
     : rig_(rig),
       families_(families),
       camera_(rig.camera(graph.camera)),
@@ -139,7 +140,7 @@ CameraLook::CameraLook(const Rig& rig, const std::vector<ColorFamily>& families,
   accept(std::exchange(runs, {}));
 }
 
-int CameraLook::family_of(PatternRef ref) const {
+int CameraMatching::family_of(PatternRef ref) const {
   for (std::size_t f = 0; f < families_.size(); ++f) {
     const auto& patterns = families_[f].patterns;
     if (std::find(patterns.begin(), patterns.end(), ref) != patterns.end())
@@ -149,14 +150,14 @@ int CameraLook::family_of(PatternRef ref) const {
 }
 
 /// Width of the profile of a predicted line, px.
-float CameraLook::expected_width(const PredictedPoint& p) const {
+float CameraMatching::expected_width(const PredictedPoint& p) const {
   const LinePattern& pattern = rig_.pattern(p.pattern);
   return line_profile_width(p.spacing_px *
                             static_cast<float>(pattern.line_width_px / pattern.pitch_px));
 }
 
 /// Adds runs to what is labelled.
-void CameraLook::accept(std::vector<LabeledRun> news) {
+void CameraMatching::accept(std::vector<LabeledRun> news) {
   for (const LabeledRun& run : news) {
     const Curve& curve = graph_.curves[static_cast<std::size_t>(run.curve)];
     for (int i = run.begin; i < run.end; ++i) {
@@ -171,7 +172,7 @@ void CameraLook::accept(std::vector<LabeledRun> news) {
   });
 }
 
-void CameraLook::grow_surface() {
+void CameraMatching::grow_surface() {
   Labeling labeling;
   labeling.runs.resize(rig_.cameras.size());
   labeling.runs[static_cast<std::size_t>(graph_.camera)] = std::exchange(not_on_surface_, {});
@@ -181,12 +182,12 @@ void CameraLook::grow_surface() {
   surface_.add(points);
 }
 
-LocalSurface CameraLook::take_surface() {
+LocalSurface CameraMatching::take_surface() {
   grow_surface();
   return std::move(surface_);
 }
 
-bool CameraLook::is_known(const PredictedPoint& p) const {
+bool CameraMatching::is_known(const PredictedPoint& p) const {
   constexpr float kSame = 1.5F;  // px
   bool found = false;
   known_.around(p.position, kSame, [&](const KnownPoint& k) {
@@ -196,7 +197,7 @@ bool CameraLook::is_known(const PredictedPoint& p) const {
   return found;
 }
 
-void CameraLook::predict() {
+void CameraMatching::predict() {
   grow_surface();
   // Those that became known lie where the surface grew.
   std::erase_if(missing_,
@@ -212,7 +213,7 @@ void CameraLook::predict() {
 /// visit(predicted, across_px) for the missing points beside a curve point, of its direction and
 /// not much thinner: a curve wider than its line is another one, or two.
 template <class Visit>
-void CameraLook::aligned_predictions(const CurvePoint& point, Visit visit) const {
+void CameraMatching::aligned_predictions(const CurvePoint& point, Visit visit) const {
   constexpr float kAround = 3;    // px
   constexpr float kAlong = 1.5F;  // px
   constexpr float kSameDirection = 0.9F;
@@ -227,8 +228,8 @@ void CameraLook::aligned_predictions(const CurvePoint& point, Visit visit) const
   });
 }
 
-std::optional<LineName> CameraLook::line_at(const CurvePoint& point, int family,
-                                            float* spacing_px) const {
+std::optional<LineName> CameraMatching::line_at(const CurvePoint& point, int family,
+                                                float* spacing_px) const {
   constexpr float kClear = 0.8F;  // px that another line must be farther away
   // Of each line the point that is nearest across it; a line's farther points say nothing.
   struct Candidate {
@@ -259,7 +260,7 @@ std::optional<LineName> CameraLook::line_at(const CurvePoint& point, int family,
   return best->name;
 }
 
-bool CameraLook::lies_on(const CurvePoint& point, const LineName& name) const {
+bool CameraMatching::lies_on(const CurvePoint& point, const LineName& name) const {
   bool found = false;
   aligned_predictions(point, [&](const PredictedPoint& p, float across) {
     found = found || (p.line == name.line && p.pattern == name.pattern && is_near(across, p));
@@ -267,7 +268,7 @@ bool CameraLook::lies_on(const CurvePoint& point, const LineName& name) const {
   return found;
 }
 
-std::vector<std::vector<char>> CameraLook::decided_points() const {
+std::vector<std::vector<char>> CameraMatching::decided_points() const {
   std::vector<std::vector<char>> decided;
   for (const Curve& curve : graph_.curves) decided.emplace_back(curve.points.size(), 0);
   for (const LabeledRun& run : runs_) {
@@ -277,7 +278,7 @@ std::vector<std::vector<char>> CameraLook::decided_points() const {
   return decided;
 }
 
-void CameraLook::confirm_tentative() {
+void CameraMatching::confirm_tentative() {
   const auto decided = decided_points();
   std::vector<LabeledRun> confirmed;
   std::vector<char> agrees;
@@ -300,7 +301,7 @@ void CameraLook::confirm_tentative() {
 }
 
 /// A stretch [begin, end) on one line, within what is undecided of its curve.
-bool CameraLook::is_long_enough(const std::vector<char>& decided, int begin, int end) const {
+bool CameraMatching::is_long_enough(const std::vector<char>& decided, int begin, int end) const {
   constexpr double kMost = 0.8;
   const int n = static_cast<int>(decided.size());
   const int length = end - begin;
@@ -310,7 +311,7 @@ bool CameraLook::is_long_enough(const std::vector<char>& decided, int begin, int
   return length >= options_.min_whole && length >= kMost * (end - begin);
 }
 
-void CameraLook::adopt_curves() {
+void CameraMatching::adopt_curves() {
   const auto decided = decided_points();
   std::vector<LabeledRun> adopted;
   std::vector<std::optional<LineName>> names;
@@ -334,7 +335,7 @@ void CameraLook::adopt_curves() {
   accept(std::move(adopted));
 }
 
-bool CameraLook::fits(const CurvePoint& point, const LineName& name, int family) const {
+bool CameraMatching::fits(const CurvePoint& point, const LineName& name, int family) const {
   if (point.sigma_px > options_.max_sigma_px) return false;
   float spacing = 0;
   if (line_at(point, family, &spacing) != name) return false;
@@ -351,7 +352,7 @@ bool CameraLook::fits(const CurvePoint& point, const LineName& name, int family)
 }
 
 /// A curve where a line is predicted, as wide as it would be there.
-Curve CameraLook::guess_of(const LineChain& chain) const {
+Curve CameraMatching::guess_of(const LineChain& chain) const {
   Curve curve;
   curve.family = family_of(chain.front().pattern);
   for (const PredictedPoint& p : chain) {
@@ -364,7 +365,7 @@ Curve CameraLook::guess_of(const LineChain& chain) const {
   return curve;
 }
 
-void CameraLook::find_missing() {
+void CameraMatching::find_missing() {
   if (unexplained_.empty()) return;
   RefineOptions fitting;
   fitting.min_points = options_.min_points;
@@ -407,16 +408,16 @@ void CameraLook::find_missing() {
 
 }  // namespace
 
-std::vector<LocalSurface> second_look(const Rig& rig, const std::vector<ColorFamily>& families,
-                                      std::span<const std::vector<cv::Mat>> presence,
-                                      std::span<GridGraph> graphs, Labeling& labeling,
-                                      const SecondLookOptions& options,
-                                      std::span<const MeasuredPoint> dense) {
+std::vector<LocalSurface> match_guided(const Rig& rig, const std::vector<ColorFamily>& families,
+                                       std::span<const std::vector<cv::Mat>> presence,
+                                       std::span<GridGraph> graphs, Labeling& labeling,
+                                       const GuidedMatchingOptions& options,
+                                       std::span<const MeasuredPoint> dense) {
   std::vector<std::optional<LocalSurface>> surfaces(graphs.size());
   parallel_for(graphs.size(), [&](std::size_t g) {
     const auto camera = static_cast<std::size_t>(graphs[g].camera);
-    CameraLook look(rig, families, presence[g], graphs[g], labeling.runs[camera],
-                    labeling.tentative[camera], options, dense);
+    CameraMatching look(rig, families, presence[g], graphs[g], labeling.runs[camera],
+                        labeling.tentative[camera], options, dense);
     for (int pass = 0; pass < options.passes; ++pass) {
       look.predict();
       look.confirm_tentative();

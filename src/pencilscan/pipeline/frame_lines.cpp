@@ -1,0 +1,96 @@
+#include <algorithm>
+#include <optional>
+#include <utility>
+
+#include "pencilscan/core/error.h"
+#include "pencilscan/pipeline/frame.h"
+#include "pencilscan/pipeline/frame_warnings.h"
+#include "pencilscan/pipeline/line_naming.h"
+#include "pencilscan/pipeline/picture_check.h"
+
+// Of a frame's way: what its pictures say of themselves, and the solution.
+
+namespace pencilscan {
+namespace {
+
+/// Forgets what the cameras of the findings saw.
+void leave_out(const Rig& rig, const std::vector<PictureFinding>& findings, PointResult& result) {
+  for (const PictureFinding& finding : findings) {
+    const auto c = static_cast<std::size_t>(finding.camera);
+    result.left_out[c] = 1;
+    result.detections[c] = {};
+    result.graphs[c] = {};
+    result.graphs[c].camera = finding.camera;
+    result.warnings.push_back(
+        {WarningCode::kWrongPicture, describe(rig, finding), rig.camera(finding.camera).name});
+  }
+}
+
+/// The share of a camera's curve points that have a name after guided matching, of the camera where
+/// it is least: a camera that stands elsewhere has few. A camera without curves does not count.
+double guided_share(const Rig& rig, const PointOptions& options, const PointResult& result) {
+  std::vector<GridGraph> graphs = result.graphs;
+  Labeling labeling = result.labeling;
+  match_guided(rig, result.families, presence_images(result.detections), graphs, labeling,
+               options.guided);
+  double least = 1;
+  for (std::size_t c = 0; c < graphs.size(); ++c) {
+    const auto points = static_cast<double>(curve_points(graphs[c]));
+    if (points > 0)
+      least = std::min(least, static_cast<double>(labelled_points(labeling.runs[c])) / points);
+  }
+  return least;
+}
+
+/// Gives the curves their lines. Methods that correct the rig first leave out pictures that do not
+/// fit, and give back the rig that the lines were named with where it is not the one given.
+std::optional<Rig> label_lines(const Rig& rig, const Frame& frame, const PointOptions& options,
+                               PointResult& result) {
+  const SolutionMethod& method = solution_method(options.method);
+  const auto solve = [&] {
+    return method.solve(rig, result.families, result.graphs, options.method);
+  };
+  result.labeling = solve();
+  if (!method.capabilities.corrects_rig) return std::nullopt;
+  if (const auto pair = exchanged_projectors(rig, frame, result.graphs, result.labeling, options)) {
+    const std::string one = rig.projector(pair->first).name;
+    const std::string other = rig.projector(pair->second).name;
+    throw StageError(
+        "projectors " + one + " and " + other +
+        " show each other's patterns: their outputs or cables are exchanged (put them "
+        "back; frames that are taken already fit a rig with the two patterns exchanged)");
+  }
+  const std::vector<PictureFinding> misplaced =
+      misplaced_pictures(rig, frame, result.graphs, result.labeling, options);
+  if (!misplaced.empty()) {
+    leave_out(rig, misplaced, result);
+    result.labeling = solve();
+  }
+  LineNaming naming = name_lines(rig, result.families, result.graphs, result.labeling, options,
+                                 [&] { return guided_share(rig, options, result); });
+  result.labeling = std::move(naming.labeling);
+  result.crossings = naming.crossings;
+  result.device_crossings = std::move(naming.device_crossings);
+  if (naming.warning) result.warnings.push_back(std::move(*naming.warning));
+  return std::move(naming.corrected);
+}
+
+}  // namespace
+
+PointResult check_pictures(const Rig& rig, const Frame& frame, PointResult curves) {
+  if (std::optional<Warning> warning = interpolation_warning(rig, curves.detections))
+    curves.warnings.push_back(std::move(*warning));
+  if (std::optional<Warning> warning = gamma_warning(rig, frame, curves.graphs))
+    curves.warnings.push_back(std::move(*warning));
+  leave_out(rig, plain_faults(rig, frame), curves);
+  return curves;
+}
+
+PointResult solve_frame(const Rig& rig, const Frame& frame, PointResult curves,
+                        const PointOptions& options, const StageClock& clock) {
+  PointResult result = std::move(curves);
+  clock("solution", [&] { result.corrected = label_lines(rig, frame, options, result); });
+  return result;
+}
+
+}  // namespace pencilscan

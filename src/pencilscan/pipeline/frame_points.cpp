@@ -1,0 +1,102 @@
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "pencilscan/core/median.h"
+#include "pencilscan/pipeline/frame.h"
+#include "pencilscan/points/surface_check.h"
+
+// Of a frame's way: from the lines to points, and to points on the dense surface.
+
+namespace pencilscan {
+namespace {
+
+/// Error of each plane, projector px, that makes crossings miss each other as they do.
+double plane_error_px(const CrossingDisagreement& crossings) {
+  const double noise2 = crossings.expected_px * crossings.expected_px;
+  const double devices2 = crossings.median_px * crossings.median_px - noise2;
+  return kDeviationPerMedian * std::sqrt(std::max(0.0, devices2) / 2);
+}
+
+/// The nodes of all depth maps.
+std::vector<MeasuredPoint> dense_points(const Rig& rig, std::span<const DepthMap> maps) {
+  std::vector<MeasuredPoint> points;
+  for (const DepthMap& map : maps) {
+    const Camera& camera = rig.cameras[static_cast<std::size_t>(map.camera)];
+    for (std::size_t i = 0; i < map.nodes.size(); ++i) {
+      if (!map.nodes[i].measured()) continue;
+      const Vec3 x = node_point(rig, map, i);
+      const Vec2 pixel = map.pixel(i);
+      MeasuredPoint p;
+      p.x = static_cast<float>(x.x());
+      p.y = static_cast<float>(x.y());
+      p.z = static_cast<float>(x.z());
+      p.u = static_cast<float>(pixel.x());
+      p.v = static_cast<float>(pixel.y());
+      p.camera = static_cast<std::uint8_t>(map.camera);
+      const double length = camera.normalized_from_pixel(pixel).homogeneous().norm();
+      p.sigma = map.nodes[i].sigma * static_cast<float>(length);
+      points.push_back(p);
+    }
+  }
+  return points;
+}
+
+}  // namespace
+
+PointResult place_points(const Rig& rig, PointResult lines, const PointOptions& options,
+                         const StageClock& clock) {
+  PointResult result = std::move(lines);
+  const bool is_guided = solution_method(options.method).capabilities.may_be_guided;
+  std::vector<LocalSurface> surfaces;
+  if (is_guided) {
+    clock("guided matching", [&] {
+      surfaces = match_guided(result.corrected ? *result.corrected : rig, result.families,
+                              presence_images(result.detections), result.graphs, result.labeling,
+                              options.guided);
+    });
+  }
+  clock("triangulation", [&] {
+    TriangulationOptions triangulation = options.triangulation;
+    SettleOptions settle = options.settle;
+    if (result.corrected) {
+      triangulation.projection_sigma_px =
+          std::max(triangulation.projection_sigma_px, plane_error_px(result.crossings));
+      settle.errors_are_shared = true;
+    }
+    result.points = triangulate(rig, result.graphs, result.labeling, triangulation);
+    if (result.corrected) surfaces = local_surfaces(rig, result.points, options.guided.surface);
+    if (is_guided) result.points = settle_points(rig, result.points, surfaces, settle);
+  });
+  return result;
+}
+
+FrameResult match_on_surface(const Rig& rig, FrameResult result, const PointOptions& options,
+                             const StageClock& clock) {
+  auto& [points, shape, times] = result;
+  if (!solution_method(options.method).capabilities.may_be_guided || points.corrected ||
+      !shape.scene)
+    return result;
+  points.is_on_surface = true;
+  clock("guided matching on the surface", [&] {
+    points.contradicted = drop_contradicted(rig, *shape.scene, points.graphs, points.labeling);
+    const std::vector<LocalSurface> surfaces =
+        match_guided(rig, points.families, presence_images(points.detections), points.graphs,
+                     points.labeling, options.guided, dense_points(rig, shape.depth.maps));
+    const std::vector<MeasuredPoint> triangulated =
+        triangulate(rig, points.graphs, points.labeling, options.triangulation);
+    SettledPoints settled = settle_on_surface(
+        rig, *shape.scene, settle_points(rig, triangulated, surfaces, options.settle),
+        shape.surface.mesh.color);
+    points.points = std::move(settled.points);
+    points.contradicted += settled.contradicted;
+    shape.surface.used = std::move(settled.on_surface);
+  });
+  SurfaceReport& report = shape.surface.report;
+  report.points = points.points.size();
+  report.points_used =
+      static_cast<std::size_t>(std::count(shape.surface.used.begin(), shape.surface.used.end(), 1));
+  return result;
+}
+
+}  // namespace pencilscan
