@@ -30,6 +30,7 @@ from ._scan import (
     reconstruct,
     simulate,
 )
+from ._stages import Detection, GridCurves, Labels, detect, label, measure
 
 __version__: str = _core.version
 __all__ = [
@@ -38,7 +39,10 @@ __all__ = [
     "Cancelled",
     "Crossings",
     "Curves",
+    "Detection",
+    "GridCurves",
     "InputError",
+    "Labels",
     "Mesh",
     "Points",
     "Result",
@@ -46,8 +50,11 @@ __all__ = [
     "SimulatedFrame",
     "StageError",
     "calibrate",
+    "detect",
     "evaluate",
+    "label",
     "make_sphere",
+    "measure",
     "read_mesh",
     "read_rig",
     "reconstruct",

@@ -316,7 +316,7 @@ class Result:
 def reconstruct(
     rig: Union[Rig, dict, PathLike],
     images: Mapping[str, np.ndarray],
-    method: str = "joint",
+    method: Union[str, Callable[..., Any]] = "joint",
     mesh: bool = True,
     progress: Optional[Progress] = None,
     *,
@@ -338,7 +338,9 @@ def reconstruct(
         float32 in [0, 1]; as the camera gave them. Float arrays of three channels are used where
         they lie. OpenCV's BGR becomes RGB by `image[..., ::-1]`. Cameras may be absent.
     method
-        joint, or the paper's linear and multiview, or single-projector.
+        joint, or the paper's linear and multiview, or single-projector. Or a function of yours, which
+        decides the lines: it gets what `detect(..., identities=True)` gives and returns `Labels`;
+        guided matching, depth and surface then follow as after joint (`measure`).
     mesh
         False: points and curves alone, much faster.
     progress
@@ -368,6 +370,17 @@ def reconstruct(
 
     Other Python threads run meanwhile.
     """
+    if callable(method):
+        from ._stages import detect, measure
+
+        detection = detect(
+            rig, images, identities=True, plain=plain, frame=frame, threads=threads,
+            progress=progress,
+        )
+        return measure(
+            detection, method(detection), mesh, progress, depth=depth, depth_maps=depth_maps,
+            threads=threads,
+        )
     return Result(
         _core.reconstruct(
             as_rig(rig)._core, _core.Pictures(dict(images)), _core.Pictures(dict(plain or {})),

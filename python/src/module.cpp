@@ -1,6 +1,8 @@
 // The compiled part of the Python package: values of the library as arrays that share their memory.
 // python/pencilscan/ gives it keyword arguments, defaults and documentation.
 
+#include "module.h"
+
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 
@@ -11,13 +13,10 @@
 #include <variant>
 #include <vector>
 
-#include "arrays.h"
-#include "pencilscan/pencilscan.h"
-
 namespace pencilscan::python {
 namespace {
 
-// ---- errors and listeners -----------------------------------------------------------------------
+// ---- errors -------------------------------------------------------------------------------------
 
 /// Raises `name` of pencilscan._errors with the given arguments.
 template <class... Arguments>
@@ -38,33 +37,7 @@ void translate(std::exception_ptr thrown) {
   }
 }
 
-/// Lets Ctrl-C through, and calls `progress(stage, done)` unless it is None: False ends the call.
-StageListener listener(const py::object& progress) {
-  return [progress = progress.ptr()](std::string_view stage, double done) {
-    const py::gil_scoped_acquire lock;
-    if (PyErr_CheckSignals() != 0) throw py::error_already_set();
-    if (Py_IsNone(progress) != 0) return true;
-    const py::object answer =
-        py::reinterpret_borrow<py::object>(progress)(py::str(stage.data(), stage.size()), done);
-    return !answer.is(py::bool_(false));
-  };
-}
-
 // ---- values -------------------------------------------------------------------------------------
-
-/// A dictionary of arrays as pictures; the arrays are kept as long as this.
-struct Pictures {
-  explicit Pictures(const py::dict& arrays) {
-    for (const auto& [key, array] : arrays) {
-      const auto name = key.cast<std::string>();
-      images.emplace(name, picture(name, array, kept));
-    }
-  }
-  Images images;
-  std::vector<py::array> kept;
-};
-
-using MeshPtr = std::shared_ptr<TriangleMesh>;
 
 template <class T>
 py::object optional_view(const std::vector<T>& values, const py::object& owner) {
@@ -236,159 +209,9 @@ void add_rig(py::module_& module) {
              [](const RingOptions& options) { return std::make_shared<Rig>(make_ring(options)); });
 }
 
-// ---- a frame and its result ---------------------------------------------------------------------
-
-using ResultPtr = std::shared_ptr<Reconstruction>;
-
-/// Arrays over the elements of a result's vector, by the names of the properties in the file.
-template <class Element>
-class Fields {
- public:
-  Fields(const std::vector<Element>& values, const py::object& owner)
-      : values_(values), owner_(owner) {}
-
-  template <class T>
-  void add(const char* name, T Element::*field, py::ssize_t columns = 0) {
-    const Element example{};
-    const auto offset = static_cast<std::size_t>(reinterpret_cast<const char*>(&(example.*field)) -
-                                                 reinterpret_cast<const char*>(&example));
-    using Stored = typename std::conditional_t<std::is_enum_v<T>, std::underlying_type<T>,
-                                               std::type_identity<T>>::type;
-    arrays_[name] = field_view<Element, Stored>(values_, offset, columns, owner_);
-  }
-  [[nodiscard]] py::dict arrays() const { return arrays_; }
-
- private:
-  const std::vector<Element>& values_;
-  py::object owner_;
-  py::dict arrays_;
-};
-
-py::dict point_arrays(const ResultPtr& result) {
-  using P = MeasuredPoint;
-  Fields<P> fields(result->points, py::cast(result));
-  static_assert(offsetof(P, y) == offsetof(P, x) + sizeof(float) &&
-                offsetof(P, z) == offsetof(P, y) + sizeof(float) &&
-                offsetof(P, v) == offsetof(P, u) + sizeof(float) &&
-                offsetof(P, ny) == offsetof(P, nx) + sizeof(float) &&
-                offsetof(P, nz) == offsetof(P, ny) + sizeof(float) &&
-                offsetof(P, green) == offsetof(P, red) + 1 &&
-                offsetof(P, blue) == offsetof(P, green) + 1);
-  fields.add("xyz", &P::x, 3);
-  fields.add("uv", &P::u, 2);
-  fields.add("x", &P::x);
-  fields.add("y", &P::y);
-  fields.add("z", &P::z);
-  fields.add("u", &P::u);
-  fields.add("v", &P::v);
-  fields.add("camera", &P::camera);
-  fields.add("projector", &P::projector);
-  fields.add("pattern", &P::pattern);
-  fields.add("line", &P::line);
-  fields.add("sigma", &P::sigma);
-  fields.add("confidence", &P::confidence);
-  fields.add("plane", &P::plane);
-  fields.add("normal", &P::nx, 3);
-  fields.add("nx", &P::nx);
-  fields.add("ny", &P::ny);
-  fields.add("nz", &P::nz);
-  fields.add("color", &P::red, 3);
-  fields.add("red", &P::red);
-  fields.add("green", &P::green);
-  fields.add("blue", &P::blue);
-  return fields.arrays();
-}
-
-py::dict curve_arrays(const ResultPtr& result) {
-  using C = CurveSample;
-  Fields<C> fields(result->curves.samples, py::cast(result));
-  fields.add("uv", &C::u, 2);
-  fields.add("u", &C::u);
-  fields.add("v", &C::v);
-  fields.add("sigma_px", &C::sigma_px);
-  fields.add("amplitude", &C::amplitude);
-  fields.add("camera", &C::camera);
-  fields.add("curve", &C::curve);
-  fields.add("family", &C::family);
-  fields.add("color", &C::color);
-  fields.add("color_lead", &C::color_lead);
-  fields.add("state", &C::state);
-  fields.add("projector", &C::projector);
-  fields.add("pattern", &C::pattern);
-  fields.add("line", &C::line);
-  fields.add("confidence", &C::confidence);
-  return fields.arrays();
-}
-
-py::dict crossing_arrays(const ResultPtr& result) {
-  using C = CurveCrossing;
-  Fields<C> fields(result->curves.crossings, py::cast(result));
-  fields.add("uv", &C::u, 2);
-  fields.add("u", &C::u);
-  fields.add("v", &C::v);
-  fields.add("camera", &C::camera);
-  fields.add("curve_a", &C::curve_a);
-  fields.add("curve_b", &C::curve_b);
-  return fields.arrays();
-}
-
-py::dict depth_arrays(const ResultPtr& result) {
-  py::dict arrays;
-  for (const CameraDepth& camera : result->depth)
-    arrays[camera.camera.c_str()] =
-        py::make_tuple(matrix_view(camera.depth), matrix_view(camera.sigma));
-  return arrays;
-}
-
-/// A part of a result, which stays alive with it; None where it is empty.
-py::object part(const ResultPtr& result, TriangleMesh& mesh) {
-  if (mesh.vertices.empty()) return py::none();
-  return py::cast(MeshPtr(result, &mesh));
-}
-
-void add_frame(py::module_& module) {
-  py::class_<Pictures, std::shared_ptr<Pictures>>(module, "Pictures")
-      .def(py::init<const py::dict&>())
-      .def("views", [](const std::shared_ptr<Pictures>& pictures) {
-        py::dict views;
-        for (const auto& [name, image] : pictures->images)
-          views[name.c_str()] = matrix_view(image.stored(), py::cast(pictures));
-        return views;
-      });
-  py::class_<Reconstruction, ResultPtr>(module, "Reconstruction")
-      .def_property_readonly("points", &point_arrays)
-      .def_property_readonly("curves", &curve_arrays)
-      .def_property_readonly("crossings", &crossing_arrays)
-      .def_property_readonly("depth", &depth_arrays)
-      .def_property_readonly("mesh", [](const ResultPtr& r) { return part(r, r->mesh); })
-      .def_property_readonly("measured", [](const ResultPtr& r) { return part(r, r->measured); })
-      .def_property_readonly("report", [](const Reconstruction& r) { return r.report; })
-      .def("write", [](const Reconstruction& r, const std::string& folder) {
-        const py::gil_scoped_release unlocked;
-        write_reconstruction(folder, r);
-      });
-  module.def("reconstruct", [](const Rig& rig, const Pictures& pictures, const Pictures& plain,
-                               const std::string& method, const std::string& multiview_cost,
-                               bool mesh, bool depth, bool depth_maps, const std::string& frame,
-                               int threads, const py::object& progress) {
-    ReconstructionOptions options;
-    options.method = method;
-    options.multiview_cost = multiview_cost;
-    options.mesh = mesh;
-    options.depth = depth;
-    options.depth_maps = depth_maps;
-    options.plain = plain.images;
-    options.frame = frame;
-    options.threads = threads;
-    options.progress = listener(progress);
-    const py::gil_scoped_release unlocked;
-    return std::make_shared<Reconstruction>(reconstruct(rig, pictures.images, options));
-  });
-}
-
 // ---- simulation, judgement, calibration ---------------------------------------------------------
 
-void add_others(py::module_& module) {
+void add_simulation(py::module_& module) {
   module.def("simulate", [](const Rig& rig, const TriangleMesh& mesh, const std::string& noise,
                             std::uint64_t seed, bool fit, const std::string& up, int bits,
                             double albedo, bool smooth, int frame, double rotate_rad,
@@ -414,6 +237,9 @@ void add_others(py::module_& module) {
     for (const auto& [name, image] : simulated.images) images[name.c_str()] = matrix_view(image);
     return py::make_tuple(images, std::make_shared<TriangleMesh>(std::move(simulated.truth)));
   });
+}
+
+void add_judgement(py::module_& module) {
   module.def("judge", [](const TriangleMesh& truth, const Rig& rig, const Reconstruction* result,
                          const std::string& points_path, const TriangleMesh* measured,
                          const std::string& align, std::uint64_t seed, const py::object& progress) {
@@ -427,6 +253,9 @@ void add_others(py::module_& module) {
     if (!points_path.empty()) points = read_points(points_path);
     return judge(truth, rig, points_path.empty() ? nullptr : &points, measured, options);
   });
+}
+
+void add_calibration(py::module_& module) {
   module.def("calibrate", [](const std::optional<std::string>& devices_path,
                              const std::string& devices_text,
                              const std::vector<std::string>& captures,
@@ -454,6 +283,18 @@ void add_others(py::module_& module) {
 }
 
 }  // namespace
+
+StageListener listener(const py::object& progress) {
+  return [progress = progress.ptr()](std::string_view stage, double done) {
+    const py::gil_scoped_acquire lock;
+    if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+    if (Py_IsNone(progress) != 0) return true;
+    const py::object answer =
+        py::reinterpret_borrow<py::object>(progress)(py::str(stage.data(), stage.size()), done);
+    return !answer.is(py::bool_(false));
+  };
+}
+
 }  // namespace pencilscan::python
 
 PYBIND11_MODULE(_core, module) {
@@ -463,5 +304,7 @@ PYBIND11_MODULE(_core, module) {
   add_mesh(module);
   add_rig(module);
   add_frame(module);
-  add_others(module);
+  add_simulation(module);
+  add_judgement(module);
+  add_calibration(module);
 }

@@ -187,6 +187,77 @@ class PackageTest(unittest.TestCase):
         for name, image in numbers.items():
             self.assertTrue((image == before[name]).all())
 
+    # ---- stage by stage -------------------------------------------------------------------------
+
+    def test_stages_give_the_points_of_the_whole(self) -> None:
+        whole = ps.reconstruct(self.scene.rig, self.scene.frame, method="multiview", mesh=False)
+        detection = ps.detect(self.scene.rig, self.scene.frame, method="multiview")
+        labels = ps.label(detection, "multiview")
+        points = ps.measure(detection, labels, mesh=False, guided=False).points
+        self.assertGreater(len(points), 5000)
+        for name in POINT_PROPERTIES:
+            self.assertEqual(points[name].tobytes(), whole.points[name].tobytes(), name)
+
+    def test_labels_in_the_middle_may_be_the_callers(self) -> None:
+        def without_first_projector(detection: ps.Detection) -> ps.Labels:
+            labels = ps.label(detection, "multiview")
+            keep = labels.projector != 0
+            self.assertFalse(keep.all())
+            return ps.Labels(np.where(keep, labels.projector, -1), labels.pattern, labels.line)
+
+        detection = ps.detect(self.scene.rig, self.scene.frame, identities=True)
+        alone = ps.measure(
+            detection, without_first_projector(detection), mesh=False, guided=False
+        ).points
+        self.assertGreater(len(alone), 1000)
+        self.assertNotIn(0, alone.projector)
+        # Guided matching then finds the lines of the first one on the surface of the others.
+        result = ps.reconstruct(self.scene.rig, self.scene.frame, method=without_first_projector)
+        self.assertGreater((result.points.projector == 0).sum(), 1000)
+        self.assertLess(
+            ps.evaluate(self.scene.frame.truth, self.scene.rig, result)["label_error"], 0.01
+        )
+
+    def test_stages_are_views_and_fit_each_other(self) -> None:
+        detection = ps.detect(self.scene.rig, self.scene.frame, identities=True)
+        curves, grid = detection.curves, detection.grid
+        self.assertEqual(address(curves.uv), address(detection._core.curves["uv"]))
+        self.assertEqual(address(curves.uv), address(curves.u))
+        self.assertEqual(address(grid.local_id), address(detection._core.grid["local_id"]))
+        labels = ps.label(detection)
+        self.assertEqual(address(labels.line), address(labels._core.arrays["line"]))
+        of_point = detection.curve_of_point
+        self.assertEqual((len(of_point), of_point.max()), (len(curves), len(grid) - 1))
+        self.assertTrue((grid.camera[of_point] == curves.camera).all())
+        self.assertTrue((grid.curve[of_point] == curves.curve).all())
+        self.assertGreater((grid.local_id >= 0).mean(), 0.3)
+        self.assertTrue((curves.state == 5).all())
+        self.assertEqual(detection.rig, self.scene.rig)
+
+    def test_measuring_twice_gives_the_same(self) -> None:
+        detection = ps.detect(self.scene.rig, self.scene.frame)
+        labels = ps.label(detection)
+        once, again = (ps.measure(detection, labels, mesh=False).points for _ in range(2))
+        self.assertEqual(once.xyz.tobytes(), again.xyz.tobytes())
+
+    def test_complaints_about_labels(self) -> None:
+        detection = ps.detect(self.scene.rig, self.scene.frame)
+        count = len(detection.curves)
+
+        def of(*arrays, **more) -> str:
+            return str(self.complaint(
+                lambda: ps.measure(detection, ps.Labels(*arrays, **more), mesh=False)))
+
+        zeros = np.zeros(count, int)
+        self.assertIn("one for every curve point", of(zeros[1:], zeros[1:], zeros[1:]))
+        self.assertIn("projector[0]: 9", of(zeros + 9, zeros, zeros).replace(" = ", ": "))
+        self.assertIn("line[0]", of(zeros, zeros, zeros + 10000))
+        self.assertIn("confidence[0]", of(zeros, zeros, zeros, confidence=2))
+        self.assertIn("whole numbers", of(zeros + 0.5, zeros, zeros))
+        self.assertIn("identities", str(self.complaint(lambda: ps.label(detection, "multiview"))))
+        self.assertIn("pencilscan.Labels", str(self.complaint(
+            lambda: ps.reconstruct(self.scene.rig, self.scene.frame, method=lambda d: zeros))))
+
     # ---- while it runs --------------------------------------------------------------------------
 
     def test_progress_comes_in_order_in_the_callers_thread(self) -> None:

@@ -15,6 +15,7 @@
 #include "pencilscan/api/images.h"
 #include "pencilscan/api/reconstruct.h"
 #include "pencilscan/api/simulate.h"
+#include "pencilscan/api/stages.h"
 #include "pencilscan/api/version.h"
 #include "pencilscan/core/cancellation.h"
 #include "pencilscan/core/error.h"
