@@ -189,35 +189,6 @@ class PackageTest(unittest.TestCase):
 
     # ---- stage by stage -------------------------------------------------------------------------
 
-    def test_stages_give_the_points_of_the_whole(self) -> None:
-        whole = ps.reconstruct(self.scene.rig, self.scene.frame, method="multiview", mesh=False)
-        detection = ps.detect(self.scene.rig, self.scene.frame, method="multiview")
-        labels = ps.label(detection, "multiview")
-        points = ps.measure(detection, labels, mesh=False, guided=False).points
-        self.assertGreater(len(points), 5000)
-        for name in POINT_PROPERTIES:
-            self.assertEqual(points[name].tobytes(), whole.points[name].tobytes(), name)
-
-    def test_labels_in_the_middle_may_be_the_callers(self) -> None:
-        def without_first_projector(detection: ps.Detection) -> ps.Labels:
-            labels = ps.label(detection, "multiview")
-            keep = labels.projector != 0
-            self.assertFalse(keep.all())
-            return ps.Labels(np.where(keep, labels.projector, -1), labels.pattern, labels.line)
-
-        detection = ps.detect(self.scene.rig, self.scene.frame, identities=True)
-        alone = ps.measure(
-            detection, without_first_projector(detection), mesh=False, guided=False
-        ).points
-        self.assertGreater(len(alone), 1000)
-        self.assertNotIn(0, alone.projector)
-        # Guided matching then finds the lines of the first one on the surface of the others.
-        result = ps.reconstruct(self.scene.rig, self.scene.frame, method=without_first_projector)
-        self.assertGreater((result.points.projector == 0).sum(), 1000)
-        self.assertLess(
-            ps.evaluate(self.scene.frame.truth, self.scene.rig, result)["label_error"], 0.01
-        )
-
     def test_stages_are_views_and_fit_each_other(self) -> None:
         detection = ps.detect(self.scene.rig, self.scene.frame, identities=True)
         curves, grid = detection.curves, detection.grid
