@@ -189,6 +189,43 @@ class PackageTest(unittest.TestCase):
 
     # ---- stage by stage -------------------------------------------------------------------------
 
+    def test_labels_in_the_middle_may_be_the_callers(self) -> None:
+        def without_every_fourth_curve(detection: ps.Detection) -> ps.Labels:
+            labels = ps.label(detection)
+            keep = (labels.projector >= 0) & (detection.curve_of_point % 4 != 0)
+            return ps.Labels(np.where(keep, labels.projector, -1), labels.pattern, labels.line)
+
+        detection = ps.detect(self.scene.rig, self.scene.frame)
+        labels = without_every_fourth_curve(detection)
+        alone = ps.measure(detection, labels, mesh=False, guided=False).points
+        self.assertGreater(len(alone), 5000)
+        self.assertLessEqual(len(alone), (labels.projector >= 0).sum())
+        footprint_mm = 1100 / 860  # of a pixel; points that nothing smoothed are a fifth of it off
+        off = np.abs(np.linalg.norm(alone.xyz, axis=1) - 120)
+        self.assertLess(np.median(off), 0.2 * footprint_mm)
+        # Guided matching finds the lines of the others on the surface, and depth follows.
+        result = ps.reconstruct(
+            self.scene.rig, self.scene.frame, method=without_every_fourth_curve
+        )
+        self.assertGreater(len(result.points), 1.1 * len(alone))
+        self.assertGreater(len(result.mesh.faces), 1000)
+        figures = ps.evaluate(self.scene.frame.truth, self.scene.rig, result)
+        self.assertLess(figures["label_error"], 0.01)
+
+    def test_stages_give_the_names_of_the_whole(self) -> None:
+        detection = ps.detect(self.scene.rig, self.scene.frame)
+        points = ps.measure(detection, ps.label(detection)).points
+
+        def names(p: ps.Points) -> dict:
+            rows = zip(p.camera.tolist(), p.u.tolist(), p.v.tolist(),
+                       p.projector.tolist(), p.line.tolist())
+            return {row[:3]: row[3:] for row in rows}
+
+        whole, ours = names(self.scene.result.points), names(points)
+        both = whole.keys() & ours.keys()
+        self.assertGreater(len(both), 0.95 * len(whole))
+        self.assertGreater(sum(whole[k] == ours[k] for k in both), 0.999 * len(both))
+
     def test_stages_are_views_and_fit_each_other(self) -> None:
         detection = ps.detect(self.scene.rig, self.scene.frame, identities=True)
         curves, grid = detection.curves, detection.grid

@@ -30,6 +30,7 @@ Labeling no_labels(std::size_t cameras) {
   Labeling labeling;
   labeling.runs.resize(cameras);
   labeling.tentative.resize(cameras);
+  labeling.undecided.resize(cameras);
   return labeling;
 }
 
