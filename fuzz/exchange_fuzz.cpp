@@ -27,7 +27,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   Choices parts(text_of(data, size));
   const std::uint8_t kind = parts.byte();
   if (kind == 'c') {
-    std::filesystem::create_directories(scratch() / "model");
+    static const bool prepared = std::filesystem::create_directories(scratch() / "model");
+    static_cast<void>(prepared);
     put("model/cameras.txt", parts.part());
     put("model/images.txt", parts.part());
     put("model/points3D.txt", parts.rest());

@@ -1,11 +1,12 @@
 #pragma once
 
+#include <fcntl.h>
 #include <unistd.h>
 
 #include <cstddef>
 #include <cstdint>
+#include <cstdlib>
 #include <filesystem>
-#include <fstream>
 #include <string>
 #include <string_view>
 
@@ -36,8 +37,10 @@ inline const std::filesystem::path& scratch() {
 }
 
 inline std::filesystem::path put(const std::string& name, std::string_view bytes) {
-  const std::filesystem::path path = scratch() / name;
-  std::ofstream(path, std::ios::binary).write(bytes.data(), std::ptrdiff_t(bytes.size()));
+  std::filesystem::path path = scratch() / name;
+  const int file = ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0644);
+  if (file < 0 || ::write(file, bytes.data(), bytes.size()) != ssize_t(bytes.size())) std::abort();
+  ::close(file);
   return path;
 }
 

@@ -2,6 +2,7 @@
 // and the folder becomes a page.
 
 #include <array>
+#include <string_view>
 
 #include "fuzz.h"
 #include "pencilscan/page/page.h"
@@ -11,23 +12,35 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   using namespace pencilscan;
   using namespace pencilscan::fuzz;
   namespace fs = std::filesystem;
-  static const std::array<const char*, 11> kFiles = {
-      "000000/report.json", "000000/timing.json", "000000/curves.ply",
-      "000000/points.ply",  "000000/mesh.ply",    "000000/evaluation.json",
-      "calibration.json",   "experiment.json",    "table.md",
-      "values.csv",         "devices.json"};
+  /// A file, and the part of the page that it is the only input of; empty: of all.
+  struct File {
+    const char* name;
+    std::string_view part;
+  };
+  static const std::array<File, 11> kFiles = {{{"000000/report.json", "details"},
+                                               {"000000/timing.json", "details"},
+                                               {"000000/curves.ply", "curves"},
+                                               {"000000/points.ply", "points"},
+                                               {"000000/mesh.ply", "mesh"},
+                                               {"000000/evaluation.json", "details"},
+                                               {"calibration.json", "index"},
+                                               {"experiment.json", "index"},
+                                               {"table.md", "index"},
+                                               {"values.csv", "index"},
+                                               {"devices.json", ""}}};
   static const bool prepared = [] {
     sample::write_output(scratch() / "out", 1);
     return true;
   }();
   static_cast<void>(prepared);
   Choices choices(text_of(data, size));
-  const fs::path file = scratch() / "out" / kFiles[choices.below(kFiles.size())];
+  const auto& [name, only] = kFiles[choices.below(kFiles.size())];
+  const fs::path file = scratch() / "out" / name;
   const fs::path kept = scratch() / "kept";
   std::error_code ignored;
   fs::remove(kept, ignored);
   if (fs::exists(file)) fs::rename(file, kept);
-  put(fs::relative(file, scratch()).string(), choices.rest());
+  put(std::string("out/") + name, choices.rest());
   answered([&] {
     const PageData page(scratch() / "out", {});
     Detail detail;
@@ -36,7 +49,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     for (std::size_t r = 0; r < page.size(); ++r) {
       const auto reader = page.open(r, detail);
       for (const char* part : {"details", "points", "curves", "mesh"})
-        static_cast<void>(reader->part(part));
+        if (only.empty() || only == part) static_cast<void>(reader->part(part));
       static_cast<void>(page.entry(r, *reader, reader->part_names()));
     }
     const auto experiment = page.experiment({});

@@ -11,8 +11,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   using namespace pencilscan::fuzz;
   namespace fs = std::filesystem;
   Choices parts(text_of(data, size));
-  fs::create_directories(scratch() / "r" / "cam0");
   static const bool prepared = [] {
+    fs::create_directories(scratch() / "r" / "cam0");
     put("r/.zgroup", R"({"zarr_format": 2})");
     return true;
   }();
