@@ -34,13 +34,13 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   }();
   static_cast<void>(prepared);
   Choices choices(text_of(data, size));
-  const auto& [name, only] = kFiles[choices.below(kFiles.size())];
-  const fs::path file = scratch() / "out" / name;
+  const File& chosen = kFiles[choices.below(kFiles.size())];
+  const fs::path file = scratch() / "out" / chosen.name;
   const fs::path kept = scratch() / "kept";
   std::error_code ignored;
   fs::remove(kept, ignored);
   if (fs::exists(file)) fs::rename(file, kept);
-  put(std::string("out/") + name, choices.rest());
+  put(std::string("out/") + chosen.name, choices.rest());
   answered([&] {
     const PageData page(scratch() / "out", {});
     Detail detail;
@@ -49,7 +49,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     for (std::size_t r = 0; r < page.size(); ++r) {
       const auto reader = page.open(r, detail);
       for (const char* part : {"details", "points", "curves", "mesh"})
-        if (only.empty() || only == part) static_cast<void>(reader->part(part));
+        if (chosen.part.empty() || chosen.part == part) static_cast<void>(reader->part(part));
       static_cast<void>(page.entry(r, *reader, reader->part_names()));
     }
     const auto experiment = page.experiment({});
