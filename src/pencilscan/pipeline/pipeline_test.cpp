@@ -126,7 +126,7 @@ TEST_F(PipelineTest, JointAndMultiviewLabelTheBallAndLinearWorksWithOneCamera) {
   ASSERT_GT(linear.points.size(), 500U);
   const TruthScene one_truth(ball(), minimum);
   const auto linear_verdicts = judge_points(one_truth, linear.points);
-  EXPECT_LT(label_figures(one_truth, linear.points, linear_verdicts).wrong.value(), 0.5);
+  EXPECT_LT(label_figures(one_truth, linear.points, linear_verdicts).wrong.value(), 0.01);
 }
 
 TEST_F(PipelineTest, TheSurfaceTakesWrongLabelsAwayAndFindsTheirLinesAgain) {
