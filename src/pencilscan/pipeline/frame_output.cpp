@@ -228,7 +228,7 @@ nlohmann::ordered_json frame_report(const Rig& rig, const Frame& frame, const Po
   report["surface"] = {{"status", to_string(s.status)},
                        {"points_used", s.points_used},
                        {"spacing_mm", number(s.spacing_mm)},
-                       {"octree_depth", s.depth},
+                       {"cells_across", 1 << s.depth},
                        {"vertices", s.vertices},
                        {"faces", s.faces},
                        {"boundary_edges", s.edges.boundary},

@@ -5,9 +5,10 @@
 #include <vector>
 
 #include "pencilscan/surface/attributes.h"
+#include "pencilscan/surface/inside_field.h"
 #include "pencilscan/surface/manifold.h"
+#include "pencilscan/surface/marching_cubes.h"
 #include "pencilscan/surface/mesh_parts.h"
-#include "pencilscan/surface/poisson.h"
 
 namespace pencilscan {
 namespace {
@@ -27,44 +28,23 @@ Cube bounding_cube(std::span<const SurfaceSample> samples) {
   return {0.5 * (low + high), 0.5 * (high - low).maxCoeff()};
 }
 
-/// Every so many samples, that a cell of an octree still has a few: coarse surfaces need no more.
-std::vector<SurfaceSample> thinned(std::span<const SurfaceSample> samples, double cell_spacings) {
-  constexpr double kPerCell = 4;
-  const auto step =
-      static_cast<std::size_t>(std::max(1.0, cell_spacings * cell_spacings / kPerCell));
-  std::vector<SurfaceSample> few;
-  for (std::size_t i = 0; i < samples.size(); i += step) few.push_back(samples[i]);
-  return few;
-}
+/// The cube within which the surface closes: this many times the samples' own.
+constexpr double kRoom = 1.5;
 
-/// Side of a cube that the closed surface does not leave, relative to the samples' bounding cube:
-/// the smaller, the finer the octree. A coarse surface tells. What few cameras saw may leave any
-/// cube: it is cut by the smallest one and capped there.
-double cube_scale(std::span<const SurfaceSample> samples, const Cube& cube, double spacing) {
-  constexpr int kProbeDepth = 6;
-  constexpr double kSmallest = 1.5;
-  constexpr double kWide = 2;
-  constexpr double kWidest = 3;
-  constexpr double kRoom = 1.25;  // a surface moves outwards with the faces of its cube near by
-  constexpr double kCells = 1 << kProbeDepth;
-  const std::vector<SurfaceSample> few =
-      thinned(samples, 2 * kWide * cube.half_side / kCells / spacing);
-  const TriangleMesh probe = poisson_surface(few, kProbeDepth, kWide);
-  if (count_edges(probe).boundary == 0) {
-    double reach = 0;
-    for (const Vec3& x : probe.vertices)
-      reach = std::max(reach, (x - cube.center).cwiseAbs().maxCoeff());
-    return kRoom * reach < kSmallest * cube.half_side ? kSmallest : kWide;
-  }
-  const bool is_inside = count_edges(poisson_surface(few, kProbeDepth, kWidest)).boundary == 0;
-  return is_inside ? kWidest : kSmallest;
-}
-
-/// Depth at which the octree's cells have the wished size.
-int octree_depth(const Cube& cube, const ClosingOptions& options, double scale) {
-  const double cells = 2 * scale * cube.half_side / options.cell_mm;
-  return std::clamp(static_cast<int>(std::ceil(std::log2(std::max(cells, 1.0)) - 0.25)), 5,
-                    options.max_depth);
+/// Samples' surface, closed within a cube around them.
+TriangleMesh closed_within_cube(std::span<const SurfaceSample> samples,
+                                const ClosingOptions& options, ClosedSurface& result) {
+  const Cube cube = bounding_cube(samples);
+  const double side = 2 * kRoom * std::max(cube.half_side, options.cell_mm);
+  int cells = 32;
+  result.depth = 5;
+  for (; result.depth < options.max_depth && cells * options.cell_mm < side; ++result.depth)
+    cells *= 2;
+  const double cell = std::max(options.cell_mm, side / cells);
+  const Vec3 origin = cube.center - Vec3::Constant(0.5 * cell * cells);
+  result.scale = 0.5 * cell * cells / std::max(cube.half_side, 0.5 * cell);
+  const InsideField field = inside_field(samples, origin, cell, cells);
+  return marching_cubes(field.lattice, field.values, field.origin, field.cell);
 }
 
 /// Keeps the component with the largest measured area and those with a fair share of it.
@@ -96,11 +76,10 @@ TriangleMesh without_floaters(const TriangleMesh& mesh, double min_share, std::s
 
 ClosedSurface closed_surface(std::span<const SurfaceSample> samples,
                              const ClosingOptions& options) {
-  const Cube cube = bounding_cube(samples);
   ClosedSurface result;
-  result.scale = cube_scale(samples, cube, options.spacing_mm);
-  result.depth = octree_depth(cube, options, result.scale);
-  result.mesh = with_caps(poisson_surface(samples, result.depth, result.scale));
+  // Caps: where the surface leaves the cells around it, which its growth from level to level
+  // prevents.
+  result.mesh = with_caps(closed_within_cube(samples, options, result));
   make_manifold(result.mesh);
   attribute_vertices(samples, options.reach_spacings, options.spacing_mm, result.mesh);
   result.mesh =

@@ -25,7 +25,7 @@ namespace pencilscan {
 
 /// Clears keep[i] of samples in small clusters. A cluster is a chain of kept samples with gaps up
 /// to `gap_mm`; it is small if it has less than min_share of the largest cluster's samples.
-/// Clusters far away would stretch the octree, and with it every cell.
+/// Clusters far away would stretch the cube, and with it every cell.
 void drop_small_clusters(std::span<const SurfaceSample> samples, double gap_mm, double min_share,
                          std::vector<char>& keep);
 

@@ -159,7 +159,7 @@ SurfaceResult reconstruct_surface(const Rig& rig, std::span<const MeasuredPoint>
 
   fit_local_surfaces(kept, kFitRadius * set.spacing);
   tell(0.4);
-  const Stopwatch poisson_watch;
+  const Stopwatch closing_watch;
   ClosingOptions closing;
   closing.spacing_mm = set.spacing;
   closing.cell_mm = options.cell_spacings * set.spacing;
@@ -167,7 +167,7 @@ SurfaceResult reconstruct_surface(const Rig& rig, std::span<const MeasuredPoint>
   closing.reach_spacings = options.reach_spacings;
   closing.min_component_share = options.min_component_share;
   take(closed_surface(kept, closing), result);
-  report.seconds_poisson = poisson_watch.seconds();
+  report.seconds_closing = closing_watch.seconds();
   result.measured = measured_part(result.mesh, 4 * set.spacing * set.spacing);
   note_quality(surface_area(result.mesh), result);
   report.seconds = watch.seconds();
@@ -193,7 +193,7 @@ SurfaceResult close_depth(const Rig& rig, std::span<const DepthMap> maps,
   }
   fit_local_surfaces(samples, options.fit_spacings * report.spacing_mm);
   report.seconds_filter = watch.seconds();
-  const Stopwatch poisson_watch;
+  const Stopwatch closing_watch;
   ClosingOptions closing;
   closing.spacing_mm = report.spacing_mm;
   closing.cell_mm = options.cell_spacings * report.spacing_mm;
@@ -201,7 +201,7 @@ SurfaceResult close_depth(const Rig& rig, std::span<const DepthMap> maps,
   closing.reach_spacings = options.reach_spacings;
   closing.min_component_share = options.min_component_share;
   take(closed_surface(samples, closing), result);
-  report.seconds_poisson = poisson_watch.seconds();
+  report.seconds_closing = closing_watch.seconds();
   const std::vector<Vec3> closed = result.mesh.vertices;
   carve(rig, silhouettes, options.carving, result.mesh);
   untangle(closed, result.mesh);

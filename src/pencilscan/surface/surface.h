@@ -24,16 +24,16 @@ namespace pencilscan {
 /// 2. Samples vote on each other (filter.h): samples of other curves on the same local surface
 ///    support, samples whose sight or light line passes through one contradict it.
 /// 3. A local quadric per sample gives its normal and its place across the surface (local_fit.h).
-/// 4. Screened Poisson (Kazhdan and Hoppe, 2013; Open3D's build of it) gives a closed surface.
+/// 4. A field says what is inside: signed distances near the samples, smooth between them
+///    (inside_field.h); marching cubes gives its closed surface.
 /// 5. Each vertex learns from the samples near it whether it was measured, and how well.
 ///
 /// Lengths are in footprints (rig/rig.h): a rig in another unit is scaled before.
-/// The bytes are the same for any thread count: Open3D's solver runs on one thread, since its sums
-/// depend on the number of threads.
+/// The bytes are the same for any thread count.
 struct SurfaceOptions {
   bool filter = true;            ///< votes on; off takes every point as it is
-  int max_depth = 8;             ///< of the octree, in [5, 10]; 8 takes about 5 s, 9 about 20 s
-  double cell_spacings = 0.25;   ///< wished octree cell in line spacings, > 0
+  int max_depth = 9;             ///< log2 of the cells along a cube around the object, in [5, 10]
+  double cell_spacings = 0.25;   ///< side of a cell in line spacings, > 0
   double sample_spacings = 0.3;  ///< length of curve per sample in line spacings, > 0
   double reach_spacings = 1.0;   ///< a vertex farther from all samples was not measured, > 0
   double min_component_share = 0.05;  ///< of the largest component's measured area, in [0, 1]
@@ -53,8 +53,8 @@ struct SurfaceReport {
   std::size_t samples = 0;
   std::size_t samples_used = 0;
   double spacing_mm = 0;  ///< median distance of neighbouring light sheets at the object
-  int depth = 0;          ///< of the octree
-  double scale = 0;       ///< octree cube / bounding cube of the samples
+  int depth = 0;          ///< log2 of the cells along the cube
+  double scale = 0;       ///< cube / bounding cube of the samples
   std::size_t components_removed = 0;
   std::size_t vertices = 0;
   std::size_t faces = 0;
@@ -62,7 +62,7 @@ struct SurfaceReport {
   std::size_t self_intersections = 0;  ///< faces that cut another one (dense depth)
   double measured_share = 0;           ///< area of mesh_measured / area of mesh
   double seconds_filter = 0;
-  double seconds_poisson = 0;
+  double seconds_closing = 0;
   double seconds = 0;
   std::vector<Warning> warnings;
 };
@@ -82,20 +82,20 @@ struct SurfaceResult {
 
 /// From dense depth to one closed surface.
 struct FusionOptions {
-  int max_depth = 8;                   ///< of the octree, in [5, 10]
-  double cell_spacings = 0.9;          ///< wished octree cell in node spacings, > 0
-  double fit_spacings = 1.5;           ///< radius of local quadrics in node spacings, > 0
-  int subdivisions = 1;                ///< of the octree's triangles, before they follow the depth
-  CarvingOptions carving;              ///< of what was invented, by the silhouettes
-  FollowOptions follow;                ///< how vertices follow the depth
-  double reach_spacings = 2;           ///< a vertex farther from all nodes was not measured, > 0
+  int max_depth = 9;           ///< log2 of the cells along a cube around the object, in [5, 10]
+  double cell_spacings = 1.1;  ///< side of a cell in node spacings, > 0
+  double fit_spacings = 1.5;   ///< radius of local quadrics in node spacings, > 0
+  int subdivisions = 1;        ///< of the cells' triangles, before they follow the depth
+  CarvingOptions carving;      ///< of what was invented, by the silhouettes
+  FollowOptions follow;        ///< how vertices follow the depth
+  double reach_spacings = 2;   ///< a vertex farther from all nodes was not measured, > 0
   double min_component_share = 0.05;   ///< of the largest component's measured area, in [0, 1]
   double least_island_spacings2 = 16;  ///< area of a measured island that is kept, spacings^2
 };
 
 /// The nodes of all depth maps, each weighted by its variance, move onto local quadrics through the
-/// nodes of all cameras (local_fit.h); screened Poisson closes them; silhouettes carve what was
-/// invented. The mesh is as coarse as the octree.
+/// nodes of all cameras (local_fit.h); a field of what is inside closes them (inside_field.h);
+/// silhouettes carve what was invented. The mesh is as coarse as the field.
 [[nodiscard]] SurfaceResult close_depth(const Rig& rig, std::span<const DepthMap> maps,
                                         const FusionOptions& options = {},
                                         std::span<const Silhouette> silhouettes = {});

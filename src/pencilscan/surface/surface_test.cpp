@@ -244,7 +244,7 @@ TEST(Surface, TwoCamerasAndOneProjectorGiveAClosedSurface) {
   EXPECT_GT(surface_area(result.measured), 0.15 * surface_area(result.mesh));
 }
 
-TEST(Surface, FarFloatersNeitherStayNorStretchTheOctree) {
+TEST(Surface, FarFloatersNeitherStayNorStretchTheCube) {
   const Rig rig = ball_rig();
   std::vector<MeasuredPoint> points = ball_points(rig);
   const std::size_t count = points.size();

@@ -19,7 +19,7 @@ struct CarriedSurface {
   std::vector<float> traveled;  ///< how far each vertex has come, along the surface too; footprints
 };
 
-/// How a closed mesh, as coarse as the octree and with confidences, fits the depth maps.
+/// How a closed mesh, as coarse as the field and with confidences, fits the depth maps.
 [[nodiscard]] SurfaceFit surface_fit(const Rig& rig, std::span<const DepthMap> maps,
                                      const TriangleMesh& mesh);
 
