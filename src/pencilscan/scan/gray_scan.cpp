@@ -7,7 +7,7 @@
 
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/gray/local_map.h"
-#include "pencilscan/surface/poisson.h"
+#include "pencilscan/surface/closing.h"
 
 namespace pencilscan {
 namespace {
@@ -120,17 +120,8 @@ GrayScan gray_scan(const Rig& rig, std::size_t camera, std::size_t projector,
 
 TriangleMesh scan_mesh(std::span<const SurfaceSample> samples, double cell_mm) {
   if (samples.size() < kLeastSamples) return {};
-  Vec3 low = samples[0].position;
-  Vec3 high = low;
-  for (const SurfaceSample& sample : samples) {
-    low = low.cwiseMin(sample.position);
-    high = high.cwiseMax(sample.position);
-  }
-  constexpr double kScale = 1.5;
-  const double size = kScale * (high - low).maxCoeff();
-  const int depth =
-      std::clamp(static_cast<int>(std::ceil(std::log2(size / std::max(cell_mm, 1e-9)))), 5, 9);
-  return poisson_surface(samples, depth, kScale);
+  constexpr int kMostDepth = 9;
+  return surface_within_cube(samples, cell_mm, kMostDepth).mesh;
 }
 
 }  // namespace pencilscan

@@ -29,7 +29,7 @@ struct GrayScan {
 [[nodiscard]] GrayScan gray_scan(const Rig& rig, std::size_t camera, std::size_t projector,
                                  const DecodedView& decoded, const GrayScanOptions& options = {});
 
-/// Screened Poisson surface of all pairs' samples; empty when there are too few. `cell_mm` is the
+/// Closed surface of all pairs' samples; empty when there are too few. `cell_mm` is the
 /// wished size of its cells, > 0.
 [[nodiscard]] TriangleMesh scan_mesh(std::span<const SurfaceSample> samples, double cell_mm);
 

@@ -31,22 +31,6 @@ Cube bounding_cube(std::span<const SurfaceSample> samples) {
 /// The cube within which the surface closes: this many times the samples' own.
 constexpr double kRoom = 1.5;
 
-/// Samples' surface, closed within a cube around them.
-TriangleMesh closed_within_cube(std::span<const SurfaceSample> samples,
-                                const ClosingOptions& options, ClosedSurface& result) {
-  const Cube cube = bounding_cube(samples);
-  const double side = 2 * kRoom * std::max(cube.half_side, options.cell_mm);
-  int cells = 32;
-  result.depth = 5;
-  for (; result.depth < options.max_depth && cells * options.cell_mm < side; ++result.depth)
-    cells *= 2;
-  const double cell = std::max(options.cell_mm, side / cells);
-  const Vec3 origin = cube.center - Vec3::Constant(0.5 * cell * cells);
-  result.scale = 0.5 * cell * cells / std::max(cube.half_side, 0.5 * cell);
-  const InsideField field = inside_field(samples, origin, cell, cells);
-  return marching_cubes(field.lattice, field.values, field.origin, field.cell);
-}
-
 /// Keeps the component with the largest measured area and those with a fair share of it.
 TriangleMesh without_floaters(const TriangleMesh& mesh, double min_share, std::size_t& removed) {
   const std::vector<int> component = face_components(mesh);
@@ -74,13 +58,28 @@ TriangleMesh without_floaters(const TriangleMesh& mesh, double min_share, std::s
 
 }  // namespace
 
-ClosedSurface closed_surface(std::span<const SurfaceSample> samples,
-                             const ClosingOptions& options) {
+ClosedSurface surface_within_cube(std::span<const SurfaceSample> samples, double cell_mm,
+                                  int max_depth) {
+  const Cube cube = bounding_cube(samples);
+  const double side = 2 * kRoom * std::max(cube.half_side, cell_mm);
+  int cells = 32;
   ClosedSurface result;
+  result.depth = 5;
+  for (; result.depth < max_depth && cells * cell_mm < side; ++result.depth) cells *= 2;
+  const double cell = std::max(cell_mm, side / cells);
+  const Vec3 origin = cube.center - Vec3::Constant(0.5 * cell * cells);
+  result.scale = 0.5 * cell * cells / std::max(cube.half_side, 0.5 * cell);
+  const InsideField field = inside_field(samples, origin, cell, cells);
   // Caps: where the surface leaves the cells around it, which its growth from level to level
   // prevents.
-  result.mesh = with_caps(closed_within_cube(samples, options, result));
+  result.mesh = with_caps(marching_cubes(field.lattice, field.values, field.origin, field.cell));
   make_manifold(result.mesh);
+  return result;
+}
+
+ClosedSurface closed_surface(std::span<const SurfaceSample> samples,
+                             const ClosingOptions& options) {
+  ClosedSurface result = surface_within_cube(samples, options.cell_mm, options.max_depth);
   attribute_vertices(samples, options.reach_spacings, options.spacing_mm, result.mesh);
   result.mesh =
       without_floaters(result.mesh, options.min_component_share, result.components_removed);

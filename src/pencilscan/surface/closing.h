@@ -22,6 +22,12 @@ struct ClosedSurface {
   std::size_t components_removed = 0;
 };
 
+/// The closed surface of at least one oriented sample within a cube around all of them, without
+/// sigma and confidence. Cells are larger than cell_mm (> 0) where 2^max_depth of them do not cross
+/// the cube.
+[[nodiscard]] ClosedSurface surface_within_cube(std::span<const SurfaceSample> samples,
+                                                double cell_mm, int max_depth);
+
 /// The closed surface of the samples, without components that hardly anything measured.
 [[nodiscard]] ClosedSurface closed_surface(std::span<const SurfaceSample> samples,
                                            const ClosingOptions& options);
