@@ -83,7 +83,7 @@ struct SurfaceResult {
 /// From dense depth to one closed surface.
 struct FusionOptions {
   int max_depth = 9;           ///< log2 of the cells along a cube around the object, in [5, 10]
-  double cell_spacings = 1.1;  ///< side of a cell in node spacings, > 0
+  double cell_spacings = 1.0;  ///< side of a cell in node spacings, > 0
   double fit_spacings = 1.5;   ///< radius of local quadrics in node spacings, > 0
   int subdivisions = 1;        ///< of the cells' triangles, before they follow the depth
   CarvingOptions carving;      ///< of what was invented, by the silhouettes
