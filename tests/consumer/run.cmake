@@ -15,11 +15,11 @@ run_step(${CMAKE_COMMAND} -S ${CMAKE_CURRENT_LIST_DIR} -B ${WORK_DIR}/build -G $
          -D CMAKE_CXX_COMPILER_LAUNCHER=${LAUNCHER}
          -D CMAKE_PREFIX_PATH=${WORK_DIR}/prefix -D CMAKE_FIND_USE_PACKAGE_REGISTRY=OFF)
 run_step(${CMAKE_COMMAND} --build ${WORK_DIR}/build)
-# The component rig, on a computer without Open3D and Ceres.
+# The component rig, on a computer without Ceres.
 run_step(${CMAKE_COMMAND} -S ${CMAKE_CURRENT_LIST_DIR}/rig_only -B ${WORK_DIR}/build_rig_only -G ${GENERATOR}
          -D CMAKE_CXX_COMPILER=${CXX_COMPILER} -D CMAKE_BUILD_TYPE=${BUILD_TYPE}
          -D CMAKE_CXX_COMPILER_LAUNCHER=${LAUNCHER}
-         -D CMAKE_DISABLE_FIND_PACKAGE_Open3D=ON -D CMAKE_DISABLE_FIND_PACKAGE_Ceres=ON
+         -D CMAKE_DISABLE_FIND_PACKAGE_Ceres=ON
          -D CMAKE_PREFIX_PATH=${WORK_DIR}/prefix -D CMAKE_FIND_USE_PACKAGE_REGISTRY=OFF)
 run_step(${CMAKE_COMMAND} --build ${WORK_DIR}/build_rig_only)
 # Only the front door and what it includes is there.

@@ -1,4 +1,4 @@
-// A program that only reads rigs: it needs neither Open3D nor Ceres.
+// A program that only reads rigs: it needs no Ceres.
 //   rig_only <rig.json>
 
 #include <pencilscan/rig/rig.h>
