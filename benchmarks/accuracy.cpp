@@ -87,7 +87,8 @@ void print_identities(const TruthScene& truth, const Rig& rig, const PointResult
 }
 
 void print_distances(const TruthScene& truth, const PointResult& result,
-                     const std::vector<PointVerdict>& verdicts) {
+                     const std::vector<PointVerdict>& verdicts,
+                     const std::vector<StageTime>& times) {
   std::vector<Vec3> points;
   for (const MeasuredPoint& p : result.points) points.emplace_back(p.x, p.y, p.z);
   std::vector<double> distances = distances_to(truth.scene(), points);
@@ -102,8 +103,7 @@ void print_distances(const TruthScene& truth, const PointResult& result,
       sigma.below_one.value(), sigma.below_two.value());
   for (const double t : sigma.tenths) std::printf(" %.2f", t);
   std::printf("  rank %.2f\n  seconds", sigma.rank_correlation);
-  for (const StageTime& time : result.times)
-    std::printf(" %s %.3f", time.stage.c_str(), time.seconds);
+  for (const StageTime& time : times) std::printf(" %s %.3f", time.stage.c_str(), time.seconds);
   std::printf("\n");
 }
 
@@ -163,7 +163,8 @@ int run(const std::filesystem::path& rig_path, const std::filesystem::path& fram
     options.meshes = false;
     options.points.method = choices[k].method;
     if (!choices[k].is_guided) options.points.guided.passes = 0;
-    const PointResult result = reconstruct_frame(rig, frame, options).points;
+    const FrameResult made = reconstruct_frame(rig, frame, options);
+    const PointResult& result = made.points;
     if (is_first) {
       print_detection(rig, result, true_lines);
       print_identities(truth, rig, result);
@@ -177,7 +178,7 @@ int run(const std::filesystem::path& rig_path, const std::filesystem::path& fram
         "%.4f\n",
         choices[k].name, result.points.size(), labels.wrong.value(), recall.recall.value(),
         recall.recall_dense.value(), labels.line_error_median_px);
-    print_distances(truth, result, verdicts);
+    print_distances(truth, result, verdicts, made.times);
     print_reliability(labels);
   }
   return 0;
