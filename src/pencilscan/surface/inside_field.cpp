@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "pencilscan/core/check.h"
+#include "pencilscan/core/chunks.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/surface/smooth_field.h"
 
@@ -256,11 +257,7 @@ std::vector<float> prolonged(const Lattice& coarse, const std::vector<float>& va
     }
     return sum / static_cast<float>(count);
   };
-  constexpr std::size_t kRun = 4096;
-  parallel_for((fine.size() + kRun - 1) / kRun, [&](std::size_t run) {
-    for (std::size_t i = run * kRun; i < std::min(fine.size(), (run + 1) * kRun); ++i)
-      result[i] = between(i);
-  });
+  parallel_chunks(fine.size(), [&](std::size_t i) { result[i] = between(i); });
   return result;
 }
 
