@@ -13,9 +13,10 @@ function(pencilscan_target_options target)
   target_compile_options(${target} PRIVATE -fno-math-errno -fno-trapping-math)
   if(PENCILSCAN_HAS_AVX2)
     # No fused multiply-add: it would round otherwise than the same code elsewhere. Eigen's alignment
-    # stays that of Debian's libraries. GCC 12 then sees overflows that are none.
+    # stays that of Debian's libraries. GCC 12 then sees overflows and unset values that are none.
     target_compile_options(${target} PRIVATE -march=x86-64-v3 -ffp-contract=off
-                           -Wno-array-bounds -Wno-stringop-overflow -Wno-stringop-overread -Wno-restrict)
+                           -Wno-array-bounds -Wno-stringop-overflow -Wno-stringop-overread -Wno-restrict
+                           -Wno-maybe-uninitialized)
     target_compile_definitions(${target} PUBLIC EIGEN_MAX_ALIGN_BYTES=16)
   endif()
   if(CMAKE_UNITY_BUILD)

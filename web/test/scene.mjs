@@ -130,7 +130,7 @@ export function readPoints(file) {
   const header = bytes.subarray(0, end).toString('latin1').split('\n');
   const count = Number(header.find((l) => l.startsWith('element vertex')).split(' ')[2]);
   const read = {float: [4, 'readFloatLE'], uchar: [1, 'readUInt8'], ushort: [2, 'readUInt16LE'], int: [4, 'readInt32LE']};
-  const properties = header.filter((l) => l.startsWith('property')).map((l) => l.split(' ').slice(1));
+  const properties = header.filter((l) => /^property (?!list)/.test(l)).map((l) => l.split(' ').slice(1));
   const points = [];
   let at = end;
   for (let i = 0; i < count; ++i) {
