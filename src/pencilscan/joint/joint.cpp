@@ -78,6 +78,29 @@ PairwiseEnergy pairwise_energy(const LabelledPieces& pieces, const JointOptions&
   return energy;
 }
 
+/// Leaves out labels that the other cameras make hopeless (`views`: what they cost there). Time and
+/// memory of all that follows grow with the square of the number of labels. Returns what becomes of
+/// each (OtherViews::forget).
+std::vector<std::vector<int>> forget_unseen(const std::vector<std::vector<float>>& views,
+                                            const JointOptions& options, LabelledPieces& pieces) {
+  std::vector<std::vector<int>> new_index;
+  const float behind = largest_gap(pieces.graph, options);
+  for (std::size_t p = 0; p < pieces.labels.size(); ++p) {
+    auto& labels = pieces.labels[p];
+    std::vector<int>& index = new_index.emplace_back(labels.size(), -1);
+    std::vector<float>& costs = pieces.scores[p];
+    for (std::size_t k = 0; k < costs.size(); ++k) costs[k] += views[p][k];
+    int kept = 0;
+    for (const std::size_t k : labels_worth_keeping(costs, labels.size(), behind)) {
+      labels[static_cast<std::size_t>(kept)] = labels[k];
+      index[k] = kept++;
+    }
+    labels.resize(static_cast<std::size_t>(kept));
+  }
+  pieces.scores.clear();
+  return new_index;
+}
+
 /// Where nothing crosses: pieces side by side are lines side by side.
 void add_order(const Rig& rig, const GridGraph& graph, const LabelledPieces& pieces,
                std::span<const NextPiece> beside, PairwiseEnergy& energy) {
@@ -254,7 +277,13 @@ Labeling solve_joint(const Rig& rig, const std::vector<ColorFamily>& families,
   parallel_for(graphs.size(), [&](std::size_t g) {
     pieces[g] = possible_labels(rig, families, graphs[g], options);
   });
-  const OtherViews others(rig, graphs, pieces);
+  OtherViews others(rig, graphs, pieces);
+  std::vector<std::vector<std::vector<int>>> new_index(graphs.size());
+  parallel_for(graphs.size(), [&](std::size_t g) {
+    const std::vector<PieceBeliefs> no_beliefs(graphs.size());
+    new_index[g] = forget_unseen(others.costs(g, no_beliefs), options, pieces[g]);
+  });
+  others.forget(new_index);
   std::vector<std::optional<Surroundings>> surroundings(graphs.size());
   std::vector<PairwiseEnergy> energies(graphs.size());
   std::vector<std::vector<NextPiece>> beside(graphs.size());

@@ -20,6 +20,7 @@ struct LinePlace {
 
 constexpr int kNextLineCellPx = 16;
 constexpr float kNextLinePx = 48;
+constexpr float kNearPx = 12;  ///< most next lines are nearer
 
 }  // namespace
 
@@ -50,20 +51,26 @@ std::vector<NextPiece> next_pieces(const Camera& camera, const GridGraph& graph,
         curve.points[static_cast<std::size_t>((piece.begin + piece.end) / 2)];
     const Vector2f tangent = middle.tangent();
     const Vector2f normal(tangent.y(), -tangent.x());
-    for (const float side : {1.F, -1.F}) {
-      float nearest = kNextLinePx;
+    const Vector2f& at = middle.position;
+    const auto nearest_within = [&](float reach, float side) {
+      constexpr float kAlong = 1;
+      float nearest = reach;
       const LinePlace* found = nullptr;
-      const Vector2f& at = middle.position;
-      places.around(at, kNextLinePx, [&](const LinePlace& place) {
+      places.around(at, std::hypot(reach, kAlong), [&](const LinePlace& place) {
         const Vector2f way = place.pixel - at;
         const float across = side * way.dot(normal);
-        if (across < 1.5F || across >= nearest || std::abs(way.dot(tangent)) > 1) return;
+        if (across < 1.5F || across >= nearest || std::abs(way.dot(tangent)) > kAlong) return;
         if (place.curve == piece.curve || std::abs(place.tangent.dot(tangent)) < 0.85F ||
             graph.curves[static_cast<std::size_t>(place.curve)].family != curve.family)
           return;
         nearest = across;
         found = &place;
       });
+      return found;
+    };
+    for (const float side : {1.F, -1.F}) {
+      const LinePlace* found = nearest_within(kNearPx, side);
+      if (found == nullptr) found = nearest_within(kNextLinePx, side);
       if (found == nullptr) continue;
       const int a = static_cast<int>(p);
       if (!seen.insert(std::minmax(a, found->piece)).second) continue;

@@ -117,6 +117,18 @@ std::vector<OtherViews::Sighting> OtherViews::look_from_others(std::size_t g,
   return sightings;
 }
 
+void OtherViews::forget(std::span<const std::vector<std::vector<int>>> new_index) {
+  for (std::size_t g = 0; g < sightings_.size(); ++g) {
+    for (Sighting& s : sightings_[g]) {
+      s.label = new_index[g][static_cast<std::size_t>(s.piece)][static_cast<std::size_t>(s.label)];
+      if (s.same >= 0)
+        s.same = new_index[static_cast<std::size_t>(s.graph)][static_cast<std::size_t>(s.hit)]
+                          [static_cast<std::size_t>(s.same)];
+    }
+    std::erase_if(sightings_[g], [](const Sighting& s) { return s.label < 0; });
+  }
+}
+
 std::vector<std::vector<float>> OtherViews::costs(std::size_t g,
                                                   std::span<const PieceBeliefs> beliefs) const {
   // A true label is hit where the other camera sees it (about 0.6) or by chance; a wrong one by

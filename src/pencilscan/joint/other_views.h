@@ -16,6 +16,10 @@ class OtherViews {
   OtherViews(const Rig& rig, std::span<const GridGraph> graphs,
              std::span<const LabelledPieces> pieces);
 
+  /// Leaves out labels: new_index[g][p][k] is what becomes of label k of piece p of graphs[g], -1
+  /// if it is gone. The pieces given at first hold the labels that stay by then.
+  void forget(std::span<const std::vector<std::vector<int>>> new_index);
+
   /// Cost of every label of every piece of graphs[g]; `beliefs` per graph, empty at first, when
   /// only places and directions count.
   [[nodiscard]] std::vector<std::vector<float>> costs(std::size_t g,

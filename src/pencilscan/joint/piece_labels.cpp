@@ -177,23 +177,16 @@ void keep_supported(LabelledPieces& pieces, const JointOptions& options) {
   scores = along_curves(pieces, scores, options);
   const std::vector<char> is_crossed = pieces_of_crossed_curves(pieces.graph);
   const bool lacks = lacks_crossings(pieces.graph);
+  const float behind = largest_gap(pieces.graph, options);
+  pieces.scores.resize(scores.size());
   for (std::size_t p = 0; p < pieces.labels.size(); ++p) {
     auto& labels = pieces.labels[p];
-    const std::size_t max_labels = kept_labels(labels, is_crossed[p] != 0, lacks, options);
-    std::vector<std::size_t> order(labels.size());
-    for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
-    const std::size_t count = std::min(labels.size(), max_labels);
-    if (count < order.size()) {
-      std::nth_element(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(count),
-                       order.end(), [&](std::size_t i, std::size_t j) {
-                         return scores[p][i] != scores[p][j] ? scores[p][i] < scores[p][j] : i < j;
-                       });
-    }
-    order.resize(count);
-    std::sort(order.begin(), order.end());
+    const std::size_t most = kept_labels(labels, is_crossed[p] != 0, lacks, options);
     std::vector<PieceLabel> kept;
-    kept.reserve(count);
-    for (const std::size_t i : order) kept.push_back(labels[i]);
+    for (const std::size_t i : labels_worth_keeping(scores[p], most, behind)) {
+      kept.push_back(labels[i]);
+      pieces.scores[p].push_back(scores[p][i]);
+    }
     labels = std::move(kept);
   }
 }
@@ -249,6 +242,30 @@ Sphere reach_of_labels(const Sphere& volume, const std::vector<char>& meets_volu
 
 }  // namespace
 
+float largest_gap(const PieceGraph& graph, const JointOptions& options) {
+  return lacks_crossings(graph) ? std::numeric_limits<float>::max()
+                                : static_cast<float>(options.max_behind);
+}
+
+std::vector<std::size_t> labels_worth_keeping(std::span<const float> costs, std::size_t most,
+                                              float behind) {
+  if (costs.empty()) return {};
+  const float limit = *std::min_element(costs.begin(), costs.end()) + behind;
+  std::vector<std::size_t> order;
+  for (std::size_t i = 0; i < costs.size(); ++i) {
+    if (costs[i] <= limit) order.push_back(i);
+  }
+  if (order.size() > most) {
+    std::nth_element(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(most), order.end(),
+                     [&](std::size_t i, std::size_t j) {
+                       return costs[i] != costs[j] ? costs[i] < costs[j] : i < j;
+                     });
+    order.resize(most);
+    std::sort(order.begin(), order.end());
+  }
+  return order;
+}
+
 CrossingCost::CrossingCost(const LabelledPieces& pieces, const JointOptions& options)
     : lights_(pieces.lights),
       wrong_(static_cast<float>(options.crossing_outliers)),
@@ -285,7 +302,9 @@ float CrossingCost::lit_share(const PieceLabel& a, const PieceLabel& b,
     const Eigen::Vector3f& c = lights_[static_cast<std::size_t>(projector)];
     const Eigen::Vector2f lever = c.head<2>() - c.z() * p;
     const float margin = 1 - w * c.z() - g.dot(lever);
-    const float sigma = std::hypot(error_a * nb.dot(lever), error_b * na.dot(lever));
+    const float of_a = error_a * nb.dot(lever);
+    const float of_b = error_b * na.dot(lever);
+    const float sigma = std::sqrt(of_a * of_a + of_b * of_b);
     if (margin > 4 * sigma) continue;
     if (margin < -6 * sigma) return 0;
     share *= 0.5F * std::erfc(-margin / (std::numbers::sqrt2_v<float> * sigma));

@@ -25,9 +25,21 @@ struct PieceLabel {
 struct LabelledPieces {
   PieceGraph graph;
   std::vector<std::vector<PieceLabel>> labels;  ///< per piece, without "outlier"
-  float inverse_depth_range = 1;                ///< of the volume
-  std::vector<Eigen::Vector3f> lights;          ///< per projector: its centre in the camera's frame
+  /// Of each label: its cost with what crossings and the curve's other pieces say, each of them
+  /// free to choose.
+  std::vector<std::vector<float>> scores;
+  float inverse_depth_range = 1;        ///< of the volume
+  std::vector<Eigen::Vector3f> lights;  ///< per projector: its centre in the camera's frame
 };
+
+/// How much more than the best of its piece a label of a camera may cost before it is left out.
+/// Where nothing crosses, costs say next to nothing so far, and all stay.
+[[nodiscard]] float largest_gap(const PieceGraph& graph, const JointOptions& options);
+
+/// Which labels of a piece go on, by their cost: at most `most`, and none that costs `behind` more
+/// than the best. Ascending.
+[[nodiscard]] std::vector<std::size_t> labels_worth_keeping(std::span<const float> costs,
+                                                            std::size_t most, float behind);
 
 /// Probability of each label of each piece of one camera; what is missing to 1 is "no line".
 using PieceBeliefs = std::vector<std::vector<float>>;

@@ -445,5 +445,56 @@ TEST(OtherViews, CostIsThatOfAPlainLoopOverAllPoints) {
   }
 }
 
+TEST(OtherViews, LabelsThatStayCostTheSameOnceOthersAreForgotten) {
+  SeenPlane scene(4);
+  OtherViews views(scene.rig, scene.graphs, scene.pieces);
+  const std::vector<PieceBeliefs> no_beliefs(4);
+  Random random(4);
+  std::vector<std::vector<std::vector<float>>> before;
+  for (std::size_t g = 0; g < 4; ++g) before.push_back(views.costs(g, no_beliefs));
+  std::vector<std::vector<std::vector<int>>> new_index(4);
+  for (std::size_t g = 0; g < 4; ++g) {
+    for (std::size_t p = 0; p < before[g].size(); ++p) {
+      auto& labels = scene.pieces[g].labels[p];
+      std::vector<int> index;
+      std::vector<float> kept_costs;
+      std::vector<PieceLabel> kept;
+      for (std::size_t k = 0; k < labels.size(); ++k) {
+        const bool stays = random.below(2) == 0;
+        index.push_back(stays ? static_cast<int>(kept.size()) : -1);
+        if (!stays) continue;
+        kept.push_back(labels[k]);
+        kept_costs.push_back(before[g][p][k]);
+      }
+      labels = std::move(kept);
+      before[g][p] = std::move(kept_costs);
+      new_index[g].push_back(std::move(index));
+    }
+  }
+  views.forget(new_index);
+  std::vector<PieceBeliefs> beliefs;
+  for (std::size_t g = 0; g < 4; ++g) {
+    EXPECT_EQ(views.costs(g, no_beliefs), before[g]);
+    beliefs.push_back(random_beliefs(scene.pieces[g], random));
+  }
+  for (std::size_t g = 0; g < 4; ++g) {
+    const auto costs = views.costs(g, beliefs);
+    for (std::size_t p = 0; p < costs.size(); ++p) {
+      for (std::size_t k = 0; k < costs[p].size(); ++k)
+        EXPECT_NEAR(costs[p][k], scene.cost(g, p, scene.pieces[g].labels[p][k], beliefs), 1e-4);
+    }
+  }
+}
+
+TEST(LabelsWorthKeeping, AreTheCheapestWithinTheGap) {
+  const std::vector<float> costs = {5, 1, 9, 2, 2, 30};
+  using Kept = std::vector<std::size_t>;
+  EXPECT_EQ(labels_worth_keeping(costs, 10, 8), (Kept{0, 1, 2, 3, 4}));
+  EXPECT_EQ(labels_worth_keeping(costs, 10, 4), (Kept{0, 1, 3, 4}));
+  EXPECT_EQ(labels_worth_keeping(costs, 2, 100), (Kept{1, 3}));  // of equal ones the first
+  EXPECT_EQ(labels_worth_keeping(costs, 3, 0.5F), (Kept{1}));
+  EXPECT_TRUE(labels_worth_keeping({}, 3, 1).empty());
+}
+
 }  // namespace
 }  // namespace pencilscan
