@@ -147,6 +147,42 @@ TEST(LineSheets, DepthIsThatOfTheExactLightSheetWithAndWithoutDistortion) {
   }
 }
 
+TEST(PossibleLabels, AStatedFloorFavorsTheLineThatWouldLieOnIt) {
+  TwoProjectorScene scene;
+  const GridGraph graph = scene.graph(0, 60, 0, 3);
+  const Camera& camera = scene.rig.cameras[0];
+  const auto labels_of = [&](std::size_t piece, std::vector<Vec3>& points) {
+    const LabelledPieces pieces = possible_labels(scene.rig, scene.families, graph, {});
+    const Eigen::Vector3f ray = pieces.graph.pieces[piece].middle.homogeneous();
+    points.clear();
+    for (const PieceLabel& label : pieces.labels[piece])
+      points.push_back(camera.device_from_world.inverse() *
+                       Vec3(ray.cast<double>() / label.q.dot(ray)));
+    return pieces.labels[piece];
+  };
+  std::vector<Vec3> points;
+  int compared = 0;
+  for (const std::size_t piece : {std::size_t{3}, std::size_t{40}, std::size_t{200}}) {
+    scene.rig.floor.reset();
+    const std::vector<PieceLabel> without = labels_of(piece, points);
+    ASSERT_GT(without.size(), 4U);
+    const std::size_t lying = without.size() / 2;
+    scene.rig.floor = Floor{points[lying], Vec3(1, 0.2, 0).normalized()};
+    const std::vector<PieceLabel> with = labels_of(piece, points);
+    for (const PieceLabel& label : with) {
+      for (std::size_t k = 0; k < without.size(); ++k) {
+        if (!(label.pattern == without[k].pattern) || label.line != without[k].line) continue;
+        const float change = label.cost - without[k].cost;
+        EXPECT_LE(change, 0);
+        if (k == lying) EXPECT_LT(change, -3);
+        if (label.pattern == without[lying].pattern && k != lying) EXPECT_GT(change, -0.01F);
+        compared += k == lying ? 1 : 0;
+      }
+    }
+  }
+  EXPECT_EQ(compared, 3);
+}
+
 class JointScene : public testing::Test, protected TwoProjectorScene {
  protected:
   /// Share of curve points whose label is right, and is wrong.

@@ -45,8 +45,9 @@ struct LabelledPieces {
 using PieceBeliefs = std::vector<std::vector<float>>;
 
 /// The labels that a piece may have. First these are all lines of its family whose depth lies in
-/// the volume. Each has the cost of the piece's colours and of the slant that the line would give
-/// the surface. Then only those that the crossings support best are kept (options.max_labels).
+/// the volume. Each has the cost of the piece's colours, of the slant that the line would give the
+/// surface and of its depth beside a stated floor. Then only those that the crossings support best
+/// are kept (options.max_labels).
 [[nodiscard]] LabelledPieces possible_labels(const Rig& rig,
                                              const std::vector<ColorFamily>& families,
                                              const GridGraph& graph, const JointOptions& options);
