@@ -1,9 +1,7 @@
 #include "pencilscan/surface/mesh_parts.h"
 
 #include <algorithm>
-#include <cstdint>
 #include <map>
-#include <unordered_map>
 #include <utility>
 
 #include "pencilscan/core/check.h"
@@ -66,25 +64,38 @@ TriangleMesh subdivided(const TriangleMesh& mesh) {
   TriangleMesh fine = mesh;
   fine.faces.clear();
   fine.faces.reserve(4 * mesh.faces.size());
-  std::unordered_map<std::uint64_t, int> middles;
-  middles.reserve(2 * mesh.faces.size());
+  fine.vertices.reserve(mesh.vertices.size() + 3 * mesh.faces.size() / 2);
+  // Edges by their lower vertex: the other one, and the new vertex between them.
+  std::vector<std::size_t> ends(mesh.vertices.size() + 1, 0);
+  for (const auto& face : mesh.faces) {
+    for (std::size_t k = 0; k < 3; ++k)
+      ++ends[static_cast<std::size_t>(std::min(face[k], face[(k + 1) % 3])) + 1];
+  }
+  for (std::size_t v = 1; v < ends.size(); ++v) ends[v] += ends[v - 1];
+  struct Edge {
+    int high, middle;
+  };
+  std::vector<Edge> edges(3 * mesh.faces.size());
+  std::vector<std::size_t> first(ends.begin(), ends.end() - 1);
+  ends.assign(first.begin(), first.end());
   const auto middle = [&](int a, int b) {
-    const auto low = static_cast<std::uint64_t>(std::min(a, b));
-    const auto high = static_cast<std::uint64_t>(std::max(a, b));
-    const auto [it, is_new] =
-        middles.try_emplace(low << 32 | high, static_cast<int>(fine.vertices.size()));
-    if (is_new) {
-      const auto i = static_cast<std::size_t>(a);
-      const auto j = static_cast<std::size_t>(b);
-      fine.vertices.push_back(0.5 * (mesh.vertices[i] + mesh.vertices[j]));
-      if (!mesh.sigma.empty()) fine.sigma.push_back(0.5F * (mesh.sigma[i] + mesh.sigma[j]));
-      // Between a measured and an invented vertex nothing was measured.
-      if (!mesh.confidence.empty()) {
-        const bool both = mesh.confidence[i] > 0 && mesh.confidence[j] > 0;
-        fine.confidence.push_back(both ? 0.5F * (mesh.confidence[i] + mesh.confidence[j]) : 0.F);
-      }
+    const auto low = static_cast<std::size_t>(std::min(a, b));
+    const int high = std::max(a, b);
+    for (std::size_t e = first[low]; e < ends[low]; ++e) {
+      if (edges[e].high == high) return edges[e].middle;
     }
-    return it->second;
+    const int added = static_cast<int>(fine.vertices.size());
+    edges[ends[low]++] = {high, added};
+    const auto i = static_cast<std::size_t>(a);
+    const auto j = static_cast<std::size_t>(b);
+    fine.vertices.push_back(0.5 * (mesh.vertices[i] + mesh.vertices[j]));
+    if (!mesh.sigma.empty()) fine.sigma.push_back(0.5F * (mesh.sigma[i] + mesh.sigma[j]));
+    // Between a measured and an invented vertex nothing was measured.
+    if (!mesh.confidence.empty()) {
+      const bool both = mesh.confidence[i] > 0 && mesh.confidence[j] > 0;
+      fine.confidence.push_back(both ? 0.5F * (mesh.confidence[i] + mesh.confidence[j]) : 0.F);
+    }
+    return added;
   };
   for (const auto& face : mesh.faces) {
     const int a = middle(face[0], face[1]);

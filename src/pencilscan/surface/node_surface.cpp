@@ -17,6 +17,8 @@ constexpr double kGrazing = 0.2;       // keeps grazing views from looking exact
 constexpr double kRelief = 0.08;
 constexpr double kReach = 2.5;  // of a node's say, widths
 
+double square(double x) { return x * x; }
+
 struct Prediction {
   double height = 0;  ///< along the vertex normal
   double weight = 0;
@@ -46,10 +48,17 @@ class NodeView {
     const Vec2 at = *pixel / map_->stride;
     const int row0 = static_cast<int>(std::lround(at[1]));
     const int column0 = static_cast<int>(std::lround(at[0]));
+    const int first_column = std::max(0, column0 - reach_);
+    const int last_column = std::min(map_->columns - 1, column0 + reach_);
+    // The bell over the image is the product of one across and one along.
+    thread_local std::vector<double> across;
+    across.clear();
+    for (int column = first_column; column <= last_column; ++column)
+      across.push_back(std::exp(-square(at[0] - column) * inverse_width2_));
     for (int row = std::max(0, row0 - reach_); row <= std::min(map_->rows - 1, row0 + reach_);
          ++row) {
-      for (int column = std::max(0, column0 - reach_);
-           column <= std::min(map_->columns - 1, column0 + reach_); ++column) {
+      const double bell_of_row = std::exp(-square(at[1] - row) * inverse_width2_);
+      for (int column = first_column; column <= last_column; ++column) {
         const double right = at[0] - column;
         const double down = at[1] - row;
         const double apart2 = right * right + down * down;
@@ -58,7 +67,7 @@ class NodeView {
         if (!node.measured()) continue;
         const auto height = node_height(node, right * map_->stride, down * map_->stride, place);
         if (!height) continue;
-        const double bell = std::exp(-apart2 * inverse_width2_);
+        const double bell = bell_of_row * across[static_cast<std::size_t>(column - first_column)];
         predictions.push_back({height->first, bell * height->second, bell});
       }
     }

@@ -153,39 +153,52 @@ Silhouette silhouette(int camera, const cv::Mat& image, double reach_px) {
 std::size_t carve(const Rig& rig, std::span<const Silhouette> silhouettes,
                   const CarvingOptions& options, TriangleMesh& mesh) {
   if (silhouettes.empty() || mesh.confidence.empty()) return 0;
-  const auto is_invented = [&](std::size_t v) { return !(mesh.confidence[v] > 0); };
-  TriangleMesh loose;  // the faces that may move
-  loose.vertices = mesh.vertices;
-  for (const auto& face : mesh.faces) {
-    if (std::any_of(face.begin(), face.end(),
-                    [&](int v) { return is_invented(static_cast<std::size_t>(v)); }))
-      loose.faces.push_back(face);
+  const auto is_invented = [](const TriangleMesh& of, std::size_t v) {
+    return !(of.confidence[v] > 0);
+  };
+  std::vector<char> may_move(mesh.faces.size(), 0);
+  std::vector<char> is_loose(mesh.vertices.size(), 0);
+  for (std::size_t f = 0; f < may_move.size(); ++f) {
+    for (const int v : mesh.faces[f])
+      may_move[f] |= static_cast<char>(is_invented(mesh, static_cast<std::size_t>(v)));
+    if (!may_move[f]) continue;
+    for (const int v : mesh.faces[f]) is_loose[static_cast<std::size_t>(v)] = 1;
   }
-  std::vector<char> ever(mesh.vertices.size(), 0);
+  // What may move, by itself, and where its vertices are in the mesh.
+  TriangleMesh loose = submesh(mesh, may_move);
+  std::vector<std::size_t> place;
+  for (std::size_t v = 0; v < is_loose.size(); ++v) {
+    if (is_loose[v]) place.push_back(v);
+  }
+  const auto put_back = [&] {
+    for (std::size_t v = 0; v < place.size(); ++v) mesh.vertices[place[v]] = loose.vertices[v];
+  };
+  std::vector<char> ever(place.size(), 0);
   std::optional<Verdict> verdict;
-  std::vector<Vec3> then_normals;  // when the scene was made
+  std::vector<Vec3> then, then_normals;  // when the scene was made
   for (int round = 0; round < options.rounds; ++round) {
     const std::vector<Vec3> normals = vertex_normals(loose);
     if (round % kRoundsPerScene == 0) {
-      mesh.vertices = loose.vertices;
+      put_back();
       verdict.emplace(rig, silhouettes, mesh, options.least_cosine);
+      then = loose.vertices;
       then_normals = normals;
     }
-    const std::vector<Vec3>& then = mesh.vertices;
-    std::vector<char> moves(mesh.vertices.size(), 0);
-    parallel_chunks(mesh.vertices.size(), [&](std::size_t v) {
-      if (!is_invented(v) || !(normals[v].squaredNorm() > 0.5)) return;
+    std::vector<char> moves(place.size(), 0);
+    parallel_chunks(place.size(), [&](std::size_t v) {
+      if (!is_invented(loose, v) || !(normals[v].squaredNorm() > 0.5)) return;
       if (!verdict->is_outside(loose.vertices[v], then[v], then_normals[v])) return;
       const double room = verdict->thickness(then[v], then_normals[v]);
       loose.vertices[v] -= std::min(options.step, 0.25 / kRoundsPerScene * room) * normals[v];
       moves[v] = 1;
     });
     if (std::find(moves.begin(), moves.end(), 1) == moves.end()) break;
-    const std::vector<char> along = grown(loose, moves, 4, is_invented);
+    const std::vector<char> along =
+        grown(loose, moves, 4, [&](std::size_t v) { return is_invented(loose, v); });
     for (int pass = 0; pass < kSmoothings; ++pass) smooth(along, loose);
     for (std::size_t v = 0; v < ever.size(); ++v) ever[v] = ever[v] || moves[v];
   }
-  mesh.vertices = std::move(loose.vertices);
+  put_back();
   return static_cast<std::size_t>(std::count(ever.begin(), ever.end(), 1));
 }
 

@@ -217,11 +217,19 @@ void follow_depth(const Rig& rig, std::span<const DepthMap> maps, const FusionOp
   std::vector<SurfaceSample> samples = node_samples(rig, maps, report.spacing_mm);
   report.samples = report.samples_used = samples.size();
   fit_local_surfaces(samples, options.fit_spacings * report.spacing_mm);
-  for (int i = 0; i < options.subdivisions; ++i) result.mesh = subdivided(result.mesh);
-  const std::vector<Vec3> closed = result.mesh.vertices;
+  TriangleMesh closed;
+  closed.vertices = result.mesh.vertices;
+  closed.faces = result.mesh.faces;
+  FollowOptions once = options.follow;
+  once.rounds = 1;
   follow_nodes(rig, maps, options.follow, result.mesh);
-  report.self_intersections = untangle(closed, result.mesh);
   attribute_vertices(samples, options.reach_spacings, report.spacing_mm, result.mesh);
+  for (int i = 0; i < options.subdivisions; ++i) {
+    closed = subdivided(closed);
+    result.mesh = subdivided(result.mesh);
+    follow_nodes(rig, maps, once, result.mesh);
+  }
+  report.self_intersections = untangle(closed.vertices, result.mesh);
   report.seconds += watch.seconds();
 }
 

@@ -214,12 +214,17 @@ std::size_t untangle(std::span<const Vec3> before, TriangleMesh& mesh) {
   constexpr int kRounds = 12;
   constexpr int kFarthest = 1 + (kRounds - kSmoothings) / 2;  // edges around faces
   PENCILSCAN_CHECK(before.size() == mesh.vertices.size());
-  for (Vec3& x : mesh.vertices) x = as_floats(x);
-  std::vector<std::size_t> faces = self_intersections(mesh);
-  if (faces.empty()) return 0;
-  TriangleMesh near;  // fewer and fewer faces: those around what is left
+  TriangleMesh near;  // fewer and fewer faces: those around what moved, then around what is left
   near.vertices.swap(mesh.vertices);
+  std::vector<char> moved(before.size(), 0);
+  for (std::size_t v = 0; v < moved.size(); ++v) {
+    moved[v] = near.vertices[v] != before[v] ? 1 : 0;
+    near.vertices[v] = as_floats(near.vertices[v]);
+  }
   near.faces = mesh.faces;
+  if (2 * std::count(moved.begin(), moved.end(), 1) < std::ssize(moved))
+    near.faces = faces_near(near, faces_at(near, grown(near, moved, 2 * kFarthest)));
+  std::vector<std::size_t> faces = self_intersections(near);
   for (int round = 0; round < kRounds && !faces.empty(); ++round) {
     const std::vector<char> cut = vertices_of(near, faces);
     const std::vector<char> marked = grown(near, cut, 1 + std::max(0, round - kSmoothings) / 2);
