@@ -22,6 +22,7 @@
 #include "pencilscan/surface/holes.h"
 #include "pencilscan/surface/surface.h"
 #include "pencilscan/tracking/tracked_surface.h"
+#include "pencilscan/uncertainty/error_model.h"
 
 namespace pencilscan {
 
@@ -88,6 +89,8 @@ struct PointResult {
   bool is_on_surface = false;    ///< matched once more, and settled, on the dense surface
   std::size_t contradicted = 0;  ///< labelled curve points that the dense surface contradicted
   std::vector<MeasuredPoint> points;
+  /// Per point, footprints: what its sigma rests on. Empty where it did not settle on the surface.
+  std::vector<PointEvidence> evidence;
   std::vector<Warning> warnings;
 };
 

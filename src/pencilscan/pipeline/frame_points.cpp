@@ -90,7 +90,10 @@ FrameResult match_on_surface(const Rig& rig, FrameResult result, const PointOpti
         shape.surface.mesh.color);
     points.points = std::move(settled.points);
     points.contradicted += settled.contradicted;
-    shape.surface.used = std::move(settled.on_surface);
+    shape.surface.used.clear();
+    for (const PointEvidence& evidence : settled.evidence)
+      shape.surface.used.push_back(evidence.settled ? 1 : 0);
+    points.evidence = std::move(settled.evidence);
   });
   SurfaceReport& report = shape.surface.report;
   report.points = points.points.size();

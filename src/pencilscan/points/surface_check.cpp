@@ -157,12 +157,6 @@ SettledPoints settle_on_surface(const Rig& rig, const RayScene& surface,
   // around; as many as settle_points() allows.
   constexpr double kLeftOut = 6;
   constexpr double kLeastCosine = 0.2;
-  // Shares of what the surface says and of its difference from the point: on rendered bunnies, a
-  // statue, a hand and a knot errors are then as large as they should be. So they are for points
-  // that stay where they were, which are the odd ones.
-  constexpr double kOfSurface = 0.95;
-  constexpr double kOfDifference = 0.2;
-  constexpr double kOffSurface = 1.5;
   const TriangleMesh& mesh = surface.mesh();
   PENCILSCAN_CHECK(mesh.sigma.size() == mesh.vertices.size() &&
                    mesh.confidence.size() == mesh.vertices.size() &&
@@ -171,7 +165,7 @@ SettledPoints settle_on_surface(const Rig& rig, const RayScene& surface,
   const SurfaceCheck check(rig, surface);
   SettledPoints settled;
   settled.points.assign(points.begin(), points.end());
-  settled.on_surface.assign(points.size(), 0);
+  settled.evidence.resize(points.size());
   std::vector<char> keep(points.size(), 1);
   parallel_chunks(points.size(), [&](std::size_t i) {
     MeasuredPoint& p = settled.points[i];
@@ -180,7 +174,9 @@ SettledPoints settle_on_surface(const Rig& rig, const RayScene& surface,
     const Ray ray = camera.ray(pixel);
     const auto hit = check.look(ray);
     if (check.contradicts(camera, pixel, {p.projector, p.pattern}, p.line, hit)) keep[i] = 0;
-    p.sigma *= static_cast<float>(kOffSurface);
+    PointEvidence& evidence = settled.evidence[i];
+    evidence.own = points[i].sigma;
+    p.sigma = static_cast<float>(point_sigma(evidence));
     if (!hit) return;
     double across = 0;
     for (std::size_t k = 0; k < 3; ++k)
@@ -193,23 +189,25 @@ SettledPoints settle_on_surface(const Rig& rig, const RayScene& surface,
     const double difference = hit->distance - (x - ray.origin).dot(ray.direction);
     const double deviations = std::abs(difference) / std::hypot(of_surface, of_point);
     if (deviations > kLeftOut) keep[i] = 0;
-    if (deviations > kFarthest) return;
-    settled.on_surface[i] = 1;
+    evidence.surface = static_cast<float>(of_surface);
+    evidence.difference = static_cast<float>(std::abs(difference));
+    evidence.settled = deviations <= kFarthest;
+    p.sigma = static_cast<float>(point_sigma(evidence));
+    if (!evidence.settled) return;
     p.x = static_cast<float>(hit->point.x());
     p.y = static_cast<float>(hit->point.y());
     p.z = static_cast<float>(hit->point.z());
-    p.sigma = static_cast<float>(std::hypot(kOfSurface * of_surface, kOfDifference * difference));
     take_looks(mesh, normals, colors, *hit, p);
   });
   std::size_t count = 0;
   for (std::size_t i = 0; i < keep.size(); ++i) {
     if (keep[i] == 0) continue;
     settled.points[count] = settled.points[i];
-    settled.on_surface[count++] = settled.on_surface[i];
+    settled.evidence[count++] = settled.evidence[i];
   }
   settled.contradicted = keep.size() - count;
   settled.points.resize(count);
-  settled.on_surface.resize(count);
+  settled.evidence.resize(count);
   return settled;
 }
 

@@ -7,6 +7,7 @@
 #include "pencilscan/geometry/ray_scene.h"
 #include "pencilscan/labeling/labeling.h"
 #include "pencilscan/labeling/measured_point.h"
+#include "pencilscan/uncertainty/error_model.h"
 
 namespace pencilscan {
 
@@ -24,13 +25,13 @@ std::size_t drop_contradicted(const Rig& rig, const RayScene& surface,
 
 struct SettledPoints {
   std::vector<MeasuredPoint> points;
-  std::vector<char> on_surface;  ///< per point: 1 where it lies on the surface now
-  std::size_t contradicted = 0;  ///< points left out
+  std::vector<PointEvidence> evidence;  ///< per point: what its sigma rests on
+  std::size_t contradicted = 0;         ///< points left out
 };
 
 /// Moves the points along their camera rays onto the surface. The surface is more certain than a
-/// point, because it rests on all pixels and cameras around. A moved point takes its sigma from the
-/// surface's vertices; the sigma grows with the way that the point moved. It takes its normal from
+/// point, because it rests on all pixels and cameras around. Sigma is that of point_sigma(): the
+/// surface's and a share of the way that the point moved. A moved point takes its normal from
 /// the surface, too, and its colour where `colors` has the albedo of each vertex (linear light, as
 /// TriangleMesh::color). Two kinds of points are left out: those that the surface contradicts (as
 /// above), and those so far off it that one of the two must be wrong. Points that are odd, or whose

@@ -81,7 +81,8 @@ TEST_F(SurfaceCheckTest, WhatWasNotMeasuredContradictsNothing) {
   EXPECT_EQ(drop(), 0U);
   const SettledPoints settled = settle_on_surface(rig, RayScene(mesh_), points());
   EXPECT_EQ(settled.contradicted, 0U);
-  EXPECT_EQ(std::count(settled.on_surface.begin(), settled.on_surface.end(), 1), 0);
+  EXPECT_TRUE(std::none_of(settled.evidence.begin(), settled.evidence.end(),
+                           [](const PointEvidence& e) { return e.settled; }));
 }
 
 TEST_F(SurfaceCheckTest, PointsSettleOnTheSurfaceAndTheirSigmaTellsOfTheWayThere) {
@@ -92,18 +93,18 @@ TEST_F(SurfaceCheckTest, PointsSettleOnTheSurfaceAndTheirSigmaTellsOfTheWayThere
   EXPECT_GT(std::count_if(before.begin(), before.end(), is_far_off), 100);
   EXPECT_EQ(std::count_if(settled.points.begin(), settled.points.end(), is_far_off), 0);
   EXPECT_EQ(settled.contradicted, before.size() - settled.points.size());
-  ASSERT_EQ(settled.on_surface.size(), settled.points.size());
+  ASSERT_EQ(settled.evidence.size(), settled.points.size());
   std::vector<double> errors;
   std::size_t moved_far = 0;
   for (std::size_t i = 0, j = 0; i < settled.points.size(); ++i, ++j) {
     while (before[j].u != settled.points[i].u || before[j].v != settled.points[i].v) ++j;
-    if (settled.on_surface[i] == 0) continue;
+    if (!settled.evidence[i].settled) continue;
     errors.push_back(error(settled.points[i]));
     const double way =
         std::hypot(before[j].x - settled.points[i].x, before[j].y - settled.points[i].y,
                    before[j].z - settled.points[i].z);
-    EXPECT_GE(settled.points[i].sigma, 0.19 * way);
-    EXPECT_GE(settled.points[i].sigma, 0.94F * 0.02F);
+    EXPECT_GE(settled.points[i].sigma, 0.16 * way);
+    EXPECT_GE(settled.points[i].sigma, 0.86F * 0.02F);
     moved_far += way > 0.05 ? 1 : 0;
   }
   EXPECT_GT(errors.size(), before.size() / 2);
@@ -145,8 +146,8 @@ TEST_F(SurfaceCheckTest, PointsHaveTheNormalAndTheColourOfTheSurface) {
   for (std::size_t i = 0; i < settled.points.size(); ++i) {
     const MeasuredPoint& p = settled.points[i];
     const Vec3 normal(p.nx, p.ny, p.nz);
-    EXPECT_EQ(normal.isZero(), settled.on_surface[i] == 0);
-    if (settled.on_surface[i] == 0) continue;
+    EXPECT_EQ(normal.isZero(), !settled.evidence[i].settled);
+    if (!settled.evidence[i].settled) continue;
     ++known;
     constexpr double kStep = 0.5;  // mm
     const Vec3 along_y = surface(p.y + kStep, p.z) - surface(p.y - kStep, p.z);

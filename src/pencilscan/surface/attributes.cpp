@@ -43,26 +43,42 @@ struct Surroundings {
   double weight = 0;
   double information = 0;
   double confidence = 0;
-  double bend = 0;           ///< mm
-  double twist = 0;          ///< mm
+  double bend = 0;
+  double scatter2 = 0;
   Vec3 pull = Vec3::Zero();  ///< sum of the offsets: cancels out where samples surround the vertex
   double pull_length = 0;
   std::array<bool, 256> seen{};  ///< by which cameras
   int cameras = 0;
 };
 
+SurfaceEvidence evidence_of(const Surroundings& a) {
+  SurfaceEvidence evidence;
+  evidence.predicted = static_cast<float>(std::sqrt(a.weight / a.information));
+  evidence.scatter = static_cast<float>(std::sqrt(a.scatter2 / a.weight));
+  evidence.bend = static_cast<float>(a.bend / a.weight);
+  if (a.pull_length > 0) evidence.one_sidedness = static_cast<float>(a.pull.norm() / a.pull_length);
+  evidence.cameras = static_cast<float>(a.cameras);
+  return evidence;
+}
+
+SurfaceEvidence mean(const SurfaceEvidence& a, const SurfaceEvidence& b) {
+  SurfaceEvidence evidence;
+  evidence.predicted = 0.5F * (a.predicted + b.predicted);
+  evidence.scatter = 0.5F * (a.scatter + b.scatter);
+  evidence.bend = 0.5F * (a.bend + b.bend);
+  evidence.one_sidedness = 0.5F * (a.one_sidedness + b.one_sidedness);
+  evidence.cameras = 0.5F * (a.cameras + b.cameras);
+  return evidence;
+}
+
 }  // namespace
 
-void attribute_vertices(std::span<const SurfaceSample> samples, double reach_spacings,
-                        double spacing, TriangleMesh& mesh) {
-  constexpr double kMaxStretch = 2.5;  // of the spacing on a grazed surface
-  // Shares of what makes a vertex uncertain: on eight rendered objects errors are then as large as
-  // they should be, those of the least sure tenth too.
-  constexpr double kNoise = 0.7;           // of what the samples' own deviations say
-  constexpr double kBend = 0.4;            // of how far the surface bends within a window
-  constexpr double kTwist = 0.4;           // of how far samples and vertex disagree on the bend
-  constexpr double kInterpolation = 0.01;  // mm of error per mm away from the nearest sample
-  constexpr double kOutsideReach = 0.4;    // of the reach, beyond the last line
+std::vector<SurfaceEvidence> attribute_vertices(std::span<const SurfaceSample> samples,
+                                                double reach_spacings, double spacing,
+                                                TriangleMesh& mesh,
+                                                std::span<const std::array<int, 2>> middles) {
+  constexpr double kMaxStretch = 2.5;    // of the spacing on a grazed surface
+  constexpr double kOutsideReach = 0.4;  // of the reach, beyond the last line
   const double radius = reach_spacings * kMaxStretch * spacing;
   std::vector<Vec3> positions;
   positions.reserve(samples.size());
@@ -98,40 +114,52 @@ void attribute_vertices(std::span<const SurfaceSample> samples, double reach_spa
       a.best = std::min(a.best, distance / reach[i]);
       a.pull += d;
       a.pull_length += distance;
-      // The neighbours' scatter about the surface holds their noise: the larger of both counts.
       const double across = s.sigma * std::max(std::abs(s.to_camera.dot(s.normal)), 0.2);
-      const double off = std::max(across, s.residual);
       const double w = std::exp(-2 * d2 / (spacing * spacing));
       a.weight += w;
-      a.information += w / std::max(off * off, 1e-9);
+      a.information += w / std::max(across * across, 1e-9);
       a.confidence += w * s.confidence;
       // 2 (1 - cos) is the angle squared. Of a quadric the chord is square to the mean normal.
       a.bend += w * 2 * (1 - cosine) * s.spacing;
-      a.twist += w * std::abs(d.dot(s.normal + normals[v]));
+      const double off = 0.5 * d.dot(s.normal + normals[v]);
+      a.scatter2 += w * off * off;
       if (!a.seen[s.camera]) ++a.cameras;
       a.seen[s.camera] = true;
     });
     return a;
   };
-  parallel_chunks(mesh.vertices.size(), [&](std::size_t v) {
+  std::vector<SurfaceEvidence> evidence(mesh.vertices.size());
+  const auto look = [&](std::size_t v) {
     Surroundings a = around(v, weighty_radius);
     if (a.best > kOutsideReach) a = around(v, near_radius);
     if (a.nearest == radius) a = around(v, radius);
     // Samples that fill a half plane pull with 2 / pi of their summed distance.
     fringe[v] = a.pull.norm() > 0.55 * a.pull_length && a.best > kOutsideReach;
-    double variance =
-        a.nearest * a.nearest;  // a guess where no sample reaches: at least so far off
+    double sigma = a.nearest;  // a guess where no sample reaches: at least so far off
     if (a.weight > 0) {
-      // Samples of one camera share their errors; cameras are independent, the surest counts most.
-      const double noise2 = kNoise * kNoise * a.weight / a.information / a.cameras;
-      const double relief = std::hypot(kBend * a.bend, kTwist * a.twist) / a.weight;
-      variance = kInterpolation * kInterpolation * variance + noise2 + relief * relief;
+      evidence[v] = evidence_of(a);
+      sigma = surface_sigma(evidence[v]);
       const double certainty = a.confidence / a.weight * (1 - 0.5 * a.best * a.best);
       mesh.confidence[v] = static_cast<float>(std::clamp(certainty, 0.01, 1.0));
     }
-    mesh.sigma[v] = static_cast<float>(std::sqrt(variance));
+    mesh.sigma[v] = static_cast<float>(sigma);
+  };
+  const std::size_t own = mesh.vertices.size() - middles.size();
+  parallel_chunks(own, look);
+  parallel_chunks(middles.size(), [&](std::size_t k) {
+    const auto a = static_cast<std::size_t>(middles[k][0]);
+    const auto b = static_cast<std::size_t>(middles[k][1]);
+    const std::size_t v = own + k;
+    const auto is_surrounded = [&](std::size_t end) {
+      return mesh.confidence[end] > 0 && !fringe[end];
+    };
+    if (!is_surrounded(a) || !is_surrounded(b)) return look(v);
+    evidence[v] = mean(evidence[a], evidence[b]);
+    mesh.sigma[v] = static_cast<float>(surface_sigma(evidence[v]));
+    mesh.confidence[v] = 0.5F * (mesh.confidence[a] + mesh.confidence[b]);
   });
   cut_fringe(fringe, mesh);
+  return evidence;
 }
 
 std::vector<char> measured_faces(const TriangleMesh& mesh) {

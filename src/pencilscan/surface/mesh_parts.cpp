@@ -60,7 +60,8 @@ double face_area(const TriangleMesh& mesh, std::size_t face) {
   return 0.5 * (b - a).cross(c - a).norm();
 }
 
-TriangleMesh subdivided(const TriangleMesh& mesh) {
+TriangleMesh subdivided(const TriangleMesh& mesh, std::vector<std::array<int, 2>>* middles) {
+  if (middles != nullptr) middles->clear();
   TriangleMesh fine = mesh;
   fine.faces.clear();
   fine.faces.reserve(4 * mesh.faces.size());
@@ -86,6 +87,7 @@ TriangleMesh subdivided(const TriangleMesh& mesh) {
     }
     const int added = static_cast<int>(fine.vertices.size());
     edges[ends[low]++] = {high, added};
+    if (middles != nullptr) middles->push_back({a, b});
     const auto i = static_cast<std::size_t>(a);
     const auto j = static_cast<std::size_t>(b);
     fine.vertices.push_back(0.5 * (mesh.vertices[i] + mesh.vertices[j]));

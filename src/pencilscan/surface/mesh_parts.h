@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <functional>
 #include <span>
 #include <vector>
@@ -17,8 +18,10 @@ namespace pencilscan {
 /// Area of one face, mm^2.
 [[nodiscard]] double face_area(const TriangleMesh& mesh, std::size_t face);
 
-/// Every face cut into four at the middles of its edges; properties are averaged.
-[[nodiscard]] TriangleMesh subdivided(const TriangleMesh& mesh);
+/// Every face cut into four at the middles of its edges; properties are averaged. The vertices that
+/// were there come first. `middles` takes, for each one added, the ends of its edge.
+[[nodiscard]] TriangleMesh subdivided(const TriangleMesh& mesh,
+                                      std::vector<std::array<int, 2>>* middles = nullptr);
 
 /// The marked vertices and those within `edges` edges of them, on paths of vertices that may join
 /// (all, where the function is empty).

@@ -1,6 +1,7 @@
 #include "pencilscan/surface/surface.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "pencilscan/core/check.h"
@@ -220,16 +221,18 @@ void follow_depth(const Rig& rig, std::span<const DepthMap> maps, const FusionOp
   TriangleMesh closed;
   closed.vertices = result.mesh.vertices;
   closed.faces = result.mesh.faces;
-  FollowOptions once = options.follow;
+  FollowOptions once = options.follow;  // normals have settled on the coarse mesh
   once.rounds = 1;
   follow_nodes(rig, maps, options.follow, result.mesh);
-  attribute_vertices(samples, options.reach_spacings, report.spacing_mm, result.mesh);
+  std::vector<std::array<int, 2>> middles;
   for (int i = 0; i < options.subdivisions; ++i) {
     closed = subdivided(closed);
-    result.mesh = subdivided(result.mesh);
+    result.mesh = subdivided(result.mesh, &middles);
     follow_nodes(rig, maps, once, result.mesh);
   }
   report.self_intersections = untangle(closed.vertices, result.mesh);
+  result.evidence =
+      attribute_vertices(samples, options.reach_spacings, report.spacing_mm, result.mesh, middles);
   report.seconds += watch.seconds();
 }
 

@@ -13,6 +13,7 @@
 #include "pencilscan/rig/rig.h"
 #include "pencilscan/surface/node_surface.h"
 #include "pencilscan/surface/silhouette.h"
+#include "pencilscan/uncertainty/error_model.h"
 
 namespace pencilscan {
 
@@ -71,6 +72,8 @@ struct SurfaceResult {
   TriangleMesh mesh;       ///< closed; confidence 0 = invented
   TriangleMesh measured;   ///< the same faces without those that touch an invented vertex
   std::vector<char> used;  ///< per input point: 1 when the surface rests on it
+  /// Per vertex of `mesh`, footprints: what its sigma rests on. Empty without dense depth.
+  std::vector<SurfaceEvidence> evidence;
   SurfaceReport report;
 };
 
