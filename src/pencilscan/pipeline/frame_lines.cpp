@@ -26,8 +26,8 @@ void leave_out(const Rig& rig, const std::vector<PictureFinding>& findings, Poin
   }
 }
 
-/// The share of a camera's curve points that have a name after guided matching, of the camera where
-/// it is least: a camera that stands elsewhere has few. A camera without curves does not count.
+/// The share of a camera's nameable points that have a name after guided matching, of the camera
+/// where it is least: a camera that stands elsewhere has few. A camera without any does not count.
 double guided_share(const Rig& rig, const PointOptions& options, const PointResult& result) {
   std::vector<GridGraph> graphs = result.graphs;
   Labeling labeling = result.labeling;
@@ -35,7 +35,7 @@ double guided_share(const Rig& rig, const PointOptions& options, const PointResu
                options.guided);
   double least = 1;
   for (std::size_t c = 0; c < graphs.size(); ++c) {
-    const auto points = static_cast<double>(curve_points(graphs[c]));
+    const auto points = static_cast<double>(nameable_points(graphs[c], labeling));
     if (points > 0)
       least = std::min(least, static_cast<double>(labelled_points(labeling.runs[c])) / points);
   }

@@ -17,10 +17,15 @@ struct LineNaming {
   std::optional<Warning> warning;
 };
 
+/// Points of a camera's curves that can have a name: all but those whose rays meet no line in the
+/// volume (walls, a floor, people).
+[[nodiscard]] std::size_t nameable_points(const GridGraph& graph, const Labeling& labeling);
+
 /// Decides whether lines keep the names that the solution gave with the rig as given, or get names
 /// with a corrected rig. For methods that may correct the rig (MethodCapabilities).
 ///
-/// The rig is doubted where crossings miss each other, or where many curves have no name. It is not
+/// The rig is doubted where crossings miss each other, or where many curves in the volume have no
+/// name. It is not
 /// doubted where crossings meet as closely as noise lets expect and most curves of every camera
 /// have a name after guided matching: curves that are close together only need the surface.
 /// (`guided_share` gives the share of points with a name, of the camera where it is least. It is
