@@ -176,7 +176,10 @@ void CameraMatching::grow_surface() {
   Labeling labeling;
   labeling.runs.resize(rig_.cameras.size());
   labeling.runs[static_cast<std::size_t>(graph_.camera)] = std::exchange(not_on_surface_, {});
-  std::vector<MeasuredPoint> points = triangulate(rig_, {&graph_, 1}, labeling);
+  // A floor is a surface like others here: its lines keep curves from names in the air above it.
+  TriangulationOptions options;
+  options.keeps_floor = true;
+  std::vector<MeasuredPoint> points = triangulate(rig_, {&graph_, 1}, labeling, options);
   points.insert(points.end(), dense_.begin(), dense_.end());
   dense_.clear();
   surface_.add(points);

@@ -119,7 +119,8 @@ void keep_one_per_pixel(std::vector<MeasuredPoint>& points) {
 std::vector<MeasuredPoint> triangulate(const Rig& rig, std::span<const GridGraph> graphs,
                                        const Labeling& labeling,
                                        const TriangulationOptions& options) {
-  const ObjectSpace space(rig, options.volume_margin);
+  const ObjectSpace of_object(rig, options.volume_margin);
+  const ObjectSpace space = options.keeps_floor ? of_object.with_floor() : of_object;
   std::vector<std::vector<MeasuredPoint>> per_camera(graphs.size());
   parallel_for(graphs.size(), [&](std::size_t g) {
     for (const LabeledRun& run : labeling.runs[static_cast<std::size_t>(graphs[g].camera)]) {

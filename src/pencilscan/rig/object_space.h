@@ -16,6 +16,13 @@ class ObjectSpace {
  public:
   explicit ObjectSpace(const Rig& rig, double volume_margin = 1.1);
 
+  /// The same, with the floor and what is below it.
+  [[nodiscard]] ObjectSpace with_floor() const {
+    ObjectSpace space = *this;
+    space.floor_.reset();
+    return space;
+  }
+
   [[nodiscard]] bool holds(const Vec3& x) const {
     return (x - volume_.center).norm() <= volume_.radius &&
            (!floor_ || floor_->height(x) > least_height_);
