@@ -1,5 +1,6 @@
 #include "pencilscan/depth/dense_depth.h"
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <opencv2/core.hpp>
@@ -88,6 +89,58 @@ Quadric quadric_of(const TangentView& at, int half) {
   q.segment<2>(1) = half * at.slope.cast<double>();
   return q;
 }
+
+/// A stated floor in one camera. Its lines continue those of the object one or more lines off;
+/// there a window may fit a surface in the air beside the object as well as the floor that it
+/// shows.
+class FloorView {
+ public:
+  FloorView(const CameraLight& light, const ObjectSpace& space)
+      : light_(light), floor_(space.floor()), space_(space.with_floor()) {}
+
+  /// True when the floor explains the window as well as the fit does.
+  [[nodiscard]] bool shows(const Vec2& pixel, const WindowFit& fit, WindowFitter& fitter) const {
+    constexpr double kSameLine = 0.2;  // lines; a floor off the stated plane, and its relief
+    constexpr float kAsWell = 1.1F;    // chi^2 of a window's hundred samples scatters by so much
+    if (!floor_) return false;
+    const Ray ray = light_.camera->ray(pixel);
+    const double descent = -ray.direction.dot(floor_->normal);
+    const double height = floor_->height(ray.origin);
+    if (!(descent > 0) || !(height > 0)) return false;
+    const Vec3 point = ray.origin + height / descent * ray.direction;
+    if (!space_.holds(point)) return false;
+    const TangentView at(*light_.camera, point, floor_->normal);
+    const Vec2 m = light_.camera->normalized_from_pixel(pixel);
+    for (std::size_t k = 0; k < light_.patterns.size(); ++k) {
+      if (!fit.lit.test(k)) continue;
+      const auto fitted = line(k, m, fit.q[0]);
+      const auto on_floor = line(k, m, at.w);
+      if (!fitted || !on_floor) return false;
+      const double apart = *fitted - *on_floor;
+      if (std::abs(apart - std::round(apart)) > kSameLine) return false;
+    }
+    const Quadric start = quadric_of(at, fitter.half());
+    const auto floor = fitter.fit(pixel, start, 5);
+    if (!floor || floor->misfit > kAsWell * fit.misfit || floor->lit.count() < fit.lit.count())
+      return false;
+    // It still is the floor, over the whole window.
+    return (floor->q - start).head<3>().cwiseAbs().sum() * static_cast<double>(floor->lines_per_w) <
+           kSameLine;
+  }
+
+ private:
+  [[nodiscard]] std::optional<double> line(std::size_t pattern, const Vec2& m, double w) const {
+    bool ok = false;
+    const WindowLines lines =
+        light_.patterns[pattern].lines(m, light_.camera->pixel_slope(m).inverse(), w, ok);
+    if (!ok) return std::nullopt;
+    return static_cast<double>(lines.line(0, 0, static_cast<float>(w)));
+  }
+
+  const CameraLight& light_;
+  std::optional<Floor> floor_;
+  ObjectSpace space_;
+};
 
 double cost(const WindowFit& fit) { return static_cast<double>(fit.misfit); }
 
@@ -191,6 +244,7 @@ DepthMap dense_depth(const CameraLight& light, int camera, std::span<const Measu
   map.nodes.resize(static_cast<std::size_t>(map.columns) * static_cast<std::size_t>(map.rows));
   const CurveSeeds seeds(*light.camera, camera, points);
   WindowFitter fitter(light, options.half);
+  const FloorView floor(light, space);
   // Nodes near labelled curves.
   for (std::size_t i = 0; i < map.nodes.size(); ++i) {
     const Vec2 pixel = map.pixel(i);
@@ -202,7 +256,7 @@ DepthMap dense_depth(const CameraLight& light, int camera, std::span<const Measu
         best = fit;
       }
     }
-    if (!best) continue;
+    if (!best || floor.shows(pixel, *best, fitter)) continue;
     map.nodes[i] = node_of(*best, options.half);
     map.nodes[i].seeded = true;
   }
@@ -240,7 +294,8 @@ DepthMap dense_depth(const CameraLight& light, int camera, std::span<const Measu
           best = fit;
         }
       }
-      if (best) found.emplace_back(j, node_of(*best, options.half));
+      if (best && !floor.shows(map.pixel(j), *best, fitter))
+        found.emplace_back(j, node_of(*best, options.half));
     }
     for (const auto& [j, node] : found) {
       map.nodes[j] = node;
@@ -258,6 +313,7 @@ std::size_t complete_map(const CameraLight& light, const RayScene& surface,
   constexpr double kHardPlaces = 1.8;  // rims and gaps: errors beyond what the window's fit says
   const Camera& camera = *light.camera;
   WindowFitter fitter(light, options.half);
+  const FloorView floor(light, space);
   std::size_t found = 0;
   for (std::size_t i = 0; i < map.nodes.size(); ++i) {
     if (map.nodes[i].measured()) continue;
@@ -269,7 +325,7 @@ std::size_t complete_map(const CameraLight& light, const RayScene& surface,
     const auto fit = fitter.fit(pixel, start, 5);
     if (!fit || !acceptable(light, pixel, *fit, space, options.half, options)) continue;
     const double move = (camera.point_at_depth(pixel, 1 / fit->q[0]) - hit->point).norm();
-    if (move > options.max_move) continue;
+    if (move > options.max_move || floor.shows(pixel, *fit, fitter)) continue;
     map.nodes[i] = node_of(*fit, options.half);
     map.nodes[i].sigma *= static_cast<float>(kHardPlaces * sigma_factor);
     map.nodes[i].confidence = kConfidence;

@@ -174,9 +174,12 @@ TEST(PossibleLabels, AStatedFloorFavorsTheLineThatWouldLieOnIt) {
         if (!(label.pattern == without[k].pattern) || label.line != without[k].line) continue;
         const float change = label.cost - without[k].cost;
         EXPECT_LE(change, 0);
-        if (k == lying) EXPECT_LT(change, -3);
-        if (label.pattern == without[lying].pattern && k != lying) EXPECT_GT(change, -0.01F);
-        compared += k == lying ? 1 : 0;
+        if (k == lying) {
+          ++compared;
+          EXPECT_LT(change, -3);
+        } else if (label.pattern == without[lying].pattern) {
+          EXPECT_GT(change, -0.01F);
+        }
       }
     }
   }

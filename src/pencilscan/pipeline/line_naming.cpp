@@ -28,14 +28,14 @@ void judge(const Rig& rig, const std::vector<GridGraph>& graphs, LineNaming& nam
 std::size_t nameable_points(const GridGraph& graph, const Labeling& labeling) {
   const auto c = static_cast<std::size_t>(graph.camera);
   const auto undecided = undecided_points(labeling.undecided[c], labeling.runs[c]);
-  return curve_points(graph) -
-         undecided[static_cast<std::size_t>(UndecidedReason::kOutsideVolume)];
+  return curve_points(graph) - undecided[static_cast<std::size_t>(UndecidedReason::kOutsideVolume)];
 }
 
 LineNaming name_lines(const Rig& rig, const std::vector<ColorFamily>& families,
                       const std::vector<GridGraph>& graphs, Labeling labeling,
                       const PointOptions& options, const std::function<double()>& guided_share) {
-  constexpr double kNearlyAll = 0.8;    // of the curves' points in the volume; right names reach .9 and more
+  constexpr double kNearlyAll =
+      0.8;  // of the curves' points in the volume; right names reach .9 and more
   constexpr double kMost = 0.5;         // once guided; the rest are close together, or no lines
   constexpr double kClearlyMore = 1.1;  // points named, of those before
   constexpr double kAsWell = 1.2;       // crossings' misses, of those before
@@ -46,7 +46,8 @@ LineNaming name_lines(const Rig& rig, const std::vector<ColorFamily>& families,
   const bool is_off = disagrees(result.crossings);
   const auto points = static_cast<double>(labelled_points(result.labeling));
   if (!are_enough(result.crossings)) return result;
-  if (!is_off && points > kNearlyAll * static_cast<double>(nameable_points(graphs, result.labeling)))
+  if (!is_off &&
+      points > kNearlyAll * static_cast<double>(nameable_points(graphs, result.labeling)))
     return result;
   const bool meets = !is_off && result.crossings.median_px <= result.crossings.expected_px;
   if (meets && guided_share && guided_share() > kMost) return result;

@@ -23,6 +23,8 @@ class ObjectSpace {
     return space;
   }
 
+  [[nodiscard]] const std::optional<Floor>& floor() const { return floor_; }
+
   [[nodiscard]] bool holds(const Vec3& x) const {
     return (x - volume_.center).norm() <= volume_.radius &&
            (!floor_ || floor_->height(x) > least_height_);
