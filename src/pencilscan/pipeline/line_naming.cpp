@@ -37,6 +37,7 @@ LineNaming name_lines(const Rig& rig, const std::vector<ColorFamily>& families,
   constexpr double kNearlyAll =
       0.8;  // of the curves' points in the volume; right names reach .9 and more
   constexpr double kMost = 0.5;         // once guided; the rest are close together, or no lines
+  constexpr double kAsClosely = 1.2;    // the misses that noise lets expect are known to a fifth
   constexpr double kClearlyMore = 1.1;  // points named, of those before
   constexpr double kAsWell = 1.2;       // crossings' misses, of those before
   constexpr double kClearlyLess = 0.8;  // the same
@@ -49,7 +50,8 @@ LineNaming name_lines(const Rig& rig, const std::vector<ColorFamily>& families,
   if (!is_off &&
       points > kNearlyAll * static_cast<double>(nameable_points(graphs, result.labeling)))
     return result;
-  const bool meets = !is_off && result.crossings.median_px <= result.crossings.expected_px;
+  const bool meets =
+      !is_off && result.crossings.median_px <= kAsClosely * result.crossings.expected_px;
   if (meets && guided_share && guided_share() > kMost) return result;
 
   const FrameCurves curves{families, graphs};
