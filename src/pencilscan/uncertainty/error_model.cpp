@@ -7,14 +7,14 @@ namespace pencilscan {
 namespace {
 
 // Of experiments/error_model.py, printed under "fitted".
-constexpr double kScale = 0.966;
-constexpr double kOneSided = 1.675;
-constexpr double kBend = 0.391;
-constexpr double kOnLines = 0.867;
-constexpr double kDifference = 0.168;
-constexpr double kOwnOff = 1.60;
-constexpr double kDifferenceOff = 1.00;
-constexpr double kSharedErrors = 0.00015;
+constexpr double kScale = 0.929;
+constexpr double kOneSided = 1.698;
+constexpr double kBend = 0.417;
+constexpr double kOnLines = 0.876;
+constexpr double kDifference = 0.167;
+constexpr double kOwnOff = 1.86;
+constexpr double kDifferenceOff = 0.97;
+constexpr double kSharedErrors = 0.00014;
 
 /// Footprints. No mean of depths was ever seen to be better; keeps exact data from saying 0.
 constexpr double kLeast = 0.01;

@@ -4,7 +4,7 @@ namespace pencilscan {
 
 // The error of a result, from few pieces of evidence and few parameters. experiments/error_model.py
 // fits the parameters on its fit scenes and prints how often they hold on other ones;
-// docs/uncertainty.md derives the form. Lengths are in footprints (rig/rig.h).
+// docs/depth.md derives the form. Lengths are in footprints (rig/rig.h).
 
 /// What is known of how well one place of a surface was measured; lengths across the surface.
 struct SurfaceEvidence {
