@@ -165,7 +165,7 @@ TEST(PossibleLabels, AStatedFloorFavorsTheLineThatWouldLieOnIt) {
   for (const std::size_t piece : {std::size_t{3}, std::size_t{40}, std::size_t{200}}) {
     scene.rig.floor.reset();
     const std::vector<PieceLabel> without = labels_of(piece, points);
-    ASSERT_GT(without.size(), 4U);
+    ASSERT_GE(without.size(), 2U);
     const std::size_t lying = without.size() / 2;
     scene.rig.floor = Floor{points[lying], Vec3(1, 0.2, 0).normalized()};
     const std::vector<PieceLabel> with = labels_of(piece, points);
