@@ -160,12 +160,17 @@ TEST(PossibleLabels, AStatedFloorFavorsTheLineThatWouldLieOnIt) {
                        Vec3(ray.cast<double>() / label.q.dot(ray)));
     return pieces.labels[piece];
   };
+  std::vector<std::size_t> open;  // pieces that keep several labels
+  const LabelledPieces all = possible_labels(scene.rig, scene.families, graph, {});
+  for (std::size_t piece = 0; piece < all.labels.size() && open.size() < 3; ++piece) {
+    if (all.labels[piece].size() > 2) open.push_back(piece);
+  }
+  ASSERT_EQ(open.size(), 3U);
   std::vector<Vec3> points;
   int compared = 0;
-  for (const std::size_t piece : {std::size_t{3}, std::size_t{40}, std::size_t{200}}) {
+  for (const std::size_t piece : open) {
     scene.rig.floor.reset();
     const std::vector<PieceLabel> without = labels_of(piece, points);
-    ASSERT_GE(without.size(), 2U);
     const std::size_t lying = without.size() / 2;
     scene.rig.floor = Floor{points[lying], Vec3(1, 0.2, 0).normalized()};
     const std::vector<PieceLabel> with = labels_of(piece, points);
