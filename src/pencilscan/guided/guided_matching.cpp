@@ -20,6 +20,7 @@ namespace {
 using Eigen::Vector2f;
 
 constexpr int kPlaceCellPx = 8;  ///< px, of what is found by place
+constexpr int kNearCellPx = 3;   ///< px, of what is looked for within a pixel or two
 
 struct KnownPoint {
   Vector2f position;
@@ -32,6 +33,11 @@ struct LineName {
   PatternRef pattern;
   int line;
   friend bool operator==(const LineName&, const LineName&) = default;
+};
+
+struct NamedPlace {
+  Vector2f position;
+  LineName name;
 };
 
 /// visit(begin, end) for each stretch [begin, end) of equal values.
@@ -103,6 +109,7 @@ class CameraMatching {
   std::vector<MeasuredPoint> dense_;        ///< more points, not on the surface yet
   std::vector<LabeledRun> not_on_surface_;  ///< runs whose points it does not hold yet
   Places<KnownPoint> known_;
+  Places<NamedPlace> known_names_;       ///< of the same points
   std::vector<PredictedPoint> missing_;  ///< predicted points that no label explains
   Places<PredictedPoint> missing_places_;
 };
@@ -121,7 +128,8 @@ CameraMatching::CameraMatching(const Rig& rig, const std::vector<ColorFamily>& f
       options_(options),
       surface_(camera_, options.surface),
       known_(camera_.width, camera_.height, kPlaceCellPx),
-      missing_places_(camera_.width, camera_.height, kPlaceCellPx) {
+      known_names_(camera_.width, camera_.height, kNearCellPx),
+      missing_places_(camera_.width, camera_.height, kNearCellPx) {
   for (const ColorFamily& family : families) {
     for (const PatternRef& ref : family.patterns) {
       if (can_see_pattern(rig, camera_, ref.projector)) patterns_.push_back(ref);
@@ -163,6 +171,7 @@ void CameraMatching::accept(std::vector<LabeledRun> news) {
     for (int i = run.begin; i < run.end; ++i) {
       const CurvePoint& p = curve.points[static_cast<std::size_t>(i)];
       known_.add(p.position, {p.position, run.label.pattern, run.label.line, p.amplitude});
+      known_names_.add(p.position, {p.position, {run.label.pattern, run.label.line}});
     }
   }
   not_on_surface_.insert(not_on_surface_.end(), news.begin(), news.end());
@@ -176,9 +185,10 @@ void CameraMatching::grow_surface() {
   Labeling labeling;
   labeling.runs.resize(rig_.cameras.size());
   labeling.runs[static_cast<std::size_t>(graph_.camera)] = std::exchange(not_on_surface_, {});
-  // A floor is a surface like others here: its lines keep curves from names in the air above it.
   TriangulationOptions options;
+  // A floor is a surface like others here: its lines keep curves from names in the air above it.
   options.keeps_floor = true;
+  options.used_of_seven = options_.surface.used_of_seven;
   std::vector<MeasuredPoint> points = triangulate(rig_, {&graph_, 1}, labeling, options);
   points.insert(points.end(), dense_.begin(), dense_.end());
   dense_.clear();
@@ -193,8 +203,8 @@ LocalSurface CameraMatching::take_surface() {
 bool CameraMatching::is_known(const PredictedPoint& p) const {
   constexpr float kSame = 1.5F;  // px
   bool found = false;
-  known_.around(p.position, kSame, [&](const KnownPoint& k) {
-    found = found || (k.line == p.line && k.pattern == p.pattern &&
+  known_names_.around(p.position, kSame, [&](const NamedPlace& k) {
+    found = found || (k.name.line == p.line && k.name.pattern == p.pattern &&
                       (k.position - p.position).squaredNorm() < kSame * kSame);
   });
   return found;
@@ -217,11 +227,11 @@ void CameraMatching::predict() {
 /// not much thinner: a curve wider than its line is another one, or two.
 template <class Visit>
 void CameraMatching::aligned_predictions(const CurvePoint& point, Visit visit) const {
-  constexpr float kAround = 3;    // px
   constexpr float kAlong = 1.5F;  // px
   constexpr float kSameDirection = 0.9F;
   constexpr float kWidest = 1.2F;
-  missing_places_.around(point.position, kAround, [&](const PredictedPoint& p) {
+  const float across = 2 * static_cast<float>(options_.max_offset_px);  // what line_at() looks at
+  missing_places_.around(point.position, std::hypot(across, kAlong), [&](const PredictedPoint& p) {
     const Vector2f way = point.position - p.position;
     const float along = std::abs(way.x() * p.normal.y() - way.y() * p.normal.x());
     if (along > kAlong || std::abs(p.normal.dot(point.normal)) < kSameDirection ||

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <set>
+#include <tuple>
 
 #include "pencilscan/core/random.h"
 #include "pencilscan/detection/refine.h"
@@ -220,6 +221,57 @@ TEST_F(LabeledScene, MissedLineIsFoundInTheImageWhereItIsAndNotWhereItIsDark) {
     }
   }
   EXPECT_GT(static_cast<double>(found), 0.5 * static_cast<double>(truth.size()));
+}
+
+TEST_F(LabeledScene, FewerPointsAreThoseOfTheLatticeInOrder) {
+  const std::vector<MeasuredPoint> all = points();
+  const auto place = [](const MeasuredPoint& p) {
+    const auto pixel = [](float x) { return static_cast<int>(x + 1024 + 0.5F); };
+    return std::tuple(p.projector, p.pattern, p.line, pixel(p.v), pixel(p.u));
+  };
+  for (std::size_t i = 1; i < all.size(); ++i) ASSERT_LT(place(all[i - 1]), place(all[i]));
+  TriangulationOptions options;
+  options.used_of_seven = 2;
+  const std::vector<MeasuredPoint> some = triangulate(rig, {&graph_, 1}, labeling_, options);
+  EXPECT_NEAR(static_cast<double>(some.size()) / static_cast<double>(all.size()), 2 / 7.0, 0.02);
+  auto at = all.begin();
+  for (const MeasuredPoint& p : some) {
+    at = std::find_if(at, all.end(), [&](const MeasuredPoint& q) { return place(p) == place(q); });
+    ASSERT_TRUE(at != all.end());
+    EXPECT_EQ(std::tie(p.x, p.y, p.z, p.sigma), std::tie(at->x, at->y, at->z, at->sigma));
+  }
+}
+
+TEST_F(LabeledScene, SurfaceThatGrewIsThatOfAllPointsAtOnce) {
+  const Vec3 center = camera().center();
+  for (const int cut : {480, 560, 640, 720, 800}) {  // px, between cells
+    for (const int beside : {8, 10, 12, 14}) {
+      // A depth step runs beside the cut, where patches need a smaller neighbourhood.
+      std::vector<MeasuredPoint> all = points();
+      for (MeasuredPoint& p : all) {
+        if (p.u < static_cast<float>(cut + beside)) continue;
+        const Vec3 x = center + 1.1 * (Vec3(p.x, p.y, p.z) - center);
+        p.x = static_cast<float>(x.x());
+        p.y = static_cast<float>(x.y());
+        p.z = static_cast<float>(x.z());
+      }
+      std::vector<MeasuredPoint> right;
+      std::vector<MeasuredPoint> left;
+      for (const MeasuredPoint& p : all)
+        (p.u < static_cast<float>(cut) ? left : right).push_back(p);
+      LocalSurface at_once(camera());
+      LocalSurface grown(camera());
+      at_once.add(all);
+      grown.add(right);
+      grown.add(left);
+      for (std::size_t i = 0; i < grown.patches().size(); ++i) {
+        const SurfacePatch& a = grown.patches()[i];
+        const SurfacePatch& b = at_once.patches()[i];
+        EXPECT_EQ(a.reference, b.reference) << i;
+        EXPECT_EQ(a.coefficients, b.coefficients) << i;
+      }
+    }
+  }
 }
 
 TEST_F(LabeledScene, SettledPointsAreCloserToTheSurface) {

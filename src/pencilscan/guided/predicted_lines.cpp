@@ -4,6 +4,7 @@
 #include <Eigen/LU>
 #include <array>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <optional>
 
@@ -177,36 +178,77 @@ struct PatchGrid {
   static int stride(int side) { return (side + kLanes - 1) / kLanes * kLanes; }
 };
 
+/// Where lines cross between eight pixels of a row and their neighbours to the right or below.
+struct EightCrossings {
+  std::array<int, kLanes> is_crossed;
+  std::array<int, kLanes> line;
+  std::array<float, kLanes> coordinate;
+  std::array<float, kLanes> slope_x;  ///< of the coordinate, per pixel
+  std::array<float, kLanes> slope_y;
+};
+
+/// `here`: coordinates of nine pixels, `below` of the eight under them. False if there are none.
+PENCILSCAN_CLONES bool look_for_crossings(const float* here, const float* below, int pixels,
+                                          int line_count, float min_spacing_px,
+                                          EightCrossings& crossings) {
+  const IntLanes lane = {0, 1, 2, 3, 4, 5, 6, 7};
+  Lanes c;
+  Lanes slope_x;
+  Lanes slope_y;
+  load(here, c);
+  load(here + 1, slope_x);
+  load(below, slope_y);
+  slope_x -= c;
+  slope_y -= c;
+  const Lanes steep_x = slope_x < 0 ? -slope_x : slope_x;
+  const Lanes steep_y = slope_y < 0 ? -slope_y : slope_y;
+  const Lanes next = c + (steep_x >= steep_y ? slope_x : slope_y);
+  const Lanes low = c < next ? c : next;
+  const Lanes high = c < next ? next : c;
+  // The least whole number that is not below.
+  const IntLanes whole = __builtin_convertvector(low, IntLanes);
+  const IntLanes line = whole - (__builtin_convertvector(whole, Lanes) < low);
+  const Lanes norm2 = slope_x * slope_x + slope_y * slope_y;
+  const IntLanes is_crossed = (high > 0) & (__builtin_convertvector(line, Lanes) < high) &
+                              (line >= 0) & (line < line_count) &
+                              (norm2 * (min_spacing_px * min_spacing_px) < 1) & (lane < pixels);
+  if (!any(is_crossed)) return false;
+  std::memcpy(crossings.is_crossed.data(), &is_crossed, sizeof(is_crossed));
+  std::memcpy(crossings.line.data(), &line, sizeof(line));
+  store(c, crossings.coordinate.data());
+  store(slope_x, crossings.slope_x.data());
+  store(slope_y, crossings.slope_y.data());
+  return true;
+}
+
 /// Adds the lines that cross a patch between neighbouring pixels.
 void add_crossings(const std::vector<float>& coordinates, int step, const Vector2f& first,
                    int line_count, double min_spacing_px, const PredictedPoint& like,
                    float sigma_lines, std::vector<PredictedPoint>& result) {
   const int stride = PatchGrid::stride(step + 1);
+  EightCrossings crossings;
   for (int y = 0; y < step; ++y) {
-    for (int x = 0; x < step; ++x) {
-      const auto i = static_cast<std::size_t>(y * stride + x);
-      const float c = coordinates[i];
-      const Vector2f slope(coordinates[i + 1] - c,
-                           coordinates[i + static_cast<std::size_t>(stride)] - c);
-      const Eigen::Index along = std::abs(slope.x()) >= std::abs(slope.y()) ? 0 : 1;
-      const float next = c + slope[along];
-      const float low = std::min(c, next);
-      const float high = std::max(c, next);
-      if (!(high > 0)) continue;
-      // The least whole number that is not below.
-      const int whole = static_cast<int>(low);
-      const int line = static_cast<float>(whole) < low ? whole + 1 : whole;
-      if (static_cast<float>(line) >= high || line < 0 || line >= line_count) continue;
-      const float norm = slope.norm();
-      if (!(norm * static_cast<float>(min_spacing_px) < 1)) continue;
-      PredictedPoint point = like;
-      point.line = line;
-      point.normal = slope / norm;
-      point.spacing_px = 1 / norm;
-      point.sigma_px = sigma_lines / norm;
-      point.position = first + Vector2f(static_cast<float>(x), static_cast<float>(y));
-      point.position[along] += (static_cast<float>(line) - c) / slope[along];
-      result.push_back(point);
+    for (int x = 0; x < step; x += kLanes) {
+      const float* here = coordinates.data() + y * stride + x;
+      if (!look_for_crossings(here, here + stride, step - x, line_count,
+                              static_cast<float>(min_spacing_px), crossings))
+        continue;
+      for (int k = 0; k < kLanes; ++k) {
+        const auto lane = static_cast<std::size_t>(k);
+        if (crossings.is_crossed[lane] == 0) continue;
+        const Vector2f slope(crossings.slope_x[lane], crossings.slope_y[lane]);
+        const Eigen::Index along = std::abs(slope.x()) >= std::abs(slope.y()) ? 0 : 1;
+        const float norm = slope.norm();
+        PredictedPoint point = like;
+        point.line = crossings.line[lane];
+        point.normal = slope / norm;
+        point.spacing_px = 1 / norm;
+        point.sigma_px = sigma_lines / norm;
+        point.position = first + Vector2f(static_cast<float>(x + k), static_cast<float>(y));
+        point.position[along] +=
+            (static_cast<float>(point.line) - crossings.coordinate[lane]) / slope[along];
+        result.push_back(point);
+      }
     }
   }
 }
@@ -223,7 +265,7 @@ std::vector<PredictedPoint> predict_lines(const Rig& rig, const Camera& camera,
   const int side = step + 1;
   const int stride = PatchGrid::stride(side);
   PENCILSCAN_CHECK(side <= PatchGrid::kMostRows && stride <= 2 * kLanes);
-  std::vector<float> coordinates(static_cast<std::size_t>(stride * side));
+  std::vector<float> coordinates(static_cast<std::size_t>(stride * side + kLanes));
   std::vector<PredictedPoint> result;
   for (std::size_t p = 0; p < surface.patches().size(); ++p) {
     const SurfacePatch& patch = surface.patches()[p];

@@ -66,7 +66,7 @@ PointResult place_points(const Rig& rig, PointResult lines, const PointOptions& 
     }
     result.points = triangulate(rig, result.graphs, result.labeling, triangulation);
     if (result.corrected) surfaces = local_surfaces(rig, result.points, options.guided.surface);
-    if (is_guided) result.points = settle_points(rig, result.points, surfaces, settle);
+    if (is_guided) result.points = settle_points(rig, std::move(result.points), surfaces, settle);
   });
   return result;
 }
@@ -83,10 +83,10 @@ FrameResult match_on_surface(const Rig& rig, FrameResult result, const PointOpti
     const std::vector<LocalSurface> surfaces =
         match_guided(rig, points.families, presence_images(points.detections), points.graphs,
                      points.labeling, options.guided, dense_points(rig, shape.depth.maps));
-    const std::vector<MeasuredPoint> triangulated =
+    std::vector<MeasuredPoint> triangulated =
         triangulate(rig, points.graphs, points.labeling, options.triangulation);
     SettledPoints settled = settle_on_surface(
-        rig, *shape.scene, settle_points(rig, triangulated, surfaces, options.settle),
+        rig, *shape.scene, settle_points(rig, std::move(triangulated), surfaces, options.settle),
         shape.surface.mesh.color);
     points.points = std::move(settled.points);
     points.contradicted += settled.contradicted;

@@ -7,6 +7,7 @@
 
 #include "pencilscan/core/lanes.h"
 #include "pencilscan/geometry/quadric_moments.h"
+#include "pencilscan/points/pixel_lattice.h"
 
 namespace pencilscan {
 namespace {
@@ -201,19 +202,6 @@ struct LocalSurface::Neighborhood {
   }
 };
 
-namespace {
-
-/// Pixels of a lattice that every line of pixels, upright, flat or diagonal, meets as often.
-bool is_used(float u, float v, int used_of_seven) {
-  constexpr std::array<int, 7> kOrder = {0, 4, 2, 1, 5, 3, 6};
-  constexpr float kMargin = 1024;  // curves may leave the image a little
-  const auto column = static_cast<unsigned>(std::max(0.F, u + kMargin + 0.5F));
-  const auto row = static_cast<unsigned>(std::max(0.F, v + kMargin + 0.5F));
-  return kOrder[(column + 2 * row) % 7] < used_of_seven;
-}
-
-}  // namespace
-
 LocalSurface::LocalSurface(const Camera& camera, const LocalSurfaceOptions& options)
     : options_(options),
       center_(camera.center()),
@@ -225,6 +213,7 @@ LocalSurface::LocalSurface(const Camera& camera, const LocalSurfaceOptions& opti
       cell_rows_(camera.height / kCell + 1),
       cells_(static_cast<std::size_t>(cell_columns_ * cell_rows_)),
       patches_(static_cast<std::size_t>(columns_ * rows_)),
+      fitted_to_(patches_.size(), 0),
       refitted_(patches_.size(), 0) {}
 
 int LocalSurface::cell_column(float x) const {
@@ -236,15 +225,13 @@ int LocalSurface::cell_row(float y) const {
 }
 
 void LocalSurface::add(std::span<const MeasuredPoint> points) {
-  for (Cell& cell : cells_) cell.has_news = false;
   for (const MeasuredPoint& p : points) {
-    if (!is_used(p.u, p.v, options_.used_of_seven)) continue;
+    if (!is_on_lattice(p.u, p.v, options_.used_of_seven)) continue;
     const Vec3 way = Vec3(p.x, p.y, p.z) - center_;
     const float relative = p.sigma / static_cast<float>(way.norm());
-    Cell& cell = cells_[static_cast<std::size_t>(cell_row(p.v) * cell_columns_ + cell_column(p.u))];
-    cell.samples.push_back({Vector2f(p.u, p.v), static_cast<float>(1 / way.dot(forward_)),
-                            1 / std::sqrt(relative * relative + floor_ * floor_)});
-    cell.has_news = true;
+    auto& cell = cells_[static_cast<std::size_t>(cell_row(p.v) * cell_columns_ + cell_column(p.u))];
+    cell.push_back({Vector2f(p.u, p.v), static_cast<float>(1 / way.dot(forward_)),
+                    1 / std::sqrt(relative * relative + floor_ * floor_)});
   }
   Neighborhood around;
   const auto step = static_cast<float>(options_.step_px);
@@ -254,8 +241,11 @@ void LocalSurface::add(std::span<const MeasuredPoint> points) {
       const Vector2f pixel((static_cast<float>(x) + 0.5F) * step - 0.5F,
                            (static_cast<float>(y) + 0.5F) * step - 0.5F);
       const auto index = static_cast<std::size_t>(y * columns_ + x);
-      refitted_[index] = gather(pixel, reach, around) ? 1 : 0;
+      const std::size_t samples = samples_around(pixel, reach);
+      refitted_[index] = samples != fitted_to_[index] ? 1 : 0;
       if (refitted_[index] == 0) continue;
+      fitted_to_[index] = samples;
+      gather(pixel, reach, around);
       patches_[index] = fit(pixel, reach, around);
       if (patches_[index].exists()) continue;
       // Near a depth step, a smaller neighbourhood may lie on one side of it.
@@ -278,35 +268,35 @@ const SurfacePatch* LocalSurface::nearest(const Vector2f& pixel) const {
   return patch.exists() ? &patch : nullptr;
 }
 
-bool LocalSurface::gather(const Vector2f& pixel, float scale, Neighborhood& around) const {
+template <class Visit>
+void LocalSurface::for_each_cell(const Vector2f& pixel, float scale, Visit visit) const {
   const float reach = 2 * scale;
   const int left = cell_column(pixel.x() - reach);
   const int right = cell_column(pixel.x() + reach);
   const int top = cell_row(pixel.y() - reach);
   const int bottom = cell_row(pixel.y() + reach);
-  const auto for_each_cell = [&](auto visit) {
-    for (int y = top; y <= bottom; ++y) {
-      for (int x = left; x <= right; ++x)
-        visit(cells_[static_cast<std::size_t>(y * cell_columns_ + x)]);
-    }
-  };
-  bool has_news = false;
-  std::size_t most = 0;
-  for_each_cell([&](const Cell& cell) {
-    has_news = has_news || cell.has_news;
-    most += cell.samples.size();
-  });
-  if (!has_news) return false;
-  around.start(most);
+  for (int y = top; y <= bottom; ++y) {
+    for (int x = left; x <= right; ++x)
+      visit(cells_[static_cast<std::size_t>(y * cell_columns_ + x)]);
+  }
+}
+
+std::size_t LocalSurface::samples_around(const Vector2f& pixel, float scale) const {
+  std::size_t count = 0;
+  for_each_cell(pixel, scale, [&](const std::vector<Sample>& cell) { count += cell.size(); });
+  return count;
+}
+
+void LocalSurface::gather(const Vector2f& pixel, float scale, Neighborhood& around) const {
+  around.start(samples_around(pixel, scale));
   const float per_scale = 1 / scale;
-  for_each_cell([&](const Cell& cell) {
-    for (const Sample& s : cell.samples) {
+  for_each_cell(pixel, scale, [&](const std::vector<Sample>& cell) {
+    for (const Sample& s : cell) {
       const Vector2f d = (s.pixel - pixel) * per_scale;
       around.add(d, s, d.squaredNorm() < 4);
     }
   });
   around.finish();
-  return true;
 }
 
 SurfacePatch LocalSurface::fit(const Vector2f& pixel, float scale_px, Neighborhood& around) const {

@@ -45,7 +45,8 @@ class LocalSurface {
  public:
   explicit LocalSurface(const Camera& camera, const LocalSurfaceOptions& options = {});
 
-  /// Adds points of this camera and fits the patches that they change.
+  /// Adds points of this camera and fits the patches that they change. However points are dealt to
+  /// calls, the patches are the same, if the order within cells of 8 px is.
   void add(std::span<const MeasuredPoint> points);
 
   /// The patch nearest to a pixel; nullptr: none.
@@ -63,15 +64,14 @@ class LocalSurface {
     float w;              ///< inverse depth
     float inverse_sigma;  ///< 1 / relative standard deviation
   };
-  struct Cell {
-    std::vector<Sample> samples;
-    bool has_news = false;  ///< of the last add()
-  };
   struct Neighborhood;
   static constexpr int kCell = 8;
 
-  /// Collects the samples around a pixel; false if none of their cells has news.
-  bool gather(const Eigen::Vector2f& pixel, float scale_px, Neighborhood& around) const;
+  template <class Visit>
+  void for_each_cell(const Eigen::Vector2f& pixel, float scale_px, Visit visit) const;
+  /// In the cells around a pixel.
+  [[nodiscard]] std::size_t samples_around(const Eigen::Vector2f& pixel, float scale_px) const;
+  void gather(const Eigen::Vector2f& pixel, float scale_px, Neighborhood& around) const;
   [[nodiscard]] SurfacePatch fit(const Eigen::Vector2f& pixel, float scale_px,
                                  Neighborhood& around) const;
   [[nodiscard]] int cell_column(float x) const;
@@ -85,8 +85,9 @@ class LocalSurface {
   int rows_;
   int cell_columns_;
   int cell_rows_;
-  std::vector<Cell> cells_;
-  std::vector<SurfacePatch> patches_;  ///< row by row
+  std::vector<std::vector<Sample>> cells_;
+  std::vector<SurfacePatch> patches_;   ///< row by row
+  std::vector<std::size_t> fitted_to_;  ///< samples around each patch when it was fitted
   std::vector<char> refitted_;
 };
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <optional>
 
+#include "pencilscan/core/chunks.h"
 #include "pencilscan/core/parallel.h"
 
 namespace pencilscan {
@@ -37,16 +38,19 @@ double settled_sigma(double propagated, double deviations, const Camera& camera,
   constexpr double kLeastSpread = 0.3;
   constexpr double kUsualBend = 0.6;  // footprints over the patch's scale
   const double bend = static_cast<double>(patch.coefficients.tail<3>().norm()) * camera.K(0, 0);
-  return kScale * footprint * std::pow(propagated / footprint, 0.7) *
-         std::pow(std::max(kLeastSpread, static_cast<double>(patch.spread)), 0.55) *
-         std::exp(1.9 * static_cast<double>(patch.one_sidedness)) *
-         std::pow(1 + bend / kUsualBend, 0.25) * std::pow(1 + deviations * deviations, 0.35);
+  // Single precision: the fit of these exponents is far coarser.
+  const auto power = [](double x, float exponent) {
+    return static_cast<double>(std::pow(static_cast<float>(x), exponent));
+  };
+  return kScale * footprint * power(propagated / footprint, 0.7F) *
+         power(std::max(kLeastSpread, static_cast<double>(patch.spread)), 0.55F) *
+         static_cast<double>(std::exp(1.9F * patch.one_sidedness)) *
+         power(1 + bend / kUsualBend, 0.25F) * power(1 + deviations * deviations, 0.35F);
 }
 
 /// The point settled; nothing if it contradicts its surroundings.
 std::optional<MeasuredPoint> settled(const MeasuredPoint& point, const LocalSurface& surface,
-                                     const Camera& camera, const Vec3& center, const Vec3& forward,
-                                     const SettleOptions& options) {
+                                     const Camera& camera, const SettleOptions& options) {
   const Eigen::Vector2f pixel(point.u, point.v);
   const SurfacePatch* patch = surface.nearest(pixel);
   if (patch == nullptr) {
@@ -56,8 +60,9 @@ std::optional<MeasuredPoint> settled(const MeasuredPoint& point, const LocalSurf
     result.sigma *= kAlone;
     return result;
   }
+  const Vec3 center = camera.center();
   const Vec3 way = Vec3(point.x, point.y, point.z) - center;
-  const double depth = way.dot(forward);
+  const double depth = way.dot(camera.forward());
   const double ray_length = way.norm() / depth;
   const Opinion others = opinion_of(*patch, camera, pixel, ray_length, options);
   const double own2 = static_cast<double>(point.sigma) * point.sigma;
@@ -97,24 +102,23 @@ std::vector<LocalSurface> local_surfaces(const Rig& rig, std::span<const Measure
   return surfaces;
 }
 
-std::vector<MeasuredPoint> settle_points(const Rig& rig, std::span<const MeasuredPoint> points,
+std::vector<MeasuredPoint> settle_points(const Rig& rig, std::vector<MeasuredPoint> points,
                                          std::span<const LocalSurface> surfaces,
                                          const SettleOptions& options) {
-  auto by_camera = points_by_camera(rig, points);
-  parallel_for(by_camera.size(), [&](std::size_t c) {
-    const Camera& camera = rig.cameras[c];
-    const Vec3 center = camera.center();
-    const Vec3 forward = camera.forward();
-    std::vector<MeasuredPoint> kept;
-    for (const MeasuredPoint& p : by_camera[c]) {
-      if (const auto point = settled(p, surfaces[c], camera, center, forward, options))
-        kept.push_back(*point);
-    }
-    by_camera[c] = std::move(kept);
+  std::vector<char> stays(points.size(), 0);
+  parallel_chunks(points.size(), [&](std::size_t i) {
+    const auto c = static_cast<std::size_t>(points[i].camera);
+    const auto point = settled(points[i], surfaces[c], rig.cameras[c], options);
+    if (!point) return;
+    points[i] = *point;
+    stays[i] = 1;
   });
-  std::vector<MeasuredPoint> result;
-  for (const auto& part : by_camera) result.insert(result.end(), part.begin(), part.end());
-  return result;
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (stays[i] != 0) points[kept++] = points[i];
+  }
+  points.resize(kept);
+  return points;
 }
 
 }  // namespace pencilscan

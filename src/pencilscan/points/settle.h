@@ -25,7 +25,7 @@ struct SettleOptions {
 /// not follow. The order is kept. `surfaces`: of each camera, from match_guided() or
 /// local_surfaces().
 [[nodiscard]] std::vector<MeasuredPoint> settle_points(const Rig& rig,
-                                                       std::span<const MeasuredPoint> points,
+                                                       std::vector<MeasuredPoint> points,
                                                        std::span<const LocalSurface> surfaces,
                                                        const SettleOptions& options = {});
 

@@ -4,9 +4,9 @@
 #include <cmath>
 #include <cstdint>
 #include <tuple>
-#include <utility>
 
 #include "pencilscan/core/parallel.h"
+#include "pencilscan/points/pixel_lattice.h"
 #include "pencilscan/rig/object_space.h"
 #include "pencilscan/uncertainty/error_model.h"
 
@@ -49,6 +49,7 @@ void add_run(const Rig& rig, const GridGraph& graph, const LabeledRun& run,
   const double coordinate = pattern.position_px(label.plane);
   for (int i = run.begin; i < run.end; ++i) {
     const CurvePoint& p = curve.points[static_cast<std::size_t>(i)];
+    if (!is_on_lattice(p.position.x(), p.position.y(), options.used_of_seven)) continue;
     const Vec2 pixel = p.position.cast<double>();
     const Vec3 direction = camera.normalized_from_pixel(pixel).homogeneous();
     const RayInProjector ray(projector_from_camera, projector, direction.head<2>());
@@ -82,36 +83,67 @@ void add_run(const Rig& rig, const GridGraph& graph, const LabeledRun& run,
   }
 }
 
-/// Of one camera's points.
-void keep_one_per_pixel(std::vector<MeasuredPoint>& points) {
+bool is_line_before(const LabeledRun& a, const LabeledRun& b) {
+  const CurveLabel& x = a.label;
+  const CurveLabel& y = b.label;
+  return std::tie(x.pattern.projector, x.pattern.pattern, x.line) <
+         std::tie(y.pattern.projector, y.pattern.pattern, y.line);
+}
+
+/// Puts the points of one line in the order of its pixels, the most certain one of each.
+class OnePerPixel {
+ public:
+  /// `points` from `first` on are of one line.
+  void operator()(std::size_t first, std::vector<MeasuredPoint>& points) {
+    const auto bits = [](float pixel) {
+      constexpr float kMargin = 1024;  // curves may leave the image a little
+      return static_cast<std::uint32_t>(std::clamp(pixel + kMargin + 0.5F, 0.F, 65535.F));
+    };
+    line_.assign(points.begin() + static_cast<std::ptrdiff_t>(first), points.end());
+    places_.clear();
+    for (std::uint32_t i = 0; i < line_.size(); ++i)
+      places_.push_back({bits(line_[i].v) << 16 | bits(line_[i].u), i});
+    std::sort(places_.begin(), places_.end(), [&](const Place& a, const Place& b) {
+      if (a.pixel != b.pixel) return a.pixel < b.pixel;
+      const MeasuredPoint& p = line_[a.point];
+      const MeasuredPoint& q = line_[b.point];
+      return std::tie(p.sigma, p.u, p.v) < std::tie(q.sigma, q.u, q.v);
+    });
+    points.resize(first);
+    for (std::size_t i = 0; i < places_.size(); ++i) {
+      if (i == 0 || places_[i].pixel != places_[i - 1].pixel)
+        points.push_back(line_[places_[i].point]);
+    }
+  }
+
+ private:
   struct Place {
-    std::uint64_t key;  ///< projector, pattern, line, row, column
+    std::uint32_t pixel;  ///< row, column
     std::uint32_t point;
   };
-  const auto bits = [](float pixel) {
-    constexpr float kMargin = 1024;  // curves may leave the image a little
-    return static_cast<std::uint64_t>(std::clamp(pixel + kMargin + 0.5F, 0.F, 65535.F));
-  };
-  std::vector<Place> places;
-  places.reserve(points.size());
-  for (std::uint32_t i = 0; i < points.size(); ++i) {
-    const MeasuredPoint& p = points[i];
-    const std::uint64_t line =
-        std::uint64_t{p.projector} << 24 | std::uint64_t{p.pattern} << 16 | std::uint64_t{p.line};
-    places.push_back({line << 32 | bits(p.v) << 16 | bits(p.u), i});
+  std::vector<MeasuredPoint> line_;
+  std::vector<Place> places_;
+};
+
+/// Of one camera.
+std::vector<MeasuredPoint> triangulate_graph(const Rig& rig, const GridGraph& graph,
+                                             std::vector<LabeledRun> runs, const ObjectSpace& space,
+                                             const TriangulationOptions& options) {
+  std::stable_sort(runs.begin(), runs.end(), is_line_before);
+  // New pages cost more than what is done with them: no vector grows by copies.
+  std::size_t most = 0;
+  for (const LabeledRun& run : runs) most += static_cast<std::size_t>(run.end - run.begin);
+  std::vector<MeasuredPoint> points;
+  points.reserve(most);
+  OnePerPixel leave_one_per_pixel;
+  std::size_t first = 0;
+  for (std::size_t k = 0; k < runs.size(); ++k) {
+    add_run(rig, graph, runs[k], space, options, points);
+    if (k + 1 < runs.size() && !is_line_before(runs[k], runs[k + 1])) continue;
+    leave_one_per_pixel(first, points);
+    first = points.size();
   }
-  std::sort(places.begin(), places.end(), [&](const Place& a, const Place& b) {
-    if (a.key != b.key) return a.key < b.key;
-    const MeasuredPoint& p = points[a.point];
-    const MeasuredPoint& q = points[b.point];
-    return std::tie(p.sigma, p.u, p.v) < std::tie(q.sigma, q.u, q.v);
-  });
-  std::vector<MeasuredPoint> kept;
-  kept.reserve(points.size());
-  for (std::size_t i = 0; i < places.size(); ++i) {
-    if (i == 0 || places[i].key != places[i - 1].key) kept.push_back(points[places[i].point]);
-  }
-  points = std::move(kept);
+  return points;
 }
 
 }  // namespace
@@ -123,12 +155,13 @@ std::vector<MeasuredPoint> triangulate(const Rig& rig, std::span<const GridGraph
   const ObjectSpace space = options.keeps_floor ? of_object.with_floor() : of_object;
   std::vector<std::vector<MeasuredPoint>> per_camera(graphs.size());
   parallel_for(graphs.size(), [&](std::size_t g) {
-    for (const LabeledRun& run : labeling.runs[static_cast<std::size_t>(graphs[g].camera)]) {
-      add_run(rig, graphs[g], run, space, options, per_camera[g]);
-    }
-    keep_one_per_pixel(per_camera[g]);
+    per_camera[g] = triangulate_graph(
+        rig, graphs[g], labeling.runs[static_cast<std::size_t>(graphs[g].camera)], space, options);
   });
+  std::size_t count = 0;
+  for (const auto& part : per_camera) count += part.size();
   std::vector<MeasuredPoint> points;
+  points.reserve(count);
   for (const auto& part : per_camera) points.insert(points.end(), part.begin(), part.end());
   return points;
 }

@@ -19,12 +19,14 @@ struct TriangulationOptions {
   double end_sigma_px = 0.5;        ///< more at the end of a curve, where its profile is cut ...
   double end_reach = 4;             ///< ... fading over so many points
   double footprint_sigma_px = 0.1;  ///< of the surface within a pixel, in pixel footprints
+  int used_of_seven = 7;  ///< pixels of seven whose points are wanted (points/pixel_lattice.h)
 };
 
 /// Intersects camera ray and light sheet for every pixel of every labelled curve. sigma adds the
 /// noise of the curve's position, the error of the projector and the footprint of a pixel; the
 /// slope of the line coordinate carries them along the ray. Of several points of one (camera,
-/// projector, pattern, line, pixel) only the most certain one is kept.
+/// projector, pattern, line, pixel) only the most certain one is kept. Ordered by graph, then by
+/// (projector, pattern, line, row, column).
 [[nodiscard]] std::vector<MeasuredPoint> triangulate(const Rig& rig,
                                                      std::span<const GridGraph> graphs,
                                                      const Labeling& labeling,
