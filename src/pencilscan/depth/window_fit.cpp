@@ -6,19 +6,12 @@
 #include <cmath>
 #include <numbers>
 
-#include "pencilscan/depth/gram.h"
+#include "pencilscan/core/lanes.h"
 
 namespace pencilscan {
 namespace {
 
 constexpr float kLeastSpacingPx = 2.5F;  // closer lines are blurred away
-
-/// Integral of the triweight kernel from -1, u clamped.
-template <typename Array>
-auto bell_integral(const Array& u) {
-  const auto u2 = u * u;
-  return 0.5F + (35.F / 32) * u * (1.F + u2 * (-1.F + u2 * (0.6F - u2 * (1.F / 7))));
-}
 
 constexpr float kLeastShare = 0.15F;  // of the largest amplitude, to be called lit
 
@@ -34,110 +27,106 @@ constexpr float kLeastLight = 0.6F;   // share of the predicted light that a sid
 constexpr float kLeastEnergy = 40.F;  // ... where that would be beyond noise
 constexpr float kMiddle2 = 0.2F;      // squared radius of the middle, in radii
 
-using Dense = Eigen::MatrixXd;
-using DenseVector = Eigen::VectorXd;
+constexpr double kTiltPrecision = 11;  // of the prior on the slope of albedo: 0.3 over the window
+constexpr double kBow = 6;  // footprints over the window's half, of the prior on curvature
+constexpr double kRidge = 1e-6;
+constexpr double kLongestStep = 0.15;  // lines, within which the profile is well linear
+constexpr double kAtRest = 2e-3;       // lines
+constexpr float kLeastAmplitude = 0.003F;
 
 }  // namespace
 
-WindowFitter::WindowFitter(const CameraLight& light, int half) : light_(&light), half_(half) {
-  const double radius2 = (half + 0.5) * (half + 0.5);
-  for (int dv = -half; dv <= half; ++dv) {
-    for (int du = -half; du <= half; ++du) {
-      if (du * du + dv * dv > radius2) continue;
-      du_.push_back(du);
-      dv_.push_back(dv);
+WindowFitter::WindowFitter(const CameraLight& light, int half) : light_(&light), grid_(half) {
+  const std::size_t padded = grid_.padded;
+  const float* x = grid_.monomial(1);
+  const float* y = grid_.monomial(2);
+  parts_.assign((kSides + 1) * padded, 0.F);
+  for (std::size_t part = 0; part <= kSides; ++part) {
+    const double angle = 2 * std::numbers::pi * static_cast<double>(part) / kSides;
+    const auto cosine = static_cast<float>(std::cos(angle));
+    const auto sine = static_cast<float>(std::sin(angle));
+    for (std::size_t i = 0; i < static_cast<std::size_t>(grid_.count); ++i) {
+      const bool is_in = part == kSides ? x[i] * x[i] + y[i] * y[i] < kMiddle2
+                                        : x[i] * cosine + y[i] * sine > kSideStart;
+      parts_[part * padded + i] = is_in ? 1.F : 0.F;
     }
   }
-  count_ = static_cast<int>(du_.size());
-  padded_ = (count_ + 7) / 8 * 8;
-  x_ = y_ = taper_ = Column::Zero(padded_);
-  for (int i = 0; i < count_; ++i) {
-    const auto k = static_cast<std::size_t>(i);
-    x_[i] = static_cast<float>(du_[k]) / static_cast<float>(half);
-    y_[i] = static_cast<float>(dv_[k]) / static_cast<float>(half);
-    // Pixels far from the centre say less about it: the quadric holds less well there.
-    taper_[i] = 1.F - 0.5F * (x_[i] * x_[i] + y_[i] * y_[i]);
+  valid_.assign(padded, 0.F);
+  w_ = scratch_ = valid_;
+  const std::size_t patterns = light.patterns.size();
+  seen_.resize(light.families.size());
+  for (Seen& seen : seen_) {
+    seen.image = seen.weight = seen.root = valid_;
+    seen.light.profile.resize(patterns);
+    seen.light.slope.resize(patterns);
+    seen.light.amplitude.resize(patterns);
   }
-  taper_ = taper_.max(0.F);
-  xx_ = x_ * x_;
-  xy_ = x_ * y_;
-  yy_ = y_ * y_;
-  const auto zero_or_one = [](const auto& condition) -> Column {
-    return condition.template cast<float>();
-  };
-  middle_ = zero_or_one(xx_ + yy_ < kMiddle2);
-  for (std::size_t k = 0; k < beyond_.size(); ++k) {
-    const double angle =
-        2 * std::numbers::pi * static_cast<double>(k) / static_cast<double>(beyond_.size());
-    beyond_[k] = zero_or_one(x_ * static_cast<float>(std::cos(angle)) +
-                                 y_ * static_cast<float>(std::sin(angle)) >
-                             kSideStart);
-  }
-  const std::size_t families = light.families.size();
-  image_.assign(families, Column::Zero(padded_));
-  weight_ = root_ = image_;
-  weight_sum_.assign(families, 0.F);
-  sampled_share_.assign(families, 1.F);
-  offset_.assign(families, 0.F);
-  ex_ = ey_ = inverse_variance_ = mean_ = variance_ = offset_;
-  profile_.assign(light.patterns.size(), Column::Zero(padded_));
+  profile_.assign(patterns, valid_);
   slope_ = profile_;
-  J_.resize(padded_, 6 + static_cast<Eigen::Index>(light.patterns.size()) + 4);
+  columns_.values.resize((patterns + 6) * padded);
+  surface_sums_.of_amplitudes.resize(8 * patterns);
+  gram_.resize((patterns + 4) * (patterns + 4));
 }
 
 bool WindowFitter::gather(int u, int v) {
   const cv::Mat& first = light_->families.front();
-  if (u < half_ || v < half_ || u + half_ >= first.cols || v + half_ >= first.rows) return false;
-  int used = 0;
-  thread_local Column valid, weight;
-  valid = taper_;
-  for (int i = 0; i < count_; ++i) {
-    const auto k = static_cast<std::size_t>(i);
-    if (light_->valid.at<std::uint8_t>(v + dv_[k], u + du_[k]) == 0) {
-      valid[i] = 0;
-    } else {
-      ++used;
-    }
-  }
-  if (used * 2 < count_) return false;
-  for (std::size_t f = 0; f < image_.size(); ++f) {
-    weight = valid;
-    sampled_share_[f] = 1;
-    if (!light_->sampled[f].empty()) {
-      int without = 0;
-      for (int i = 0; i < count_; ++i) {
-        const auto k = static_cast<std::size_t>(i);
-        if (light_->sampled[f].at<std::uint8_t>(v + dv_[k], u + du_[k]) != 0) continue;
-        weight[i] = 0;
+  const int half = grid_.half;
+  if (u < half || v < half || u + half >= first.cols || v + half >= first.rows) return false;
+  // take(index in the grid, pointers to the row's pixels in the images)
+  const auto for_rows = [&](auto take) {
+    for (const WindowGrid::Row& row : grid_.rows)
+      take(static_cast<std::size_t>(row.first), v + row.dv, u + row.least_du,
+           static_cast<std::size_t>(row.pixels));
+  };
+  /// Weight 0 where the mask is; how often it is.
+  const auto leave_out = [&](const cv::Mat& mask, std::vector<float>& weight) {
+    int without = 0;
+    for_rows([&](std::size_t at, int image_row, int column, std::size_t pixels) {
+      const std::uint8_t* values = mask.ptr<std::uint8_t>(image_row) + column;
+      for (std::size_t i = 0; i < pixels; ++i) {
+        if (values[i] != 0) continue;
+        weight[at + i] = 0;
         ++without;
       }
-      sampled_share_[f] = 1 - static_cast<float>(without) / static_cast<float>(count_);
+    });
+    return without;
+  };
+  std::copy(grid_.taper.begin(), grid_.taper.end(), valid_.begin());
+  if (2 * leave_out(light_->valid, valid_) > grid_.count) return false;
+  for (std::size_t f = 0; f < seen_.size(); ++f) {
+    Seen& seen = seen_[f];
+    std::copy(valid_.begin(), valid_.end(), seen.weight.begin());
+    seen.sampled_share = 1;
+    if (!light_->sampled[f].empty()) {
+      const int without = leave_out(light_->sampled[f], seen.weight);
+      seen.sampled_share = 1 - static_cast<float>(without) / static_cast<float>(grid_.count);
     }
-    set_weight(f, weight);
-    for (int i = 0; i < count_; ++i) {
-      const auto k = static_cast<std::size_t>(i);
-      image_[f][i] = light_->families[f].at<float>(v + dv_[k], u + du_[k]);
-    }
-    mean_[f] = weight_sum_[f] > 0 ? (weight_[f] * image_[f]).sum() / weight_sum_[f] : 0.F;
-    inverse_variance_[f] = 1 / light_->noise[f].variance(mean_[f]);
+    set_weight(seen);
+    for_rows([&](std::size_t at, int image_row, int column, std::size_t pixels) {
+      const float* values = light_->families[f].ptr<float>(image_row) + column;
+      std::copy(values, values + pixels, seen.image.data() + at);
+    });
+    float sum = 0;
+    sum_parts(grid_, seen.image.data(), seen.weight.data(), 1, &sum);
+    seen.mean = seen.weight_sum > 0 ? sum / seen.weight_sum : 0.F;
+    seen.inverse_variance = 1 / light_->noise[f].variance(seen.mean);
   }
   return true;
 }
 
-void WindowFitter::set_weight(std::size_t family, const Column& weight) {
-  weight_[family] = weight;
-  root_[family] = weight.sqrt();
-  weight_sum_[family] = weight.sum();
+void WindowFitter::set_weight(Seen& seen) {
+  for (std::size_t i = 0; i < grid_.padded; ++i) seen.root[i] = std::sqrt(seen.weight[i]);
+  sum_parts(grid_, seen.weight.data(), grid_.monomial(0), 1, &seen.weight_sum);
 }
 
 void WindowFitter::choose_patterns(const Vec2& m, const Eigen::Matrix2d& jacobian,
                                    const Quadric& q) {
   lit_.clear();
   const auto w = static_cast<float>(q[0]);
-  const auto wx = static_cast<float>(q[1] / half_);
-  const auto wy = static_cast<float>(q[2] / half_);
+  const auto wx = static_cast<float>(q[1] / grid_.half);
+  const auto wy = static_cast<float>(q[2] / grid_.half);
   // w = omega . (x, y, 1) over normalised pixels: the normal towards the camera is -omega.
-  const Vec2 slope = jacobian.transpose().inverse() * Vec2(q[1], q[2]) / half_;
+  const Vec2 slope = jacobian.transpose().inverse() * Vec2(q[1], q[2]) / grid_.half;
   const Vec3 normal = -Vec3(slope[0], slope[1], q[0] - slope.dot(m)).normalized();
   const Vec3 x = m.homogeneous() / q[0];
   for (std::size_t k = 0; k < light_->patterns.size(); ++k) {
@@ -159,230 +148,234 @@ void WindowFitter::choose_patterns(const Vec2& m, const Eigen::Matrix2d& jacobia
 
 void WindowFitter::render(const Quadric& q) {
   const Eigen::Matrix<float, 6, 1> p = q.cast<float>();
-  w_ = p[0] + p[1] * x_ + p[2] * y_ + p[3] * xx_ + p[4] * xy_ + p[5] * yy_;
-  const auto scale = static_cast<float>(half_);
-  thread_local Column line, inverse, a, u1, u2, u3;
+  for (std::size_t i = 0; i < grid_.padded; ++i) {
+    w_[i] = p[0];
+    for (int k = 1; k < 6; ++k) w_[i] += p[k] * grid_.monomial(k)[i];
+  }
+  const auto scale = static_cast<float>(grid_.half);
   for (std::size_t k = 0; k < lit_.size(); ++k) {
     if (!lit_[k].on) continue;
     const Eigen::Vector4f& n = lit_[k].lines.n;
     const Eigen::Vector4f& d = lit_[k].lines.d;
-    const float h = light_->patterns[static_cast<std::size_t>(lit_[k].pattern)].half_width();
-    const float r = lit_[k].inverse_reach;
-    inverse = 1.F / (d[0] + scale * d[1] * x_ + scale * d[2] * y_ + d[3] * w_);
-    line = (n[0] + scale * n[1] * x_ + scale * n[2] * y_ + n[3] * w_) * inverse;
-    // Distance to the nearest line; adding and subtracting 1.5 * 2^23 rounds a float.
-    constexpr float kRound = 12582912.F;
-    a = line - ((line + kRound) - kRound);
-    u1 = ((a.abs() + h) * r).min(1.F);
-    u2 = ((a.abs() - h) * r).max(-1.F).min(1.F);
-    u3 = ((1.F - a.abs() - h) * r).max(-1.F).min(1.F);
-    // This line and the next one on the nearer side.
-    profile_[k] = bell_integral(u1) - bell_integral(u2) + 1.F - bell_integral(u3);
-    const auto bell = [](const Column& u) { return (1.F - u * u).cube(); };
-    const float kernel = 35.F / 32 * r;
-    slope_[k] = kernel * (bell(u1) - bell(u2) + bell(u3));
-    slope_[k] = (a < 0).select(-slope_[k], slope_[k]) * (n[3] - line * d[3]) * inverse;
+    const WindowLineShape shape{
+        {n[0], scale * n[1], scale * n[2], n[3]},
+        {d[0], scale * d[1], scale * d[2], d[3]},
+        light_->patterns[static_cast<std::size_t>(lit_[k].pattern)].half_width(),
+        lit_[k].inverse_reach};
+    render_lines(grid_, shape, w_.data(), profile_[k].data(), slope_[k].data());
   }
 }
 
-WindowFitter::Gram WindowFitter::gram_of(int columns) const {
-  Gram products(columns, columns);
-  gram(J_.data(), padded_, columns, products.data());
-  return products;
+void WindowFitter::collect(std::size_t family) {
+  FamilyLight& light = seen_[family].light;
+  light.patterns = 0;
+  for (std::size_t k = 0; k < lit_.size(); ++k) {
+    if (!lit_[k].on || lit_[k].family != static_cast<int>(family)) continue;
+    const auto at = static_cast<std::size_t>(light.patterns);
+    light.profile[at] = profile_[k].data();
+    light.slope[at] = slope_[k].data();
+    light.amplitude[at] = lit_[k].amplitude;
+    ++light.patterns;
+  }
 }
 
 void WindowFitter::solve_amplitudes() {
+  for (std::size_t f = 0; f < seen_.size(); ++f) solve_amplitudes(f);
+}
+
+void WindowFitter::solve_amplitudes(std::size_t family) {
+  Seen& seen = seen_[family];
+  seen.light.ex = seen.light.ey = 0;
+  seen.light.offset = 0;
   thread_local std::vector<std::size_t> mine;
-  for (std::size_t f = 0; f < image_.size(); ++f) {
-    ex_[f] = ey_[f] = 0;
-    while (true) {
-      mine.clear();
-      for (std::size_t k = 0; k < lit_.size(); ++k) {
-        if (lit_[k].on && lit_[k].family == static_cast<int>(f)) mine.push_back(k);
-      }
-      const auto n = static_cast<int>(mine.size() + 1);
-      for (int i = 0; i + 1 < n; ++i)
-        J_.col(i) = (root_[f] * profile_[mine[static_cast<std::size_t>(i)]]).matrix();
-      J_.col(n - 1) = root_[f].matrix();
-      J_.col(n) = (root_[f] * image_[f]).matrix();
-      const Gram products = gram_of(n + 1);
-      Dense A = products.topLeftCorner(n, n).cast<double>();
-      const DenseVector b = products.col(n).head(n).cast<double>();
-      for (Eigen::Index i = 0; i < n; ++i) A(i, i) += 1e-4 * A(i, i) + 1e-9;
-      const DenseVector c = A.llt().solve(b);
-      offset_[f] = static_cast<float>(c[n - 1]);
-      Eigen::Index worst = -1;
-      for (Eigen::Index i = 0; i + 1 < n; ++i) {
-        lit_[mine[static_cast<std::size_t>(i)]].amplitude = static_cast<float>(c[i]);
-        if (c[i] < 0.005 && (worst < 0 || c[i] < c[worst])) worst = i;
-      }
-      if (worst < 0) break;
-      lit_[mine[static_cast<std::size_t>(worst)]].on = false;
+  thread_local std::vector<int> columns;  // those of `mine`, then of the offset
+  mine.clear();
+  columns.clear();
+  for (std::size_t k = 0; k < lit_.size(); ++k) {
+    lit_[k].amplitude = lit_[k].family == static_cast<int>(family) ? 0.F : lit_[k].amplitude;
+    if (lit_[k].on && lit_[k].family == static_cast<int>(family)) mine.push_back(k);
+  }
+  // Without light, the residual is the image.
+  collect(family);
+  make_columns(grid_, seen.light, seen.image.data(), seen.root.data(), 1, columns_);
+  const int all = static_cast<int>(mine.size()) + 4;
+  const int image = all - 1;
+  gram(columns_.values.data(), static_cast<int>(grid_.padded), all, gram_.data());
+  for (int k = 0; k <= static_cast<int>(mine.size()); ++k) columns.push_back(k);
+  using Dense = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic>;
+  thread_local Dense A;
+  thread_local Eigen::VectorXd amplitudes;
+  while (true) {
+    const auto n = static_cast<Eigen::Index>(columns.size());
+    A.resize(n, n);
+    amplitudes.resize(n);
+    const auto product = [&](Eigen::Index i, int j) {
+      return static_cast<double>(
+          gram_[static_cast<std::size_t>(columns[static_cast<std::size_t>(i)] * all + j)]);
+    };
+    for (Eigen::Index i = 0; i < n; ++i) {
+      for (Eigen::Index j = 0; j < n; ++j)
+        A(i, j) = product(i, columns[static_cast<std::size_t>(j)]);
+      amplitudes[i] = product(i, image);
+      A(i, i) += 1e-4 * A(i, i) + 1e-9;
     }
+    A.llt().solveInPlace(amplitudes);
+    seen.light.offset = static_cast<float>(amplitudes[n - 1]);
+    Eigen::Index worst = -1;
+    for (Eigen::Index i = 0; i + 1 < n; ++i) {
+      lit_[mine[static_cast<std::size_t>(i)]].amplitude = static_cast<float>(amplitudes[i]);
+      if (amplitudes[i] < 0.005 && (worst < 0 || amplitudes[i] < amplitudes[worst])) worst = i;
+    }
+    if (worst < 0) break;
+    lit_[mine[static_cast<std::size_t>(worst)]].on = false;
+    mine.erase(mine.begin() + worst);
+    columns.erase(columns.begin() + worst);
   }
 }
 
-double WindowFitter::step(Quadric& q, bool last, WindowFit& fit) {
-  int unknowns = 6;
-  std::vector<int> first(image_.size());
-  for (std::size_t f = 0; f < image_.size(); ++f) {
-    first[f] = unknowns;
-    unknowns += 3;
-    for (const Lit& lit : lit_) unknowns += lit.on && lit.family == static_cast<int>(f) ? 1 : 0;
+void WindowFitter::add_family(std::size_t family, float unit) {
+  Seen& seen = seen_[family];
+  const int patterns = seen.light.patterns;
+  const int residual = FamilyColumns::residual(patterns);
+  const int all = residual + 1;
+  make_columns(grid_, seen.light, seen.image.data(), seen.root.data(), unit, columns_);
+  gram(columns_.values.data(), static_cast<int>(grid_.padded), all, gram_.data());
+  const auto iv = static_cast<double>(seen.inverse_variance);
+  const auto product = [&](int i, int j) {
+    return static_cast<double>(gram_[static_cast<std::size_t>(i * all + j)]);
+  };
+  const double rss = product(residual, residual);
+  seen.variance = static_cast<float>(rss) / std::max(seen.weight_sum, 1e-6F);
+  chi2_ += rss * iv;
+  degrees_ += static_cast<double>(seen.weight_sum);
+  if (patterns == 0) return;  // no line of this family: it says nothing of depth
+  sum_surface(grid_, patterns, columns_, surface_sums_);
+  const SurfaceSums& sums = surface_sums_;
+  // Of the products of two of the monomials 1, x, y, xx, xy, yy: their place among all.
+  constexpr int kProduct[6][6] = {{0, 1, 2, 3, 4, 5},    {1, 3, 4, 6, 7, 8},
+                                  {2, 4, 5, 7, 8, 9},    {3, 6, 7, 10, 11, 12},
+                                  {4, 7, 8, 11, 12, 13}, {5, 8, 9, 12, 13, 14}};
+  WindowEquations::Family& equations = equations_.family(family);
+  WindowEquations::resize(patterns + 3, equations);
+  for (int i = 0; i < 6; ++i) {
+    for (int j = 0; j < 6; ++j)
+      equations_.surface[i][j] += iv * static_cast<double>(sums.of_depth[kProduct[i][j]]);
+    equations_.surface[i][6] += iv * static_cast<double>(sums.of_residual[i]);
   }
-  Dense H = Dense::Zero(unknowns, unknowns);
-  DenseVector g = DenseVector::Zero(unknowns);
-  double chi2 = 0;
-  double degrees = 0;
-  thread_local Column envelope, sum, geometry, residual;
+  for (int i = 0; i < patterns + 3; ++i) {
+    for (int j = 0; j <= i; ++j) equations.a(i, j) = iv * product(i, j);
+    WindowEquations::Row& row = equations.B[static_cast<std::size_t>(i)];
+    row = WindowEquations::Row{};
+    for (int c = 0; c < 6; ++c) {
+      // e_x and e_y: the products with x and y times the summed light.
+      const float value = i < patterns    ? sums.of_amplitudes[static_cast<std::size_t>(i * 8 + c)]
+                          : i == patterns ? sums.of_offset[c]
+                                          : sums.of_slopes[kProduct[i - patterns][c] - 1];
+      row[c] = iv * static_cast<double>(value);
+    }
+    row[6] = iv * product(i, residual);
+  }
+  for (int i = patterns + 1; i < patterns + 3; ++i) {
+    const float e = i == patterns + 1 ? seen.light.ex : seen.light.ey;
+    equations.a(i, i) += kTiltPrecision;
+    equations.B[static_cast<std::size_t>(i)][6] -= kTiltPrecision * static_cast<double>(e);
+  }
+}
+
+bool WindowFitter::evaluate(const Quadric& q) {
+  equations_.reset(seen_.size());
+  chi2_ = degrees_ = 0;
   // Inverse depth in units of the present one: unknowns of like size.
   const auto unit = static_cast<float>(q[0]);
-  for (std::size_t f = 0; f < image_.size(); ++f) {
-    envelope = 1.F + ex_[f] * x_ + ey_[f] * y_;
-    sum = geometry = Column::Zero(padded_);
-    int columns = 6;
-    for (std::size_t k = 0; k < lit_.size(); ++k) {
-      if (!lit_[k].on || lit_[k].family != static_cast<int>(f)) continue;
-      sum += lit_[k].amplitude * profile_[k];
-      geometry += lit_[k].amplitude * slope_[k];
-      J_.col(columns++) = (root_[f] * envelope * profile_[k]).matrix();
-    }
-    residual = root_[f] * (image_[f] - offset_[f] - envelope * sum);
-    J_.col(columns++) = root_[f].matrix();
-    J_.col(columns++) = (root_[f] * x_ * sum).matrix();
-    J_.col(columns++) = (root_[f] * y_ * sum).matrix();
-    const double rss = static_cast<double>(residual.square().sum());
-    variance_[f] = static_cast<float>(rss) / std::max(weight_sum_[f], 1e-6F);
-    chi2 += rss * static_cast<double>(inverse_variance_[f]);
-    degrees += static_cast<double>(weight_sum_[f]);
-    if (columns == 9) {  // no line of this family: it says nothing of depth, only the offset
-      for (int i = 0; i < 3; ++i) H(first[f] + i, first[f] + i) = 1;
-      continue;
-    }
-    geometry *= root_[f] * envelope * unit;
-    J_.col(0) = geometry.matrix();
-    J_.col(1) = (geometry * x_).matrix();
-    J_.col(2) = (geometry * y_).matrix();
-    J_.col(3) = (geometry * xx_).matrix();
-    J_.col(4) = (geometry * xy_).matrix();
-    J_.col(5) = (geometry * yy_).matrix();
-    J_.col(columns) = residual.matrix();
-    const Gram local = gram_of(columns + 1);
-    const auto iv = static_cast<double>(inverse_variance_[f]);
-    const auto place = [&](int c) { return c < 6 ? c : first[f] + c - 6; };
-    for (int i = 0; i < columns; ++i) {
-      g[place(i)] += iv * static_cast<double>(local(i, columns));
-      for (int j = 0; j < columns; ++j)
-        H(place(i), place(j)) += iv * static_cast<double>(local(i, j));
-    }
-    // A weak prior on the slope of albedo: 0.3 over the window.
-    for (int c = columns - 2; c < columns; ++c) {
-      const double e = static_cast<double>(c == columns - 2 ? ex_[f] : ey_[f]);
-      H(place(c), place(c)) += 11;
-      g[place(c)] -= 11 * e;
+  for (std::size_t f = 0; f < seen_.size(); ++f) {
+    collect(f);
+    add_family(f, unit);
+    int next = 0;
+    for (Lit& lit : lit_) {
+      if (lit.on && lit.family == static_cast<int>(f)) lit.unknown = next++;
     }
   }
-  // Weak prior on curvature: a bow of so many footprints over the window's half.
-  constexpr double kBow = 6;
   const double bow = kBow * q[0];
   for (int c = 3; c < 6; ++c) {
-    H(c, c) += 1 / (bow * bow);
-    g[c] -= q[c] / q[0] / (bow * bow);
+    equations_.surface[c][c] += 1 / (bow * bow);
+    equations_.surface[c][6] -= q[c] / q[0] / (bow * bow);
   }
-  for (int i = 0; i < unknowns; ++i) H(i, i) *= 1 + 1e-6;
-  const Eigen::LLT<Dense> solver(H);
-  if (solver.info() != Eigen::Success) return 1e9;
-  if (last) {
-    fit.misfit = static_cast<float>(chi2 / degrees);
-    const double inflate = std::max(1.0, chi2 / degrees);
-    // Of the inverse, what is read: the depth's column, and an element for each line.
-    std::vector<int> next = first;
-    std::vector<int> unknown_of_lit;
-    for (const Lit& lit : lit_) {
-      if (lit.on) unknown_of_lit.push_back(next[static_cast<std::size_t>(lit.family)]++);
-    }
-    Dense columns = Dense::Zero(unknowns, 1 + static_cast<Eigen::Index>(unknown_of_lit.size()));
-    columns(0, 0) = 1;
-    for (std::size_t k = 0; k < unknown_of_lit.size(); ++k)
-      columns(unknown_of_lit[k], 1 + static_cast<Eigen::Index>(k)) = 1;
-    solver.solveInPlace(columns);
-    fit.variance = columns(0, 0) * inflate * q[0] * q[0];
-    Eigen::Index k = 0;
-    for (Lit& lit : lit_) {
-      if (!lit.on) continue;
-      const int at = unknown_of_lit[static_cast<std::size_t>(k)];
-      lit.amplitude_variance = static_cast<float>(inflate * columns(at, ++k));
-    }
-    return 0;
-  }
-  const DenseVector delta = solver.solve(g);
-  if (!delta.allFinite()) return 1e9;
-  // No step beyond a fraction of a line, within which the profile is well linear.
+  return equations_.eliminate(kRidge);
+}
+
+double WindowFitter::step(Quadric& q) {
+  const WindowEquations::Surface delta = equations_.solve_surface();
   double most = 0;
   for (const Lit& lit : lit_) {
     if (!lit.on) continue;
-    most = std::max(most, std::abs(delta[0] * q[0] * static_cast<double>(lit.lines.slope(unit))));
+    const auto slope = static_cast<double>(lit.lines.slope(static_cast<float>(q[0])));
+    most = std::max(most, std::abs(delta[0] * q[0] * slope));
   }
-  const double limit = most > 0.15 ? 0.15 / most : 1.0;
+  const double limit = most > kLongestStep ? kLongestStep / most : 1.0;
   const double scale = limit * q[0];
-  for (int c = 0; c < 6; ++c) q[c] += scale * delta[c];
-  std::vector<int> next = first;
-  for (Lit& lit : lit_) {
-    if (!lit.on) continue;
-    lit.amplitude +=
-        static_cast<float>(limit * delta[next[static_cast<std::size_t>(lit.family)]++]);
-    if (lit.amplitude < 0.003F) lit.on = false;
-  }
-  for (std::size_t f = 0; f < image_.size(); ++f) {
-    offset_[f] += static_cast<float>(limit * delta[next[f]]);
-    ex_[f] += static_cast<float>(limit * delta[next[f] + 1]);
-    ey_[f] += static_cast<float>(limit * delta[next[f] + 2]);
-    ex_[f] = std::clamp(ex_[f], -0.8F, 0.8F);
-    ey_[f] = std::clamp(ey_[f], -0.8F, 0.8F);
+  q += scale * delta;
+  thread_local std::vector<double> change;
+  for (std::size_t f = 0; f < seen_.size(); ++f) {
+    FamilyLight& light = seen_[f].light;
+    if (light.patterns == 0) continue;
+    equations_.solve_light(f, delta, change);
+    const auto moved = [&](int unknown) {
+      return static_cast<float>(limit * change[static_cast<std::size_t>(unknown)]);
+    };
+    for (Lit& lit : lit_) {
+      if (!lit.on || lit.family != static_cast<int>(f)) continue;
+      lit.amplitude += moved(lit.unknown);
+      if (lit.amplitude < kLeastAmplitude) lit.on = false;
+    }
+    light.offset += moved(light.patterns);
+    light.ex = std::clamp(light.ex + moved(light.patterns + 1), -0.8F, 0.8F);
+    light.ey = std::clamp(light.ey + moved(light.patterns + 2), -0.8F, 0.8F);
   }
   return most;
 }
 
-bool WindowFitter::iterate(Quadric& q, int rounds, WindowFit& fit) {
+bool WindowFitter::iterate(Quadric& q, int rounds) {
   for (int round = 0; round < rounds; ++round) {
-    const double moved = step(q, false, fit);
-    if (!(moved < 1e6) || !(q[0] > 0)) return false;
+    if (!evaluate(q)) return false;
+    const double moved = step(q);
+    if (!(moved < 1e6) || !q.allFinite() || !(q[0] > 0)) return false;
     if (std::none_of(lit_.begin(), lit_.end(), [](const Lit& l) { return l.on; })) return false;
+    // The equations before so small a step are those after it. But the slope of albedo starts at
+    // none.
+    if (moved < kAtRest && round > 0) return true;
     // The blur follows the slope of the surface.
     const auto w = static_cast<float>(q[0]);
-    const auto wx = static_cast<float>(q[1] / half_);
-    const auto wy = static_cast<float>(q[2] / half_);
+    const auto wx = static_cast<float>(q[1] / grid_.half);
+    const auto wy = static_cast<float>(q[2] / grid_.half);
     for (Lit& lit : lit_) {
       const float gradient = lit.lines.gradient(w, wx, wy).norm();
       lit.inverse_reach = 1 / std::clamp(3 * light_->blur_px * gradient, 0.02F, 2.F);
     }
     render(q);
-    if (moved < 2e-3) break;
   }
-  return true;
+  return evaluate(q);
 }
 
 void WindowFitter::compare_light() {
-  seen_ = predicted_ = Column::Zero(padded_);
-  thread_local Column light;
-  for (std::size_t f = 0; f < image_.size(); ++f) {
-    light = Column::Zero(padded_);
-    for (std::size_t k = 0; k < lit_.size(); ++k) {
-      if (lit_[k].on && lit_[k].family == static_cast<int>(f))
-        light += lit_[k].amplitude * profile_[k];
-    }
-    light *= 1.F + ex_[f] * x_ + ey_[f] * y_;
-    seen_ += inverse_variance_[f] * weight_[f] * light * (image_[f] - offset_[f]);
-    predicted_ += inverse_variance_[f] * weight_[f] * light.square();
+  std::fill(scratch_.begin(), scratch_.end(), 0.F);
+  std::fill(w_.begin(), w_.end(), 0.F);  // not needed any more
+  for (std::size_t f = 0; f < seen_.size(); ++f) {
+    const Seen& seen = seen_[f];
+    collect(f);
+    add_light(grid_, seen.light, seen.image.data(), seen.weight.data(), seen.inverse_variance,
+              scratch_.data(), w_.data());
   }
+  constexpr int kParts = kSides + 1;
+  sum_parts(grid_, scratch_.data(), parts_.data(), kParts, light_seen_.data());
+  sum_parts(grid_, w_.data(), parts_.data(), kParts, light_predicted_.data());
 }
 
 std::optional<std::size_t> WindowFitter::dark_side() const {
   std::optional<std::size_t> darkest;
   float least = kLeastLight;
-  for (std::size_t side = 0; side < beyond_.size(); ++side) {
-    const float energy = (beyond_[side] * predicted_).sum();
-    const float seen = (beyond_[side] * seen_).sum();
+  for (std::size_t side = 0; side < kSides; ++side) {
+    const float energy = light_predicted_[side];
+    const float seen = light_seen_[side];
     if (!(energy > kLeastEnergy && seen < least * energy)) continue;
     least = seen / energy;
     darkest = side;
@@ -391,8 +384,35 @@ std::optional<std::size_t> WindowFitter::dark_side() const {
 }
 
 bool WindowFitter::is_middle_dark() const {
-  const float energy = (middle_ * predicted_).sum();
-  return energy > kLeastEnergy && (middle_ * seen_).sum() < kLeastLight * energy;
+  const float energy = light_predicted_[kSides];
+  return energy > kLeastEnergy && light_seen_[kSides] < kLeastLight * energy;
+}
+
+std::optional<WindowFit> WindowFitter::finish(const Quadric& q, bool cut) {
+  WindowFit fit;
+  fit.q = q;
+  fit.cut = cut;
+  fit.misfit = static_cast<float>(chi2_ / degrees_);
+  const double inflate = std::max(1.0, chi2_ / degrees_);
+  fit.variance = equations_.surface_variance() * inflate * q[0] * q[0];
+  for (const Lit& lit : lit_) {
+    if (lit.on) fit.amplitude = std::max(fit.amplitude, lit.amplitude);
+  }
+  for (const Lit& lit : lit_) {
+    if (!lit.on || lit.amplitude < kLeastShare * fit.amplitude) continue;
+    const auto family = static_cast<std::size_t>(lit.family);
+    const double variance = inflate * equations_.light_variance(family, lit.unknown);
+    const float least = least_significance(seen_[family].sampled_share);
+    if (lit.amplitude < least * std::sqrt(static_cast<float>(variance))) continue;
+    fit.lit.set(static_cast<std::size_t>(lit.pattern));
+    fit.lines_per_w =
+        std::max(fit.lines_per_w, std::abs(lit.lines.slope(static_cast<float>(q[0]))));
+  }
+  if (fit.lit.none() || !(fit.variance > 0)) return std::nullopt;
+  float residual = 0;
+  for (const Seen& seen : seen_) residual = std::max(residual, seen.variance);
+  fit.relative_residual = std::sqrt(residual) / fit.amplitude;
+  return fit;
 }
 
 std::optional<WindowFit> WindowFitter::fit(const Vec2& pixel, const Quadric& start, int rounds) {
@@ -403,46 +423,29 @@ std::optional<WindowFit> WindowFitter::fit(const Vec2& pixel, const Quadric& sta
   const Vec2 m = light_->camera->normalized_from_pixel(pixel);
   const Eigen::Matrix2d jacobian = light_->camera->pixel_slope(m).inverse();
   Quadric q = start;
-  choose_patterns(m, jacobian, q);
-  if (lit_.empty()) return std::nullopt;
-  render(q);
-  solve_amplitudes();
-  WindowFit fit;
-  if (!iterate(q, rounds, fit)) return std::nullopt;
-  // Where the surface ends within the window, fit what is left of it.
-  compare_light();
-  if (const auto side = dark_side()) {
-    for (std::size_t f = 0; f < image_.size(); ++f)
-      set_weight(f, weight_[f] * (1.F - beyond_[*side]));
+  const auto fit_window = [&] {
     choose_patterns(m, jacobian, q);
-    if (lit_.empty()) return std::nullopt;
+    if (lit_.empty()) return false;
     render(q);
     solve_amplitudes();
-    if (!iterate(q, rounds, fit)) return std::nullopt;
+    if (!iterate(q, rounds)) return false;
     compare_light();
-    if (dark_side()) return std::nullopt;
-    fit.cut = true;
+    return true;
+  };
+  if (!fit_window()) return std::nullopt;
+  // Where the surface ends within the window, fit what is left of it.
+  const std::optional<std::size_t> side = dark_side();
+  if (side) {
+    const float* beyond = parts_.data() + *side * grid_.padded;
+    for (Seen& seen : seen_) {
+      for (std::size_t i = 0; i < grid_.padded; ++i) seen.weight[i] *= 1.F - beyond[i];
+      set_weight(seen);
+    }
+    if (!fit_window() || dark_side()) return std::nullopt;
   }
   // The centre itself must show the light that is predicted there.
   if (is_middle_dark()) return std::nullopt;
-  step(q, true, fit);
-  fit.q = q;
-  float residual = 0;
-  for (const Lit& lit : lit_) {
-    if (lit.on) fit.amplitude = std::max(fit.amplitude, lit.amplitude);
-  }
-  for (const Lit& lit : lit_) {
-    if (!lit.on || lit.amplitude < kLeastShare * fit.amplitude) continue;
-    const float least = least_significance(sampled_share_[static_cast<std::size_t>(lit.family)]);
-    if (lit.amplitude < least * std::sqrt(lit.amplitude_variance)) continue;
-    fit.lit.set(static_cast<std::size_t>(lit.pattern));
-    fit.lines_per_w =
-        std::max(fit.lines_per_w, std::abs(lit.lines.slope(static_cast<float>(q[0]))));
-  }
-  if (fit.lit.none() || !(fit.variance > 0)) return std::nullopt;
-  for (const float variance : variance_) residual = std::max(residual, variance);
-  fit.relative_residual = std::sqrt(residual) / fit.amplitude;
-  return fit;
+  return finish(q, side.has_value());
 }
 
 }  // namespace pencilscan

@@ -9,6 +9,8 @@
 
 #include "pencilscan/depth/depth_map.h"
 #include "pencilscan/depth/pattern_view.h"
+#include "pencilscan/depth/window_equations.h"
+#include "pencilscan/depth/window_sums.h"
 
 namespace pencilscan {
 
@@ -64,9 +66,9 @@ class WindowFitter {
   /// then.
   [[nodiscard]] std::optional<WindowFit> fit(const Vec2& pixel, const Quadric& start, int rounds);
   /// Mean image value and variance of the residuals of a family, of the last window that did fit.
-  [[nodiscard]] float family_mean(std::size_t family) const { return mean_[family]; }
-  [[nodiscard]] float family_variance(std::size_t family) const { return variance_[family]; }
-  [[nodiscard]] int half() const { return half_; }
+  [[nodiscard]] float family_mean(std::size_t family) const { return seen_[family].mean; }
+  [[nodiscard]] float family_variance(std::size_t family) const { return seen_[family].variance; }
+  [[nodiscard]] int half() const { return grid_.half; }
 
  private:
   struct Lit {
@@ -76,42 +78,56 @@ class WindowFitter {
     float inverse_reach = 0;  ///< 1 / reach of the bell, 1/lines
     float amplitude = 0;
     float amplitude_variance = 0;
+    int unknown = 0;  ///< of its family, in the last equations
     bool on = true;
   };
-  using Column = Eigen::ArrayXf;
-  using Gram = Eigen::MatrixXf;
+  /// What the window shows of a family; arrays of the grid's pixels.
+  struct Seen {
+    std::vector<float> image, weight, root;  ///< root: of the weight
+    float weight_sum = 0;
+    float sampled_share = 1;  ///< of the pixels, a mosaic's samples
+    float inverse_variance = 0;
+    float mean = 0;      ///< of the image
+    float variance = 0;  ///< of the residuals
+    FamilyLight light;
+  };
 
   [[nodiscard]] bool gather(int u, int v);
-  void set_weight(std::size_t family, const Column& weight);
+  void set_weight(Seen& seen);
   void choose_patterns(const Vec2& m, const Eigen::Matrix2d& jacobian, const Quadric& q);
   void render(const Quadric& q);
-  /// Products of the first columns of J_ with each other.
-  [[nodiscard]] Gram gram_of(int columns) const;
+  /// Lists the patterns of a family that are on.
+  void collect(std::size_t family);
   void solve_amplitudes();
-  double step(Quadric& q, bool last, WindowFit& fit);
-  [[nodiscard]] bool iterate(Quadric& q, int rounds, WindowFit& fit);
-  /// Light that the fit predicts at each pixel, and what is seen of it.
+  void solve_amplitudes(std::size_t family);
+  /// The equations of the next step, eliminated; false where they have no solution.
+  [[nodiscard]] bool evaluate(const Quadric& q);
+  void add_family(std::size_t family, float unit);
+  /// Goes where the equations lead; returns how far the lines move at most.
+  [[nodiscard]] double step(Quadric& q);
+  [[nodiscard]] bool iterate(Quadric& q, int rounds);
+  /// Light that the fit predicts at each pixel, and what is seen of it, over the parts.
   void compare_light();
-  /// The side that shows too little of the predicted light: of beyond_.
+  /// The side that shows too little of the predicted light.
   [[nodiscard]] std::optional<std::size_t> dark_side() const;
   [[nodiscard]] bool is_middle_dark() const;
+  [[nodiscard]] std::optional<WindowFit> finish(const Quadric& q, bool cut);
+
+  static constexpr std::size_t kSides = 8;
 
   const CameraLight* light_;
-  int half_;
-  int count_ = 0;   ///< pixels in the window
-  int padded_ = 0;  ///< rounded up to a multiple of eight; weight 0 beyond count_
-  std::vector<int> du_, dv_;
-  Column x_, y_, xx_, xy_, yy_, taper_, w_;
-  Column middle_;                              ///< 1 near the centre, 0 elsewhere
-  std::array<Column, 8> beyond_;               ///< 1 on one side of the centre, 0 elsewhere
-  Column seen_, predicted_;                    ///< weighted by what a pixel says
-  std::vector<Column> image_, weight_, root_;  ///< per family; root_: of the weight
-  std::vector<float> weight_sum_;              ///< per family
-  std::vector<float> sampled_share_;           ///< per family: of the pixels, a mosaic's samples
+  WindowGrid grid_;
+  std::vector<float> parts_;  ///< masks of the sides, then of the middle
+  std::vector<float> valid_, w_, scratch_;
+  std::vector<Seen> seen_;  ///< per family
   std::vector<Lit> lit_;
-  std::vector<Column> profile_, slope_;  ///< per lit: P, dP/dw
-  std::vector<float> offset_, ex_, ey_, inverse_variance_, mean_, variance_;
-  Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic> J_;
+  std::vector<std::vector<float>> profile_, slope_;  ///< per lit: P, dP/dw
+  FamilyColumns columns_;
+  SurfaceSums surface_sums_;
+  std::vector<float> gram_;
+  WindowEquations equations_;
+  double chi2_ = 0, degrees_ = 0;                                   ///< of the last equations
+  std::array<float, kSides + 1> light_seen_{}, light_predicted_{};  ///< per part
 };
 
 }  // namespace pencilscan

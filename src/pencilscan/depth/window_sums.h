@@ -1,0 +1,90 @@
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+namespace pencilscan {
+
+/// The pixels of a circular window, padded to a multiple of kLanes (lanes.h) with pixels that count
+/// nothing, and the monomials of their place x = dx / half, y = dy / half.
+struct WindowGrid {
+  /// half: radius, px, in [2, 10].
+  explicit WindowGrid(int half);
+
+  static constexpr int kMonomials = 15;  ///< of degree 0 to 4: 1, x, y, xx, xy, yy, xxx, ... yyyy
+
+  int half;
+  int count = 0;       ///< pixels
+  std::size_t padded;  ///< rounded up
+  /// A row of pixels: the first one's index, and their places from the middle.
+  struct Row {
+    int first, dv, least_du, pixels;
+  };
+  std::vector<Row> rows;
+  std::vector<float> monomials;  ///< kMonomials x padded
+  std::vector<float> taper;      ///< weight: pixels far from the middle say less about it
+
+  [[nodiscard]] const float* monomial(int k) const {
+    return monomials.data() + static_cast<std::size_t>(k) * padded;
+  }
+};
+
+/// Lines of one pattern over a window: their coordinate (pattern_view.h), with dx and dy in halves
+/// of the window, and their profile.
+struct WindowLineShape {
+  float n[4], d[4];
+  float half_width;     ///< lines
+  float inverse_reach;  ///< 1 / reach of the blur's bell, 1/lines
+};
+
+/// Profile P of the lines and its slope dP / dw at each pixel, w: inverse depth there.
+void render_lines(const WindowGrid& grid, const WindowLineShape& lines, const float* w,
+                  float* profile, float* slope);
+
+/// The light of one family over a window as window_fit.h defines it.
+struct FamilyLight {
+  int patterns = 0;
+  std::vector<const float*> profile, slope;  ///< per pattern, as rendered
+  std::vector<float> amplitude;              ///< per pattern
+  float offset = 0, ex = 0, ey = 0;
+};
+
+/// Columns of the Jacobian, weighted by the root of the pixels' weights: patterns' amplitudes,
+/// offset, e_x, e_y, then the residual, then of what the others are made: depth and summed light.
+struct FamilyColumns {
+  std::vector<float> values;  ///< (patterns + 6) x padded
+  [[nodiscard]] static int residual(int patterns) { return patterns + 3; }
+  [[nodiscard]] static int depth(int patterns) { return patterns + 4; }
+  [[nodiscard]] static int sum(int patterns) { return patterns + 5; }
+};
+
+/// `unit`: of inverse depth, in which the column of depth is.
+void make_columns(const WindowGrid& grid, const FamilyLight& light, const float* image,
+                  const float* root, float unit, FamilyColumns& columns);
+
+/// Products of columns with each other, J' J: both triangles. rows: a multiple of kLanes; result:
+/// columns x columns.
+void gram(const float* J, int rows, int columns, float* result);
+
+/// Products of the columns of the surface's six unknowns, which are the column of depth times the
+/// monomials up to degree 2, with each other and with all others: sums of few products of columns,
+/// times monomials.
+struct SurfaceSums {
+  float of_depth[16];                ///< depth x depth, the monomials up to degree 4
+  float of_slopes[16];               ///< depth x sum, the same: of e_x and e_y
+  std::vector<float> of_amplitudes;  ///< patterns x 8: depth x column, the monomials up to degree 2
+  float of_offset[8], of_residual[8];
+};
+void sum_surface(const WindowGrid& grid, int patterns, const FamilyColumns& columns,
+                 SurfaceSums& sums);
+
+/// What a fit predicts of a family's light, and what the image shows of it, both times the
+/// prediction, the weights and `certainty`; added to the arrays.
+void add_light(const WindowGrid& grid, const FamilyLight& light, const float* image,
+               const float* weight, float certainty, float* seen, float* predicted);
+
+/// Sums of values over the pixels of each part; parts: `count` masks.
+void sum_parts(const WindowGrid& grid, const float* values, const float* parts, int count,
+               float* sums);
+
+}  // namespace pencilscan
