@@ -54,23 +54,6 @@ PENCILSCAN_INLINE bool any(const IntLanes& mask) {
   return bits != 0;
 }
 
-/// The sums of the lanes of eight.
-PENCILSCAN_INLINE void sum_each(const Lanes* of, Lanes& sums) {
-  Lanes two[4], four[2];  // lanes that are sums of two, then of four
-  for (int k = 0; k < 4; ++k) {
-    const Lanes &a = of[2 * k], &b = of[2 * k + 1];
-    two[k] = __builtin_shufflevector(a, b, 0, 8, 1, 9, 4, 12, 5, 13) +
-             __builtin_shufflevector(a, b, 2, 10, 3, 11, 6, 14, 7, 15);
-  }
-  for (int k = 0; k < 2; ++k) {
-    const Lanes &a = two[2 * k], &b = two[2 * k + 1];
-    four[k] = __builtin_shufflevector(a, b, 0, 1, 8, 9, 4, 5, 12, 13) +
-              __builtin_shufflevector(a, b, 2, 3, 10, 11, 6, 7, 14, 15);
-  }
-  sums = __builtin_shufflevector(four[0], four[1], 0, 1, 2, 3, 8, 9, 10, 11) +
-         __builtin_shufflevector(four[0], four[1], 4, 5, 6, 7, 12, 13, 14, 15);
-}
-
 /// exp(x) to about 3e-6 of its value for |x| < 80; beyond, that of +-80.
 PENCILSCAN_INLINE void exponential(const Lanes& x, Lanes& result) {
   // 2^y with y = n + f, |f| <= 1/2: n goes into the exponent, 2^f is its Taylor series.

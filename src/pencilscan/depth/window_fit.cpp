@@ -6,8 +6,6 @@
 #include <cmath>
 #include <numbers>
 
-#include "pencilscan/core/lanes.h"
-
 namespace pencilscan {
 namespace {
 

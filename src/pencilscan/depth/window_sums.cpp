@@ -20,6 +20,23 @@ PENCILSCAN_INLINE void bell(const Lanes& u, Lanes& integral, Lanes& kernel) {
   kernel = rest * rest * rest;
 }
 
+/// The sums of the lanes of eight.
+PENCILSCAN_INLINE void sum_each(const Lanes* of, Lanes& sums) {
+  Lanes two[4], four[2];  // lanes that are sums of two, then of four
+  for (int k = 0; k < 4; ++k) {
+    const Lanes &a = of[2 * k], &b = of[2 * k + 1];
+    two[k] = __builtin_shufflevector(a, b, 0, 8, 1, 9, 4, 12, 5, 13) +
+             __builtin_shufflevector(a, b, 2, 10, 3, 11, 6, 14, 7, 15);
+  }
+  for (int k = 0; k < 2; ++k) {
+    const Lanes &a = two[2 * k], &b = two[2 * k + 1];
+    four[k] = __builtin_shufflevector(a, b, 0, 1, 8, 9, 4, 5, 12, 13) +
+              __builtin_shufflevector(a, b, 2, 3, 10, 11, 6, 7, 14, 15);
+  }
+  sums = __builtin_shufflevector(four[0], four[1], 0, 1, 2, 3, 8, 9, 10, 11) +
+         __builtin_shufflevector(four[0], four[1], 4, 5, 6, 7, 12, 13, 14, 15);
+}
+
 /// M columns by N: as many sums as are added up at once.
 template <int M, int N>
 PENCILSCAN_INLINE void gram_block(const float* J, int rows, int columns, int first, int second,
