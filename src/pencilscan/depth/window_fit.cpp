@@ -338,9 +338,6 @@ bool WindowFitter::iterate(Quadric& q, int rounds) {
     const double moved = step(q);
     if (!(moved < 1e6) || !q.allFinite() || !(q[0] > 0)) return false;
     if (std::none_of(lit_.begin(), lit_.end(), [](const Lit& l) { return l.on; })) return false;
-    // The equations before so small a step are those after it. But the slope of albedo starts at
-    // none.
-    if (moved < kAtRest && round > 0) return true;
     // The blur follows the slope of the surface.
     const auto w = static_cast<float>(q[0]);
     const auto wx = static_cast<float>(q[1] / grid_.half);
@@ -350,6 +347,7 @@ bool WindowFitter::iterate(Quadric& q, int rounds) {
       lit.inverse_reach = 1 / std::clamp(3 * light_->blur_px * gradient, 0.02F, 2.F);
     }
     render(q);
+    if (moved < kAtRest) break;
   }
   return evaluate(q);
 }

@@ -63,7 +63,7 @@ class WindowFitter {
 
   /// Nothing where the window leaves the image, is saturated or shows no line that fits. It rests
   /// as soon as the middle's depth does: slopes may be a hundredth of a line over the window off
-  /// then. Misfit and variance are those before the last step then, which is that short.
+  /// then.
   [[nodiscard]] std::optional<WindowFit> fit(const Vec2& pixel, const Quadric& start, int rounds);
   /// Mean image value and variance of the residuals of a family, of the last window that did fit.
   [[nodiscard]] float family_mean(std::size_t family) const { return seen_[family].mean; }
