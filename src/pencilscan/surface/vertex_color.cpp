@@ -135,6 +135,21 @@ std::vector<Sample> collect(const Rig& rig, const RayScene& surface,
   return samples;
 }
 
+/// Sum of value(v) over all vertices, which value may change: of fixed runs side by side, then of
+/// the runs in order.
+template <class Value>
+Eigen::Array3d ordered_sum(std::size_t count, const Value& value) {
+  constexpr std::size_t kRun = 4096;
+  std::vector<Eigen::Array3d> sums((count + kRun - 1) / kRun, Eigen::Array3d::Zero());
+  parallel_for(sums.size(), [&](std::size_t run) {
+    const std::size_t end = std::min(count, (run + 1) * kRun);
+    for (std::size_t v = run * kRun; v < end; ++v) sums[run] += value(v);
+  });
+  Eigen::Array3d sum = Eigen::Array3d::Zero();
+  for (const Eigen::Array3d& of_run : sums) sum += of_run;
+  return sum;
+}
+
 /// Sums of the normal equations of one vertex: albedo = right / weight.
 struct Evidence {
   Channels weight = Channels::Zero();
@@ -144,7 +159,7 @@ struct Evidence {
 std::vector<Evidence> evidence(std::span<const Sample> samples, std::size_t views,
                                std::span<const Channels> ambient) {
   std::vector<Evidence> sums(samples.size() / views);
-  for (std::size_t v = 0; v < sums.size(); ++v) {
+  parallel_chunks(sums.size(), [&](std::size_t v) {
     for (std::size_t k = 0; k < views; ++k) {
       const Sample& s = samples[v * views + k];
       if (!(s.weight > 0)) continue;
@@ -152,7 +167,7 @@ std::vector<Evidence> evidence(std::span<const Sample> samples, std::size_t view
       sums[v].weight += s.weight * light * light;
       sums[v].right += s.weight * light * s.image;
     }
-  }
+  });
   return sums;
 }
 
@@ -161,7 +176,7 @@ std::vector<Channels> ambient_light(std::span<const Sample> samples, std::size_t
                                     std::span<const Channels> albedo) {
   constexpr float kDark = 0.02F;
   std::vector<Channels> ambient(views, Channels::Zero());
-  for (std::size_t k = 0; k < views; ++k) {
+  parallel_for(views, [&](std::size_t k) {
     Eigen::Array3d right = Eigen::Array3d::Zero();
     Eigen::Array3d weight = Eigen::Array3d::Constant(1e-9);
     for (std::size_t v = 0; v < albedo.size(); ++v) {
@@ -175,7 +190,7 @@ std::vector<Channels> ambient_light(std::span<const Sample> samples, std::size_t
       }
     }
     ambient[k] = (right / weight).max(0.0).cast<float>();
-  }
+  });
   return ambient;
 }
 
@@ -228,27 +243,26 @@ std::vector<Channels> solve(const Neighbors& neighbors, std::span<const Evidence
   };
   std::vector<Channels> residual(n), direction(n), product(n);
   times(rho, product);
-  Eigen::Array3d energy = Eigen::Array3d::Zero();
-  for (std::size_t v = 0; v < n; ++v) {
+  Eigen::Array3d energy = ordered_sum(n, [&](std::size_t v) -> Eigen::Array3d {
     residual[v] = sums[v].right - product[v];
     direction[v] = residual[v] / diagonal(v);
-    energy += (residual[v] * direction[v]).cast<double>();
-  }
+    return (residual[v] * direction[v]).cast<double>();
+  });
   for (int round = 0; round < rounds; ++round) {
     times(direction, product);
-    Eigen::Array3d curvature = Eigen::Array3d::Zero();
-    for (std::size_t v = 0; v < n; ++v) curvature += (direction[v] * product[v]).cast<double>();
+    const Eigen::Array3d curvature = ordered_sum(n, [&](std::size_t v) -> Eigen::Array3d {
+      return (direction[v] * product[v]).cast<double>();
+    });
     const Channels step = (energy / (curvature + 1e-30)).cast<float>();
-    Eigen::Array3d next = Eigen::Array3d::Zero();
-    for (std::size_t v = 0; v < n; ++v) {
+    const Eigen::Array3d next = ordered_sum(n, [&](std::size_t v) -> Eigen::Array3d {
       rho[v] += step * direction[v];
       residual[v] -= step * product[v];
-      next += (residual[v] * residual[v] / diagonal(v)).cast<double>();
-    }
+      return (residual[v] * residual[v] / diagonal(v)).cast<double>();
+    });
     const Channels ratio = (next / (energy + 1e-30)).cast<float>();
     energy = next;
-    for (std::size_t v = 0; v < n; ++v)
-      direction[v] = residual[v] / diagonal(v) + ratio * direction[v];
+    parallel_chunks(
+        n, [&](std::size_t v) { direction[v] = residual[v] / diagonal(v) + ratio * direction[v]; });
   }
   return rho;
 }
