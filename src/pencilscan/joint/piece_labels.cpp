@@ -6,8 +6,8 @@
 #include <numbers>
 #include <tuple>
 
+#include "pencilscan/joint/floor_cost.h"
 #include "pencilscan/joint/next_lines.h"
-#include "pencilscan/rig/object_space.h"
 
 namespace pencilscan {
 namespace {
@@ -210,43 +210,6 @@ struct VisiblePattern {
   PatternRef ref;
   LineSheets sheets;
   std::vector<std::size_t> colors;  ///< of one period
-};
-
-/// What a stated floor says of a label. A curve shows the floor or anything above it; depths of
-/// what shows the floor scatter about the plane, all others are anywhere in the range. The cost is
-/// the negative logarithm of that likelihood over the one without a floor, both being as likely as
-/// not.
-class FloorCost {
- public:
-  /// range: of inverse depths. Without a floor nothing costs anything.
-  FloorCost(const Rig& rig, const Camera& camera, float range, const JointOptions& options)
-      : range_(range), projection_(static_cast<float>(options.projection_sigma_px)) {
-    if (!rig.floor) return;
-    const double height = -rig.floor->height(camera.center());
-    if (!(height < 0)) return;  // the camera is below: it does not see the floor
-    normal_ = (camera.device_from_world.rotation * rig.floor->normal / height).cast<float>();
-    relative_sigma_ = static_cast<float>(kFloorSpacings * line_spacing(rig) / -height);
-  }
-
-  [[nodiscard]] float operator()(const PieceLabel& label, const Eigen::Vector3f& ray) const {
-    const float floor = normal_.dot(ray);
-    if (!(floor > 0)) return 0;
-    const float deviation =
-        std::hypot(projection_ * label.inverse_depth_per_px, relative_sigma_ * floor);
-    const float off = (label.q.dot(ray) - floor) / deviation;
-    const float density =
-        std::exp(-0.5F * off * off) / (std::sqrt(2 * std::numbers::pi_v<float>) * deviation);
-    return -std::log1p(range_ * density);
-  }
-
- private:
-  /// Deviation of a floor from the stated plane, line spacings: a tenth of what ObjectSpace keeps
-  /// clear of it.
-  static constexpr double kFloorSpacings = 0.1;
-
-  float range_, projection_;
-  Eigen::Vector3f normal_ = Eigen::Vector3f::Zero();  ///< inverse depth = normal . (x, y, 1)
-  float relative_sigma_ = 0;                          ///< of the floor's inverse depth
 };
 
 /// The picture's pixel in the middle of a piece.
