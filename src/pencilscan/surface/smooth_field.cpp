@@ -3,11 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <functional>
-#include <numeric>
 
 #include "pencilscan/core/check.h"
-#include "pencilscan/core/parallel.h"
+#include "pencilscan/core/chunks.h"
 
 namespace pencilscan {
 namespace {
@@ -17,12 +15,10 @@ constexpr float kScreening = 4;
 constexpr int kMostSteps = 300;
 constexpr std::size_t kRun = 8192;  // nodes, one task
 
-/// Sum over the nodes of term(i), of the runs' sums in order.
-double sum_over(std::size_t count, const std::function<double(std::size_t, std::size_t)>& of_run) {
-  std::vector<double> sums((count + kRun - 1) / kRun);
-  parallel_for(sums.size(),
-               [&](std::size_t r) { sums[r] = of_run(r * kRun, std::min(count, (r + 1) * kRun)); });
-  return std::accumulate(sums.begin(), sums.end(), 0.0);
+/// Sum over the nodes of what of_run(from, to) says of runs of them.
+template <class OfRun>
+double sum_over(std::size_t count, const OfRun& of_run) {
+  return sum_of_runs(count, kRun, 0.0, of_run);
 }
 
 class Solver {

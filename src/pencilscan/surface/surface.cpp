@@ -218,19 +218,19 @@ void follow_depth(const Rig& rig, std::span<const DepthMap> maps, const FusionOp
   std::vector<SurfaceSample> samples = node_samples(rig, maps, report.spacing_mm);
   report.samples = report.samples_used = samples.size();
   fit_local_surfaces(samples, options.fit_spacings * report.spacing_mm);
-  TriangleMesh closed;
-  closed.vertices = result.mesh.vertices;
-  closed.faces = result.mesh.faces;
+  std::vector<Vec3> closed = result.mesh.vertices;
   FollowOptions once = options.follow;  // normals have settled on the coarse mesh
   once.rounds = 1;
   follow_nodes(rig, maps, options.follow, result.mesh);
   std::vector<std::array<int, 2>> middles;
   for (int i = 0; i < options.subdivisions; ++i) {
-    closed = subdivided(closed);
     result.mesh = subdivided(result.mesh, &middles);
+    for (const auto& [a, b] : middles)
+      closed.push_back(0.5 *
+                       (closed[static_cast<std::size_t>(a)] + closed[static_cast<std::size_t>(b)]));
     follow_nodes(rig, maps, once, result.mesh);
   }
-  report.self_intersections = untangle(closed.vertices, result.mesh);
+  report.self_intersections = untangle(closed, result.mesh);
   result.evidence =
       attribute_vertices(samples, options.reach_spacings, report.spacing_mm, result.mesh, middles);
   report.seconds += watch.seconds();

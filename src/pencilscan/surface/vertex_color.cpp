@@ -135,19 +135,16 @@ std::vector<Sample> collect(const Rig& rig, const RayScene& surface,
   return samples;
 }
 
-/// Sum of value(v) over all vertices, which value may change: of fixed runs side by side, then of
-/// the runs in order.
+/// Sum of value(v) over all vertices, which value may change.
 template <class Value>
 Eigen::Array3d ordered_sum(std::size_t count, const Value& value) {
   constexpr std::size_t kRun = 4096;
-  std::vector<Eigen::Array3d> sums((count + kRun - 1) / kRun, Eigen::Array3d::Zero());
-  parallel_for(sums.size(), [&](std::size_t run) {
-    const std::size_t end = std::min(count, (run + 1) * kRun);
-    for (std::size_t v = run * kRun; v < end; ++v) sums[run] += value(v);
+  const Eigen::Array3d zero = Eigen::Array3d::Zero();
+  return sum_of_runs(count, kRun, zero, [&](std::size_t from, std::size_t to) {
+    Eigen::Array3d sum = zero;
+    for (std::size_t v = from; v < to; ++v) sum += value(v);
+    return sum;
   });
-  Eigen::Array3d sum = Eigen::Array3d::Zero();
-  for (const Eigen::Array3d& of_run : sums) sum += of_run;
-  return sum;
 }
 
 /// Sums of the normal equations of one vertex: albedo = right / weight.
