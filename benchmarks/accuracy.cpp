@@ -15,10 +15,9 @@
 #include "pencilscan/evaluation/surface_figures.h"
 #include "pencilscan/evaluation/true_lines.h"
 #include "pencilscan/evaluation/truth_scene.h"
-#include "pencilscan/io/image.h"
 #include "pencilscan/io/mesh_file.h"
 #include "pencilscan/pipeline/frame.h"
-#include "pencilscan/rig/camera_light.h"
+#include "read_frame.h"
 
 namespace pencilscan {
 namespace {
@@ -128,12 +127,7 @@ int run(const std::filesystem::path& rig_path, const std::filesystem::path& fram
   const ThreadLimit limit(threads);
   cv::setNumThreads(1);
   const Rig rig = read_rig(rig_path);
-  Frame frame;
-  frame.name = name;
-  for (const Camera& camera : rig.cameras) {
-    const auto path = find_image(frames / name, camera.name);
-    frame.images.push_back(path ? read_camera_image(camera, *path) : cv::Mat());
-  }
+  const Frame frame = read_frame(rig, frames / name);
   const TruthScene truth(read_mesh(mesh_path), rig);
   std::vector<std::vector<TrueLinePixel>> true_lines(rig.cameras.size());
   parallel_for(rig.cameras.size(), [&](std::size_t c) {

@@ -14,10 +14,9 @@
 #include "pencilscan/evaluation/label_error.h"
 #include "pencilscan/evaluation/surface_figures.h"
 #include "pencilscan/evaluation/truth_scene.h"
-#include "pencilscan/io/image.h"
 #include "pencilscan/io/mesh_file.h"
 #include "pencilscan/pipeline/frame.h"
-#include "pencilscan/rig/camera_light.h"
+#include "read_frame.h"
 
 namespace pencilscan {
 namespace {
@@ -62,13 +61,7 @@ std::vector<float> point_rows(const TruthScene& truth, const PointResult& result
 void run(const std::filesystem::path& scene, const std::filesystem::path& out) {
   cv::setNumThreads(1);
   const Rig rig = read_rig(scene / "rig.json");
-  Frame frame;
-  frame.name = "000000";
-  for (const Camera& camera : rig.cameras) {
-    const auto path = find_image(scene / "frames" / frame.name, camera.name);
-    frame.images.push_back(path ? read_camera_image(camera, *path) : cv::Mat());
-  }
-  const FrameResult result = reconstruct_frame(rig, frame);
+  const FrameResult result = reconstruct_frame(rig, read_frame(rig, scene / "frames/000000"));
   const TruthScene truth(read_mesh(scene / "truth/mesh.ply"), rig);
   const auto per_unit = static_cast<float>(1 / footprint(rig));
   std::filesystem::create_directories(out);

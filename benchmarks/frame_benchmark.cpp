@@ -25,19 +25,11 @@
 #include "pencilscan/pipeline/sequence.h"
 #include "pencilscan/rig/camera_light.h"
 #include "pencilscan/rig/rig.h"
+#include "read_frame.h"
 #include "reference_blur.h"
 
 namespace pencilscan {
 namespace {
-
-Frame read_frame(const Rig& rig, const std::filesystem::path& folder) {
-  Frame frame;
-  frame.name = folder.filename().string();
-  FrameFiles files{frame.name, {}};
-  for (const Camera& camera : rig.cameras) files.images.push_back(find_image(folder, camera.name));
-  frame.images = read_images(rig, files);
-  return frame;
-}
 
 /// Of all threads of the process, s.
 double cpu_seconds() {

@@ -17,10 +17,9 @@
 #include "pencilscan/evaluation/label_error.h"
 #include "pencilscan/evaluation/surface_figures.h"
 #include "pencilscan/evaluation/truth_scene.h"
-#include "pencilscan/io/image.h"
 #include "pencilscan/io/mesh_file.h"
 #include "pencilscan/pipeline/rig_refinement.h"
-#include "pencilscan/rig/camera_light.h"
+#include "read_frame.h"
 
 namespace pencilscan {
 namespace {
@@ -74,12 +73,7 @@ int run(const Arguments& arguments) {
   const ThreadLimit limit(arguments.threads);
   cv::setNumThreads(1);
   const Rig rig = read_rig(arguments.rig);
-  Frame frame;
-  frame.name = arguments.frame;
-  for (const Camera& camera : rig.cameras) {
-    const auto path = find_image(arguments.frames / frame.name, camera.name);
-    frame.images.push_back(path ? read_camera_image(camera, *path) : cv::Mat());
-  }
+  const Frame frame = read_frame(rig, arguments.frames / arguments.frame);
   const TruthScene truth(read_mesh(arguments.mesh), rig);
   const PointResult detected = detect_frame(rig, frame);
   const FrameCurves curves{detected.families, detected.graphs};
