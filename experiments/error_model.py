@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """The error model: fitted on some scenes, judged on others.
 
-sigma and confidence (src/pencilscan/uncertainty/error_model.cpp) have nine parameters. They are fitted on
+sigma and confidence (src/pencilscan/uncertainty/error_model.cpp) have eight parameters. They are fitted on
 scenes of heldout.py's fit split; how often sigma holds, and how many labels are wrong, is printed for
 these and for scenes of its held split: other objects, pitches, noise and rigs. heldout.py renders them.
 """

@@ -11,11 +11,6 @@
 namespace pencilscan {
 namespace {
 
-struct Quality {
-  bool good = false;
-  double cosine = 0;
-};
-
 /// Cosine of the incidence to the camera.
 double incidence(const CameraLight& light, const Vec2& pixel, const Quadric& q, int half) {
   const Camera& camera = *light.camera;
@@ -111,10 +106,11 @@ class FloorView {
     if (!space_.holds(point)) return false;
     const TangentView at(*light_.camera, point, floor_->normal);
     const Vec2 m = light_.camera->normalized_from_pixel(pixel);
+    const Eigen::Matrix2d jacobian = light_.camera->pixel_slope(m).inverse();
     for (std::size_t k = 0; k < light_.patterns.size(); ++k) {
       if (!fit.lit.test(k)) continue;
-      const auto fitted = line(k, m, fit.q[0]);
-      const auto on_floor = line(k, m, at.w);
+      const auto fitted = line(k, m, jacobian, fit.q[0]);
+      const auto on_floor = line(k, m, jacobian, at.w);
       if (!fitted || !on_floor) return false;
       const double apart = *fitted - *on_floor;
       if (std::abs(apart - std::round(apart)) > kSameLine) return false;
@@ -129,10 +125,10 @@ class FloorView {
   }
 
  private:
-  [[nodiscard]] std::optional<double> line(std::size_t pattern, const Vec2& m, double w) const {
+  [[nodiscard]] std::optional<double> line(std::size_t pattern, const Vec2& m,
+                                           const Eigen::Matrix2d& jacobian, double w) const {
     bool ok = false;
-    const WindowLines lines =
-        light_.patterns[pattern].lines(m, light_.camera->pixel_slope(m).inverse(), w, ok);
+    const WindowLines lines = light_.patterns[pattern].lines(m, jacobian, w, ok);
     if (!ok) return std::nullopt;
     return static_cast<double>(lines.line(0, 0, static_cast<float>(w)));
   }

@@ -77,7 +77,6 @@ class WindowFitter {
     WindowLines lines;
     float inverse_reach = 0;  ///< 1 / reach of the bell, 1/lines
     float amplitude = 0;
-    float amplitude_variance = 0;
     int unknown = 0;  ///< of its family, in the last equations
     bool on = true;
   };

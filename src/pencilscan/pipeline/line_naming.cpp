@@ -34,8 +34,7 @@ std::size_t nameable_points(const GridGraph& graph, const Labeling& labeling) {
 LineNaming name_lines(const Rig& rig, const std::vector<ColorFamily>& families,
                       const std::vector<GridGraph>& graphs, Labeling labeling,
                       const PointOptions& options, const std::function<double()>& guided_share) {
-  constexpr double kNearlyAll =
-      0.8;  // of the curves' points in the volume; right names reach .9 and more
+  constexpr double kNearlyAll = 0.8;    // of the nameable points; right names reach .9 and more
   constexpr double kMost = 0.5;         // once guided; the rest are close together, or no lines
   constexpr double kAsClosely = 1.2;    // the misses that noise lets expect are known to a fifth
   constexpr double kClearlyMore = 1.1;  // points named, of those before

@@ -25,9 +25,9 @@ struct LineNaming {
 /// with a corrected rig. For methods that may correct the rig (MethodCapabilities).
 ///
 /// The rig is doubted where crossings miss each other, or where many curves in the volume have no
-/// name. It is not
-/// doubted where crossings meet as closely as noise lets expect and most curves of every camera
-/// have a name after guided matching: curves that are close together only need the surface.
+/// name. It is not doubted where crossings meet about as closely as noise lets expect and most
+/// curves of every camera have a name after guided matching: curves that are close together only
+/// need the surface.
 /// (`guided_share` gives the share of points with a name, of the camera where it is least. It is
 /// asked only then. Without it, the share counts as 0.)
 ///
