@@ -4,6 +4,9 @@
 #include <cmath>
 #include <cstdint>
 #include <numbers>
+#include <span>
+
+#include "pencilscan/geometry/mesh_sides.h"
 
 namespace pencilscan {
 namespace {
@@ -58,24 +61,11 @@ Vec3 face_normal(const TriangleMesh& mesh, std::size_t face) {
 }
 
 EdgeCounts count_edges(const TriangleMesh& mesh) {
-  std::vector<std::uint64_t> edges;
-  edges.reserve(mesh.faces.size() * 3);
-  for (const auto& face : mesh.faces) {
-    for (std::size_t k = 0; k < 3; ++k) {
-      const auto a = static_cast<std::uint64_t>(face[k]);
-      const auto b = static_cast<std::uint64_t>(face[(k + 1) % 3]);
-      edges.push_back((std::min(a, b) << 32U) | std::max(a, b));
-    }
-  }
-  std::sort(edges.begin(), edges.end());
   EdgeCounts counts;
-  for (std::size_t i = 0; i < edges.size();) {
-    std::size_t j = i;
-    while (j < edges.size() && edges[j] == edges[i]) ++j;
-    counts.boundary += j - i == 1;
-    counts.non_manifold += j - i > 2;
-    i = j;
-  }
+  for_each_edge(sides_by_edge(mesh), [&](std::span<const Side> sides) {
+    counts.boundary += sides.size() == 1;
+    counts.non_manifold += sides.size() > 2;
+  });
   return counts;
 }
 

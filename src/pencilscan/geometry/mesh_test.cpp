@@ -2,11 +2,16 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <numbers>
+#include <span>
+#include <vector>
 
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/core/random.h"
 #include "pencilscan/geometry/as_floats.h"
+#include "pencilscan/geometry/mesh_sides.h"
 #include "pencilscan/geometry/ray_scene.h"
 
 namespace pencilscan {
@@ -21,6 +26,40 @@ TEST(TriangleMesh, BoxAndSphereAreClosedOutwardAndOfTheRightVolume) {
   EXPECT_NEAR(signed_volume(sphere), 4.0 / 3 * std::numbers::pi * 1000, 10);  // faceted: < 0.3 %
   EXPECT_EQ(count_edges(sphere).boundary, 0U);
   EXPECT_EQ(count_edges(sphere).non_manifold, 0U);
+}
+
+TEST(MeshSides, AreThoseOfASort) {
+  Random random(11);
+  TriangleMesh mesh;
+  mesh.vertices.resize(12);
+  const auto other = [&](int than) { return (than + 1 + static_cast<int>(random.below(3))) % 12; };
+  std::vector<std::array<int, 4>> expected;  // low, high, face, corner
+  for (int f = 0; f < 200; ++f) {
+    const int a = static_cast<int>(random.below(12));
+    const int b = other(a);
+    const std::array<int, 3> face{a, b, other(b) == a ? (a + 6) % 12 : (b + 4) % 12};
+    mesh.faces.push_back(face);
+    for (int k = 0; k < 3; ++k) {
+      const int from = face[static_cast<std::size_t>(k)];
+      const int to = face[static_cast<std::size_t>((k + 1) % 3)];
+      expected.push_back({std::min(from, to), std::max(from, to), f, k});
+    }
+  }
+  std::sort(expected.begin(), expected.end());
+  const std::vector<Side> sides = sides_by_edge(mesh);
+  ASSERT_EQ(sides.size(), expected.size());
+  std::size_t edges = 0;
+  for_each_edge(sides, [&](std::span<const Side> of_edge) {
+    ++edges;
+    EXPECT_EQ(of_edge.front().high, of_edge.back().high);
+  });
+  EXPECT_GT(edges, 12U);
+  for (std::size_t i = 0; i < sides.size(); ++i) {
+    const Side& s = sides[i];
+    EXPECT_EQ((std::array{s.low, s.high, s.face, static_cast<int>(s.corner)}), expected[i]);
+    const std::array<int, 3>& face = mesh.faces[static_cast<std::size_t>(s.face)];
+    EXPECT_EQ(s.rises, face[static_cast<std::size_t>(s.corner)] == s.low);
+  }
 }
 
 TEST(RayScene, HitsTheBoxWhereGeometrySays) {

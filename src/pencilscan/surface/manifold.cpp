@@ -7,36 +7,13 @@
 #include <map>
 #include <numeric>
 #include <span>
-#include <tuple>
 #include <utility>
 #include <vector>
 
+#include "pencilscan/geometry/mesh_sides.h"
+
 namespace pencilscan {
 namespace {
-
-/// Side `corner` of a face: from its vertex there to the next one.
-struct Side {
-  int low, high;  ///< vertices, low < high
-  int face;
-  int corner;
-  bool rises;  ///< from low to high
-};
-
-std::vector<Side> sorted_sides(const TriangleMesh& mesh) {
-  std::vector<Side> sides;
-  sides.reserve(3 * mesh.faces.size());
-  for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
-    for (int k = 0; k < 3; ++k) {
-      const int a = mesh.faces[f][static_cast<std::size_t>(k)];
-      const int b = mesh.faces[f][static_cast<std::size_t>((k + 1) % 3)];
-      sides.push_back({std::min(a, b), std::max(a, b), static_cast<int>(f), k, a < b});
-    }
-  }
-  std::sort(sides.begin(), sides.end(), [](const Side& a, const Side& b) {
-    return std::tie(a.low, a.high, a.face) < std::tie(b.low, b.high, b.face);
-  });
-  return sides;
-}
 
 /// Corners of faces, three per face, that are one vertex.
 class Corners {
@@ -106,18 +83,6 @@ std::vector<std::pair<Side, Side>> wedges(const TriangleMesh& mesh, std::vector<
   return pairs;
 }
 
-/// visit(sides) for every edge.
-template <class Visit>
-void for_each_edge(const std::vector<Side>& sides, Visit visit) {
-  for (std::size_t i = 0; i < sides.size();) {
-    std::size_t end = i;
-    while (end < sides.size() && sides[end].low == sides[i].low && sides[end].high == sides[i].high)
-      ++end;
-    visit(std::span(sides).subspan(i, end - i));
-    i = end;
-  }
-}
-
 template <class T>
 void copy_entry(std::vector<T>& values, std::size_t from) {
   if (!values.empty()) values.push_back(T(values[from]));
@@ -138,7 +103,7 @@ constexpr double kApart = 0.02;
 /// Gives every fan of faces around a vertex a vertex of its own. Returns the number of new ones.
 std::size_t split_fans(TriangleMesh& mesh) {
   Corners corners(mesh.faces.size());
-  for_each_edge(sorted_sides(mesh), [&](std::span<const Side> sides) {
+  for_each_edge(sides_by_edge(mesh), [&](std::span<const Side> sides) {
     if (sides.size() == 2 && sides[0].rises != sides[1].rises) {
       corners.join(sides[0].rises ? sides[0] : sides[1], sides[0].rises ? sides[1] : sides[0]);
     } else if (sides.size() > 2) {
@@ -191,7 +156,7 @@ std::size_t split_edges(TriangleMesh& mesh) {
   for (bool found = true; found;) {
     found = false;
     std::vector<char> is_cut(mesh.faces.size(), 0);
-    const std::vector<Side> all = sorted_sides(mesh);
+    const std::vector<Side> all = sides_by_edge(mesh);
     for_each_edge(all, [&](std::span<const Side> sides) {
       if (sides.size() <= 2) return;
       const auto pairs = wedges(mesh, {sides.begin(), sides.end()});

@@ -6,6 +6,7 @@
 
 #include "pencilscan/core/check.h"
 #include "pencilscan/core/disjoint_sets.h"
+#include "pencilscan/geometry/mesh_sides.h"
 
 namespace pencilscan {
 
@@ -111,18 +112,35 @@ TriangleMesh subdivided(const TriangleMesh& mesh, std::vector<std::array<int, 2>
   return fine;
 }
 
-std::vector<char> grown(const TriangleMesh& mesh, std::vector<char> marked, int edges,
-                        const std::function<bool(std::size_t)>& may_join) {
+FacesOf::FacesOf(const TriangleMesh& mesh) : begin_(mesh.vertices.size() + 1, 0) {
+  for (const auto& face : mesh.faces) {
+    for (const int v : face) ++begin_[static_cast<std::size_t>(v) + 1];
+  }
+  for (std::size_t v = 1; v < begin_.size(); ++v) begin_[v] += begin_[v - 1];
+  faces_.resize(begin_.back());
+  std::vector<std::uint32_t> next(begin_.begin(), begin_.end() - 1);
+  for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
+    for (const int v : mesh.faces[f])
+      faces_[next[static_cast<std::size_t>(v)]++] = static_cast<std::uint32_t>(f);
+  }
+}
+
+std::vector<std::size_t> around(const TriangleMesh& mesh, const FacesOf& faces,
+                                std::vector<std::size_t> marked, int edges,
+                                const std::function<bool(std::size_t)>& may_join) {
+  std::vector<char> is_marked(mesh.vertices.size(), 0);
+  for (const std::size_t v : marked) is_marked[v] = 1;
+  std::size_t begin = 0;
   for (int edge = 0; edge < edges; ++edge) {
-    const std::vector<char> before = marked;
-    for (const auto& face : mesh.faces) {
-      const bool touched = std::any_of(face.begin(), face.end(), [&](int v) {
-        return before[static_cast<std::size_t>(v)] != 0;
-      });
-      if (!touched) continue;
-      for (const int vertex : face) {
-        const auto v = static_cast<std::size_t>(vertex);
-        if (marked[v] == 0 && (!may_join || may_join(v))) marked[v] = 1;
+    const std::size_t end = marked.size();
+    for (; begin < end; ++begin) {
+      for (const std::uint32_t f : faces[marked[begin]]) {
+        for (const int vertex : mesh.faces[f]) {
+          const auto v = static_cast<std::size_t>(vertex);
+          if (is_marked[v] != 0 || (may_join && !may_join(v))) continue;
+          is_marked[v] = 1;
+          marked.push_back(v);
+        }
       }
     }
   }
@@ -132,17 +150,15 @@ std::vector<char> grown(const TriangleMesh& mesh, std::vector<char> marked, int 
 TriangleMesh with_caps(TriangleMesh mesh) {
   PENCILSCAN_CHECK(mesh.sigma.empty() && mesh.confidence.empty() && mesh.hole.empty() &&
                    mesh.color.empty());
-  std::vector<std::pair<int, int>> edges;
-  edges.reserve(3 * mesh.faces.size());
-  for (const auto& face : mesh.faces) {
-    for (std::size_t k = 0; k < 3; ++k) edges.emplace_back(face[k], face[(k + 1) % 3]);
-  }
-  std::sort(edges.begin(), edges.end());
   // Open edges by their start; where two loops touch in a vertex there are several.
   std::multimap<int, int> open;
-  for (const auto& [a, b] : edges) {
-    if (!std::binary_search(edges.begin(), edges.end(), std::pair(b, a))) open.emplace(a, b);
-  }
+  for_each_edge(sides_by_edge(mesh), [&](std::span<const Side> sides) {
+    const auto rising =
+        std::count_if(sides.begin(), sides.end(), [](const Side& side) { return side.rises; });
+    if (rising != 0 && rising != std::ssize(sides)) return;
+    for (const Side& side : sides)
+      open.emplace(side.rises ? side.low : side.high, side.rises ? side.high : side.low);
+  });
   while (!open.empty()) {
     std::vector<int> loop;
     for (auto edge = open.begin(); edge != open.end(); edge = open.find(loop.back())) {

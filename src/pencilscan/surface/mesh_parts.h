@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <functional>
 #include <span>
 #include <vector>
@@ -23,10 +24,32 @@ namespace pencilscan {
 [[nodiscard]] TriangleMesh subdivided(const TriangleMesh& mesh,
                                       std::vector<std::array<int, 2>>* middles = nullptr);
 
-/// The marked vertices and those within `edges` edges of them, on paths of vertices that may join
-/// (all, where the function is empty).
-[[nodiscard]] std::vector<char> grown(const TriangleMesh& mesh, std::vector<char> marked, int edges,
-                                      const std::function<bool(std::size_t)>& may_join = {});
+/// Faces of each vertex, in order.
+class FacesOf {
+ public:
+  explicit FacesOf(const TriangleMesh& mesh);
+  [[nodiscard]] std::span<const std::uint32_t> operator[](std::size_t vertex) const {
+    return std::span(faces_).subspan(begin_[vertex], begin_[vertex + 1] - begin_[vertex]);
+  }
+
+ private:
+  std::vector<std::uint32_t> begin_;
+  std::vector<std::uint32_t> faces_;
+};
+
+/// The marked vertices (each once) and then those within `edges` edges of them, on paths of
+/// vertices that may join.
+[[nodiscard]] std::vector<std::size_t> around(
+    const TriangleMesh& mesh, const FacesOf& faces, std::vector<std::size_t> marked, int edges,
+    const std::function<bool(std::size_t)>& may_join = {});
+
+/// The vertex that follows v around a face of v.
+[[nodiscard]] inline std::size_t next_around(const std::array<int, 3>& face, std::size_t v) {
+  const std::size_t next = static_cast<std::size_t>(face[0]) == v   ? 1
+                           : static_cast<std::size_t>(face[1]) == v ? 2
+                                                                    : 0;
+  return static_cast<std::size_t>(face[next]);
+}
 
 /// The mesh with a fan over every loop of boundary edges, from a new vertex at the loop's mean.
 /// Only for meshes without vertex properties.

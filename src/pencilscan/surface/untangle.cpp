@@ -5,10 +5,10 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
-#include <unordered_set>
+#include <utility>
 
 #include "pencilscan/core/check.h"
-#include "pencilscan/core/parallel.h"
+#include "pencilscan/core/chunks.h"
 #include "pencilscan/geometry/as_floats.h"
 #include "pencilscan/surface/mesh_parts.h"
 
@@ -33,25 +33,41 @@ double volume(const Vec3& o, const Vec3& x, const Vec3& y, const Vec3& z) {
   return (x - o).cross(y - o).dot(z - o);
 }
 
-/// True when segment pq passes through the inside of the triangle.
-bool pierces(const Vec3& p, const Vec3& q, const std::array<Vec3, 3>& t) {
-  if (volume(p, t[0], t[1], t[2]) * volume(q, t[0], t[1], t[2]) >= 0) return false;
-  const double ab = volume(p, q, t[0], t[1]);
-  const double bc = volume(p, q, t[1], t[2]);
-  const double ca = volume(p, q, t[2], t[0]);
-  return (ab > 0 && bc > 0 && ca > 0) || (ab < 0 && bc < 0 && ca < 0);
-}
-
 bool boxes_touch(const Triangle& a, const Triangle& b) {
   return (a.low.array() <= b.high.array()).all() && (b.low.array() <= a.high.array()).all();
 }
 
-bool cut_each_other(const Triangle& a, const Triangle& b) {
+/// Of the corners of `t` over the plane of `base`: times twice its area, and three.
+std::array<double, 3> heights(const Triangle& t, const Triangle& base) {
+  const auto& b = base.x;
+  return {volume(t.x[0], b[0], b[1], b[2]), volume(t.x[1], b[0], b[1], b[2]),
+          volume(t.x[2], b[0], b[1], b[2])};
+}
+
+bool on_one_side(const std::array<double, 3>& heights) {
+  return (heights[0] > 0 && heights[1] > 0 && heights[2] > 0) ||
+         (heights[0] < 0 && heights[1] < 0 && heights[2] < 0);
+}
+
+/// True when an edge of `t` passes through the inside of `base`.
+bool pierces(const Triangle& t, const std::array<double, 3>& heights, const Triangle& base) {
   for (std::size_t k = 0; k < 3; ++k) {
-    if (pierces(a.x[k], a.x[(k + 1) % 3], b.x) || pierces(b.x[k], b.x[(k + 1) % 3], a.x))
-      return true;
+    const std::size_t next = (k + 1) % 3;
+    if (heights[k] * heights[next] >= 0) continue;
+    const auto beside = [&](std::size_t side) {
+      return volume(t.x[k], t.x[next], base.x[side], base.x[(side + 1) % 3]);
+    };
+    if (on_one_side({beside(0), beside(1), beside(2)})) return true;
   }
   return false;
+}
+
+bool cut_each_other(const Triangle& a, const Triangle& b) {
+  const std::array<double, 3> of_a = heights(a, b);
+  if (on_one_side(of_a)) return false;
+  const std::array<double, 3> of_b = heights(b, a);
+  if (on_one_side(of_b)) return false;
+  return pierces(a, of_a, b) || pierces(b, of_b, a);
 }
 
 bool have_common_vertex(const std::array<int, 3>& a, const std::array<int, 3>& b) {
@@ -73,104 +89,112 @@ void for_each_cell(const Triangle& t, double size, Visit&& visit) {
       for (auto z = low[2]; z <= high[2]; ++z) visit(Cell{x, y, z});
 }
 
+constexpr std::size_t kFacesPerRun = 4096;
+
 /// Twice the mean extent of the faces.
 double cell_size(const TriangleMesh& mesh) {
-  double size = 0;
-  for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
-    const Triangle t = triangle(mesh, f);
-    size += (t.high - t.low).maxCoeff();
-  }
-  return std::max(2 * size / static_cast<double>(mesh.faces.size()), 1e-9);
+  const double sum =
+      sum_of_runs(mesh.faces.size(), kFacesPerRun, 0.0, [&](std::size_t from, std::size_t to) {
+        double size = 0;
+        for (std::size_t f = from; f < to; ++f) {
+          const Triangle t = triangle(mesh, f);
+          size += (t.high - t.low).maxCoeff();
+        }
+        return size;
+      });
+  return std::max(2 * sum / static_cast<double>(mesh.faces.size()), 1e-9);
 }
 
-struct CellHash {
-  std::size_t operator()(const Cell& c) const {
-    return static_cast<std::size_t>(c[0]) * 73856093U ^ static_cast<std::size_t>(c[1]) * 19349663U ^
-           static_cast<std::size_t>(c[2]) * 83492791U;
-  }
-};
+std::size_t hash(const Cell& c) {
+  return static_cast<std::size_t>(c[0]) * 73856093U ^ static_cast<std::size_t>(c[1]) * 19349663U ^
+         static_cast<std::size_t>(c[2]) * 83492791U;
+}
 
 /// Faces whose bounding boxes touch the same cube, and at times those of another one.
 struct Buckets {
-  std::vector<std::size_t> starts;  ///< of each bucket in `faces`, and the end of the last
+  std::vector<std::uint32_t> starts;  ///< of each bucket in `faces`, and the end of the last
   std::vector<std::uint32_t> faces;
 
   explicit Buckets(const TriangleMesh& mesh) : starts(std::bit_ceil(mesh.faces.size()) + 1, 0) {
     const double size = cell_size(mesh);
     const std::size_t mask = starts.size() - 2;
-    std::vector<std::uint32_t> bucket_of;
-    std::vector<std::size_t> ends;  // of each face in bucket_of
-    for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
-      for_each_cell(triangle(mesh, f), size, [&](const Cell& cell) {
-        const std::size_t bucket = CellHash()(cell) & mask;
-        bucket_of.push_back(static_cast<std::uint32_t>(bucket));
-        ++starts[bucket + 1];
-      });
-      ends.push_back(bucket_of.size());
+    struct Entry {
+      std::uint32_t bucket, face;
+    };
+    std::vector<std::vector<Entry>> runs((mesh.faces.size() + kFacesPerRun - 1) / kFacesPerRun);
+    parallel_for(runs.size(), [&](std::size_t r) {
+      runs[r].reserve(4 * kFacesPerRun);
+      const std::size_t end = std::min(mesh.faces.size(), (r + 1) * kFacesPerRun);
+      for (std::size_t f = r * kFacesPerRun; f < end; ++f) {
+        for_each_cell(triangle(mesh, f), size, [&](const Cell& cell) {
+          runs[r].push_back(
+              {static_cast<std::uint32_t>(hash(cell) & mask), static_cast<std::uint32_t>(f)});
+        });
+      }
+    });
+    std::size_t count = 0;
+    for (const auto& run : runs) {
+      count += run.size();
+      for (const Entry& entry : run) ++starts[entry.bucket + 1];
     }
     for (std::size_t k = 1; k < starts.size(); ++k) starts[k] += starts[k - 1];
-    faces.resize(bucket_of.size());
-    std::vector<std::size_t> next(starts.begin(), starts.end() - 1);
-    std::size_t i = 0;
-    for (std::size_t f = 0; f < ends.size(); ++f) {
-      for (; i < ends[f]; ++i) faces[next[bucket_of[i]]++] = static_cast<std::uint32_t>(f);
+    faces.resize(count);
+    std::vector<std::uint32_t> next(starts.begin(), starts.end() - 1);
+    for (const auto& run : runs) {
+      for (const Entry& entry : run) faces[next[entry.bucket]++] = entry.face;
     }
   }
 };
 
-/// The marked faces and all that share a cell with one of them.
-std::vector<std::array<int, 3>> faces_near(const TriangleMesh& mesh, std::span<const char> marked) {
+/// The faces that share a cell with one that has such a vertex, at times others.
+std::vector<std::array<int, 3>> faces_near(const TriangleMesh& mesh, const FacesOf& faces_of,
+                                           std::span<const std::size_t> vertices) {
   const double size = cell_size(mesh);
-  std::unordered_set<Cell, CellHash> cells;
-  for (std::size_t f = 0; f < marked.size(); ++f) {
-    if (marked[f] != 0)
-      for_each_cell(triangle(mesh, f), size, [&](const Cell& cell) { cells.insert(cell); });
+  std::vector<char> is_taken(std::bit_ceil(4 * mesh.faces.size()), 0);  // cells, by their hash
+  const std::size_t mask = is_taken.size() - 1;
+  for (const std::size_t v : vertices) {
+    for (const std::uint32_t f : faces_of[v])
+      for_each_cell(triangle(mesh, f), size,
+                    [&](const Cell& cell) { is_taken[hash(cell) & mask] = 1; });
   }
+  std::vector<char> is_near(mesh.faces.size(), 0);
+  parallel_chunks(is_near.size(), [&](std::size_t f) {
+    for_each_cell(triangle(mesh, f), size, [&](const Cell& cell) {
+      if (is_taken[hash(cell) & mask] != 0) is_near[f] = 1;
+    });
+  });
   std::vector<std::array<int, 3>> faces;
-  for (std::size_t f = 0; f < marked.size(); ++f) {
-    bool is_near = false;
-    for_each_cell(triangle(mesh, f), size,
-                  [&](const Cell& cell) { is_near = is_near || cells.contains(cell); });
-    if (is_near) faces.push_back(mesh.faces[f]);
+  for (std::size_t f = 0; f < is_near.size(); ++f) {
+    if (is_near[f] != 0) faces.push_back(mesh.faces[f]);
   }
   return faces;
 }
 
-std::vector<char> vertices_of(const TriangleMesh& mesh, std::span<const std::size_t> faces) {
-  std::vector<char> marked(mesh.vertices.size(), 0);
+/// The corners of some faces, each once.
+std::vector<std::size_t> vertices_of(const TriangleMesh& mesh, std::span<const std::size_t> faces) {
+  std::vector<std::size_t> vertices;
   for (const std::size_t f : faces) {
-    for (const int v : mesh.faces[f]) marked[static_cast<std::size_t>(v)] = 1;
+    for (const int v : mesh.faces[f]) vertices.push_back(static_cast<std::size_t>(v));
   }
-  return marked;
+  std::sort(vertices.begin(), vertices.end());
+  vertices.erase(std::unique(vertices.begin(), vertices.end()), vertices.end());
+  return vertices;
 }
 
-/// Faces with such a vertex.
-std::vector<char> faces_at(const TriangleMesh& mesh, std::span<const char> vertices) {
-  std::vector<char> marked(mesh.faces.size(), 0);
-  for (std::size_t f = 0; f < marked.size(); ++f) {
-    for (const int v : mesh.faces[f]) {
-      if (vertices[static_cast<std::size_t>(v)] != 0) marked[f] = 1;
+/// Vertices move as their neighbours do in the mean.
+void even_out(std::span<const Vec3> before, std::span<const std::size_t> vertices,
+              const FacesOf& faces, TriangleMesh& mesh) {
+  std::vector<Vec3> move;
+  for (const std::size_t v : vertices) {
+    Vec3 sum = Vec3::Zero();
+    for (const std::uint32_t f : faces[v]) {
+      const std::size_t next = next_around(mesh.faces[f], v);
+      sum += mesh.vertices[next] - before[next];
     }
+    move.emplace_back(sum / static_cast<double>(faces[v].size()));
   }
-  return marked;
-}
-
-/// Marked vertices move as their neighbours do in the mean.
-void even_out(std::span<const Vec3> before, std::span<const char> marked, TriangleMesh& mesh) {
-  std::vector<Vec3> sum(before.size(), Vec3::Zero());
-  std::vector<int> count(before.size(), 0);
-  for (const auto& face : mesh.faces) {
-    for (std::size_t k = 0; k < 3; ++k) {
-      const auto a = static_cast<std::size_t>(face[k]);
-      const auto b = static_cast<std::size_t>(face[(k + 1) % 3]);
-      if (marked[a] == 0) continue;
-      sum[a] += mesh.vertices[b] - before[b];
-      ++count[a];
-    }
-  }
-  for (std::size_t v = 0; v < before.size(); ++v) {
-    if (count[v] > 0) mesh.vertices[v] = before[v] + sum[v] / count[v];
-  }
+  for (std::size_t i = 0; i < vertices.size(); ++i)
+    mesh.vertices[vertices[i]] = before[vertices[i]] + move[i];
 }
 
 }  // namespace
@@ -216,25 +240,30 @@ std::size_t untangle(std::span<const Vec3> before, TriangleMesh& mesh) {
   PENCILSCAN_CHECK(before.size() == mesh.vertices.size());
   TriangleMesh near;  // fewer and fewer faces: those around what moved, then around what is left
   near.vertices.swap(mesh.vertices);
-  std::vector<char> moved(before.size(), 0);
-  for (std::size_t v = 0; v < moved.size(); ++v) {
-    moved[v] = near.vertices[v] != before[v] ? 1 : 0;
+  std::vector<std::size_t> moved;
+  for (std::size_t v = 0; v < before.size(); ++v) {
+    if (near.vertices[v] != before[v]) moved.push_back(v);
     near.vertices[v] = as_floats(near.vertices[v]);
   }
   near.faces = mesh.faces;
-  if (2 * std::count(moved.begin(), moved.end(), 1) < std::ssize(moved))
-    near.faces = faces_near(near, faces_at(near, grown(near, moved, 2 * kFarthest)));
+  if (2 * moved.size() < before.size()) {
+    const FacesOf faces_of(near);
+    near.faces =
+        faces_near(near, faces_of, around(near, faces_of, std::move(moved), 2 * kFarthest));
+  }
   std::vector<std::size_t> faces = self_intersections(near);
   for (int round = 0; round < kRounds && !faces.empty(); ++round) {
-    const std::vector<char> cut = vertices_of(near, faces);
-    const std::vector<char> marked = grown(near, cut, 1 + std::max(0, round - kSmoothings) / 2);
-    near.faces = faces_near(near, faces_at(near, grown(near, cut, 2 * kFarthest)));
-    if (round < kSmoothings) even_out(before, marked, near);
-    for (std::size_t v = 0; v < marked.size(); ++v) {
-      if (marked[v] == 0) continue;
+    const FacesOf faces_of(near);
+    const std::vector<std::size_t> cut = vertices_of(near, faces);
+    const std::vector<std::size_t> marked =
+        around(near, faces_of, cut, 1 + std::max(0, round - kSmoothings) / 2);
+    auto fewer = faces_near(near, faces_of, around(near, faces_of, cut, 2 * kFarthest));
+    if (round < kSmoothings) even_out(before, marked, faces_of, near);
+    for (const std::size_t v : marked) {
       if (round >= kSmoothings) near.vertices[v] = 0.5 * (before[v] + near.vertices[v]);
       near.vertices[v] = as_floats(near.vertices[v]);
     }
+    near.faces = std::move(fewer);
     faces = self_intersections(near);
   }
   near.vertices.swap(mesh.vertices);

@@ -16,19 +16,29 @@ namespace {
 
 using Channels = Eigen::Array3f;
 
-/// What one camera says of one vertex: image = albedo * (light + ambient).
+constexpr float kTolerance = 2e-4F;  // of a vertex's albedo: a twentieth of a step of 8 bits
+
+/// What one camera says of one vertex that it sees: image = albedo * (light + ambient).
 struct Sample {
   Channels light = Channels::Zero();
   Channels image = Channels::Zero();
-  float weight = 0;  ///< 0: not seen
+  float weight = 0;  ///< > 0
+  std::uint32_t vertex = 0;
+  std::uint32_t view = 0;
 };
+
+/// Runs of vertices: the samples of each, in order of vertices and views.
+using Samples = std::vector<std::vector<Sample>>;
+constexpr std::size_t kVerticesPerRun = 1024;
 
 /// Share of a pixel's light at line coordinate l under lines of half width h (lines), blurred by a
 /// Gaussian of deviation s (lines).
 double line_profile(double l, double h, double s) {
   const double a = std::abs(l - std::round(l));
   const double k = 1 / (std::numbers::sqrt2 * std::max(s, 1e-3));
-  const auto box = [&](double x) { return 0.5 * (std::erf((h - x) * k) + std::erf((h + x) * k)); };
+  // Beyond 4, erf(x) is 1 but for 2e-8.
+  const auto error = [](double x) { return x > 4 ? 1 : x < -4 ? -1 : std::erf(x); };
+  const auto box = [&](double x) { return 0.5 * (error((h - x) * k) + error((h + x) * k)); };
   return box(a) + box(1 - a);
 }
 
@@ -101,14 +111,12 @@ class Light {
   std::vector<std::vector<PatternView>> patterns_;  ///< per view
 };
 
-std::vector<Sample> collect(const Rig& rig, const RayScene& surface,
-                            std::span<const ColorView> views, const ColorOptions& options,
-                            bool has_plain) {
+Samples collect(const Rig& rig, const RayScene& surface, std::span<const ColorView> views,
+                const ColorOptions& options, bool has_plain) {
   const TriangleMesh& mesh = surface.mesh();
   const Light light(rig, surface, views, options);
   const std::vector<Vec3> normals = vertex_normals(mesh);
-  std::vector<Sample> samples(mesh.vertices.size() * views.size());
-  parallel_chunks(mesh.vertices.size(), [&](std::size_t v) {
+  const auto look = [&](std::size_t v, std::vector<Sample>& samples) {
     if (!mesh.confidence.empty() && !(mesh.confidence[v] > 0)) return;  // it may be elsewhere
     const Vec3& x = mesh.vertices[v];
     thread_local std::vector<double> irradiance;
@@ -123,14 +131,22 @@ std::vector<Sample> collect(const Rig& rig, const RayScene& surface,
       sample.image = sample_color(views[k].image, pixel->x(), pixel->y());
       if (!sample.image.isFinite().all()) continue;
       sample.weight = static_cast<float>((camera.center() - x).normalized().dot(normals[v]));
+      sample.vertex = static_cast<std::uint32_t>(v);
+      sample.view = static_cast<std::uint32_t>(k);
       if (has_plain) {
         sample.light = Channels::Ones();
       } else {
         if (irradiance.empty()) light.irradiance(x, normals[v], irradiance);
         sample.light = light.pattern_light(k, camera, views[k].blur_px, x, normals[v], irradiance);
       }
-      samples[v * views.size() + k] = sample;
+      samples.push_back(sample);
     }
+  };
+  const std::size_t count = mesh.vertices.size();
+  Samples samples((count + kVerticesPerRun - 1) / kVerticesPerRun);
+  parallel_for(samples.size(), [&](std::size_t r) {
+    for (std::size_t v = r * kVerticesPerRun; v < std::min(count, (r + 1) * kVerticesPerRun); ++v)
+      look(v, samples[r]);
   });
   return samples;
 }
@@ -153,41 +169,41 @@ struct Evidence {
   Channels right = Channels::Zero();
 };
 
-std::vector<Evidence> evidence(std::span<const Sample> samples, std::size_t views,
+std::vector<Evidence> evidence(const Samples& samples, std::size_t vertices,
                                std::span<const Channels> ambient) {
-  std::vector<Evidence> sums(samples.size() / views);
-  parallel_chunks(sums.size(), [&](std::size_t v) {
-    for (std::size_t k = 0; k < views; ++k) {
-      const Sample& s = samples[v * views + k];
-      if (!(s.weight > 0)) continue;
-      const Channels light = s.light + ambient[k];
-      sums[v].weight += s.weight * light * light;
-      sums[v].right += s.weight * light * s.image;
+  std::vector<Evidence> sums(vertices);
+  parallel_for(samples.size(), [&](std::size_t r) {
+    for (const Sample& s : samples[r]) {
+      const Channels light = s.light + ambient[s.view];
+      sums[s.vertex].weight += s.weight * light * light;
+      sums[s.vertex].right += s.weight * light * s.image;
     }
   });
   return sums;
 }
 
 /// Ambient light of each view: least squares over vertices where no line falls.
-std::vector<Channels> ambient_light(std::span<const Sample> samples, std::size_t views,
+std::vector<Channels> ambient_light(const Samples& samples, std::size_t views,
                                     std::span<const Channels> albedo) {
   constexpr float kDark = 0.02F;
-  std::vector<Channels> ambient(views, Channels::Zero());
-  parallel_for(views, [&](std::size_t k) {
+  struct Sums {
     Eigen::Array3d right = Eigen::Array3d::Zero();
     Eigen::Array3d weight = Eigen::Array3d::Constant(1e-9);
-    for (std::size_t v = 0; v < albedo.size(); ++v) {
-      const Sample& s = samples[v * views + k];
-      if (!(s.weight > 0)) continue;
+  };
+  std::vector<Sums> sums(views);
+  for (const std::vector<Sample>& of_run : samples) {
+    for (const Sample& s : of_run) {
       for (int c = 0; c < 3; ++c) {
         if (s.light[c] > kDark) continue;
-        const auto rho = static_cast<double>(albedo[v][c]);
-        right[c] += rho * static_cast<double>(s.image[c]);
-        weight[c] += rho * rho;
+        const auto rho = static_cast<double>(albedo[s.vertex][c]);
+        sums[s.view].right[c] += rho * static_cast<double>(s.image[c]);
+        sums[s.view].weight[c] += rho * rho;
       }
     }
-    ambient[k] = (right / weight).max(0.0).cast<float>();
-  });
+  }
+  std::vector<Channels> ambient;
+  for (const Sums& of_view : sums)
+    ambient.emplace_back((of_view.right / of_view.weight).max(0.0).cast<float>());
   return ambient;
 }
 
@@ -216,38 +232,33 @@ class Neighbors {
 };
 
 /// Minimises sum_v weight_v (rho_v - right_v / weight_v)^2 + smoothing sum_edges (rho_i - rho_j)^2
-/// per channel by conjugate gradients with the diagonal as preconditioner. The mesh is closed, so
-/// that each edge appears once in both directions and the matrix is symmetric.
-std::vector<Channels> solve(const Neighbors& neighbors, std::span<const Evidence> sums,
-                            float smoothing, int rounds) {
+/// per channel by conjugate gradients with the diagonal as preconditioner, from `rho`. The mesh is
+/// closed, so that each edge appears once in both directions and the matrix is symmetric.
+void solve(const Neighbors& neighbors, std::span<const Evidence> sums, float smoothing, int rounds,
+           std::vector<Channels>& rho) {
   const std::size_t n = sums.size();
-  Channels mean_right = Channels::Zero();
-  Channels mean_weight = Channels::Constant(1e-9F);
-  for (const Evidence& e : sums) {
-    mean_right += e.right;
-    mean_weight += e.weight;
-  }
-  std::vector<Channels> rho(n, mean_right / mean_weight);
   const auto diagonal = [&](std::size_t v) -> Channels {
     return sums[v].weight + smoothing * static_cast<float>(neighbors.of(v).size()) + 1e-9F;
   };
-  const auto times = [&](const std::vector<Channels>& x, std::vector<Channels>& y) {
-    parallel_chunks(n, [&](std::size_t v) {
-      Channels sum = diagonal(v) * x[v];
-      for (const int k : neighbors.of(v)) sum -= smoothing * x[static_cast<std::size_t>(k)];
-      y[v] = sum;
-    });
+  const auto times = [&](const std::vector<Channels>& x, std::size_t v) {
+    Channels sum = diagonal(v) * x[v];
+    for (const int k : neighbors.of(v)) sum -= smoothing * x[static_cast<std::size_t>(k)];
+    return sum;
   };
   std::vector<Channels> residual(n), direction(n), product(n);
-  times(rho, product);
   Eigen::Array3d energy = ordered_sum(n, [&](std::size_t v) -> Eigen::Array3d {
-    residual[v] = sums[v].right - product[v];
+    residual[v] = sums[v].right - times(rho, v);
     direction[v] = residual[v] / diagonal(v);
     return (residual[v] * direction[v]).cast<double>();
   });
-  for (int round = 0; round < rounds; ++round) {
-    times(direction, product);
+  // residual / diagonal is how far a vertex is off: the energy if all were off by the tolerance.
+  const Eigen::Array3d enough = ordered_sum(n, [&](std::size_t v) -> Eigen::Array3d {
+    const Channels off = kTolerance * rho[v];
+    return (diagonal(v) * off * off).cast<double>();
+  });
+  for (int round = 0; round < rounds && (energy > enough).any(); ++round) {
     const Eigen::Array3d curvature = ordered_sum(n, [&](std::size_t v) -> Eigen::Array3d {
+      product[v] = times(direction, v);
       return (direction[v] * product[v]).cast<double>();
     });
     const Channels step = (energy / (curvature + 1e-30)).cast<float>();
@@ -261,7 +272,17 @@ std::vector<Channels> solve(const Neighbors& neighbors, std::span<const Evidence
     parallel_chunks(
         n, [&](std::size_t v) { direction[v] = residual[v] / diagonal(v) + ratio * direction[v]; });
   }
-  return rho;
+}
+
+/// The mean of all evidence at every vertex.
+std::vector<Channels> even_albedo(std::span<const Evidence> sums) {
+  Channels right = Channels::Zero();
+  Channels weight = Channels::Constant(1e-9F);
+  for (const Evidence& e : sums) {
+    right += e.right;
+    weight += e.weight;
+  }
+  return {sums.size(), right / weight};
 }
 
 }  // namespace
@@ -273,16 +294,17 @@ std::vector<std::array<float, 3>> vertex_colors(const Rig& rig, const RayScene& 
   if (mesh.faces.empty() || views.empty()) return {};
   const bool has_plain =
       std::any_of(views.begin(), views.end(), [](const ColorView& view) { return view.is_plain; });
-  const std::vector<Sample> samples = collect(rig, surface, views, options, has_plain);
+  const Samples samples = collect(rig, surface, views, options, has_plain);
   std::vector<Channels> ambient(views.size(), Channels::Zero());
-  std::vector<Evidence> sums = evidence(samples, views.size(), ambient);
+  std::vector<Evidence> sums = evidence(samples, mesh.vertices.size(), ambient);
   const Neighbors neighbors(mesh);
   const auto smoothing = static_cast<float>(options.smoothing);
-  std::vector<Channels> rho = solve(neighbors, sums, smoothing, options.rounds / 2);
+  std::vector<Channels> rho = even_albedo(sums);
+  solve(neighbors, sums, smoothing, options.rounds / 2, rho);
   if (!has_plain) {
     ambient = ambient_light(samples, views.size(), rho);
-    sums = evidence(samples, views.size(), ambient);
-    rho = solve(neighbors, sums, smoothing, options.rounds);
+    sums = evidence(samples, mesh.vertices.size(), ambient);
+    solve(neighbors, sums, smoothing, options.rounds, rho);
   }
   std::vector<float> brightest;
   for (std::size_t v = 0; v < rho.size(); ++v) {
