@@ -131,19 +131,23 @@ std::vector<Vec3> initial_normals(std::span<const SurfaceSample> samples, const 
   return normals;
 }
 
-void fit_local_surfaces(std::vector<SurfaceSample>& samples, double radius) {
+void fit_local_surfaces(std::vector<SurfaceSample>& samples, double radius, std::size_t first) {
   constexpr int kRounds = 2;  // the second uses neighbours whose normals have settled
+  if (first == samples.size()) return;
+  std::vector<Vec3> positions(samples.size());
+  for (std::size_t i = 0; i < samples.size(); ++i) positions[i] = samples[i].position;
+  const PointGrid grid(positions, radius);
   for (int round = 0; round < kRounds; ++round) {
-    std::vector<Vec3> positions(samples.size());
-    for (std::size_t i = 0; i < samples.size(); ++i) positions[i] = samples[i].position;
-    const PointGrid grid(positions, radius);
-    std::vector<SurfaceSample> fitted = samples;
-    parallel_chunks(samples.size(),
+    std::vector<SurfaceSample> fitted(samples.begin() + static_cast<std::ptrdiff_t>(first),
+                                      samples.end());
+    parallel_chunks(fitted.size(),
                     [&](std::size_t i) { fit_quadric(samples, grid, radius, fitted[i]); });
-    if (round + 1 < kRounds) {
-      for (std::size_t i = 0; i < samples.size(); ++i) samples[i].normal = fitted[i].normal;
-    } else {
-      samples = std::move(fitted);
+    for (std::size_t i = 0; i < fitted.size(); ++i) {
+      if (round + 1 < kRounds) {
+        samples[first + i].normal = fitted[i].normal;
+      } else {
+        samples[first + i] = fitted[i];
+      }
     }
   }
 }

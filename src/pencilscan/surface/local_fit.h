@@ -19,7 +19,7 @@ namespace pencilscan {
 /// z = c0 + c1 x + c2 y + c3 x^2 + c4 x y + c5 y^2 over the tangent plane of each sample, weighted
 /// by distance and 1 / sigma^2 across the surface, from the samples of all cameras whose normals
 /// lie within 60 degrees. Sets normal, residual and moves the sample along its normal onto the
-/// quadric, by no more than a quarter of the radius.
-void fit_local_surfaces(std::vector<SurfaceSample>& samples, double radius);
+/// quadric, by no more than a quarter of the radius. Samples before `first` are on theirs already.
+void fit_local_surfaces(std::vector<SurfaceSample>& samples, double radius, std::size_t first = 0);
 
 }  // namespace pencilscan

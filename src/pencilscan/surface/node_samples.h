@@ -15,4 +15,8 @@ namespace pencilscan {
                                                       std::span<const DepthMap> maps,
                                                       double& spacing);
 
+/// Adds those of the measured nodes that have none among `samples`.
+void add_node_samples(const Rig& rig, std::span<const DepthMap> maps,
+                      std::vector<SurfaceSample>& samples);
+
 }  // namespace pencilscan

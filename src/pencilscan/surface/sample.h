@@ -16,11 +16,12 @@ struct SurfaceSample {
   Vec3 to_camera = Vec3::UnitZ();     ///< unit, world
   Vec3 sheet_normal = Vec3::UnitX();  ///< unit normal of the light sheet, world
   Vec3 normal = Vec3::UnitZ();        ///< unit, outward once estimated
-  double spacing = 0;       ///< mm between this light sheet and the next, across the sheets
-  double sigma = 0;         ///< mm along the camera ray, of the mean
-  double residual = 0;      ///< mm, root mean square of the neighbours about the local surface
-  double confidence = 0;    ///< mean of the points'
-  std::uint32_t curve = 0;  ///< the same for one camera, projector, pattern and line
+  double spacing = 0;     ///< mm between this light sheet and the next, across the sheets
+  double sigma = 0;       ///< mm along the camera ray, of the mean
+  double residual = 0;    ///< mm, root mean square of the neighbours about the local surface
+  double confidence = 0;  ///< mean of the points'
+  /// The same for one camera, projector, pattern and line; of a depth node its place in the map.
+  std::uint32_t curve = 0;
   std::uint8_t camera = 0;
   std::uint8_t projector = 0;
   std::uint32_t count = 0;  ///< points in it

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
 #include "pencilscan/core/check.h"
 #include "pencilscan/core/median.h"
@@ -206,6 +207,7 @@ SurfaceResult close_depth(const Rig& rig, std::span<const DepthMap> maps,
   const std::vector<Vec3> closed = result.mesh.vertices;
   carve(rig, silhouettes, options.carving, result.mesh);
   untangle(closed, result.mesh);
+  result.samples = std::move(samples);
   report.seconds = watch.seconds();
   return result;
 }
@@ -215,9 +217,11 @@ void follow_depth(const Rig& rig, std::span<const DepthMap> maps, const FusionOp
   const Stopwatch watch;
   SurfaceReport& report = result.report;
   if (report.status == SurfaceStatus::kTooFewPoints || result.mesh.faces.empty()) return;
-  std::vector<SurfaceSample> samples = node_samples(rig, maps, report.spacing_mm);
+  std::vector<SurfaceSample> samples = std::exchange(result.samples, {});
+  const std::size_t fitted = samples.size();
+  add_node_samples(rig, maps, samples);
   report.samples = report.samples_used = samples.size();
-  fit_local_surfaces(samples, options.fit_spacings * report.spacing_mm);
+  fit_local_surfaces(samples, options.fit_spacings * report.spacing_mm, fitted);
   std::vector<Vec3> closed = result.mesh.vertices;
   FollowOptions once = options.follow;  // normals have settled on the coarse mesh
   once.rounds = 1;

@@ -12,6 +12,7 @@
 #include "pencilscan/labeling/measured_point.h"
 #include "pencilscan/rig/rig.h"
 #include "pencilscan/surface/node_surface.h"
+#include "pencilscan/surface/sample.h"
 #include "pencilscan/surface/silhouette.h"
 #include "pencilscan/uncertainty/error_model.h"
 
@@ -74,6 +75,8 @@ struct SurfaceResult {
   std::vector<char> used;  ///< per input point: 1 when the surface rests on it
   /// Per vertex of `mesh`, footprints: what its sigma rests on. Empty without dense depth.
   std::vector<SurfaceEvidence> evidence;
+  /// Between close_depth() and follow_depth(): nodes of the depth maps on their local surfaces.
+  std::vector<SurfaceSample> samples;
   SurfaceReport report;
 };
 

@@ -153,6 +153,7 @@ std::optional<CarriedSurface> carry_surface(const Rig& rig, std::span<const Dept
   for (Vec3& x : whole) x = result.motion * x;
   carve(rig, silhouettes, options.carving, mesh);
   untangle(whole, mesh);
+  result.surface.samples = std::move(samples);
   report.seconds = watch.seconds();
   return result;
 }
