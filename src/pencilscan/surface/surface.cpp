@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "pencilscan/core/check.h"
+#include "pencilscan/core/chunks.h"
 #include "pencilscan/core/median.h"
 #include "pencilscan/core/stopwatch.h"
 #include "pencilscan/depth/consistency.h"
@@ -65,7 +66,7 @@ std::vector<char> judge_samples(const Rig& rig, const SurfaceOptions& options, S
 std::vector<char> points_on_maps(const Rig& rig, std::span<const MeasuredPoint> points,
                                  std::span<const DepthMap> maps, double tolerance) {
   std::vector<char> used(points.size(), 0);
-  for (std::size_t i = 0; i < points.size(); ++i) {
+  parallel_chunks(points.size(), [&](std::size_t i) {
     const MeasuredPoint& p = points[i];
     for (const DepthMap& map : maps) {
       if (map.camera != p.camera) continue;
@@ -77,7 +78,7 @@ std::vector<char> points_on_maps(const Rig& rig, std::span<const MeasuredPoint> 
       const Vec3 d = Vec3(p.x, p.y, p.z) - node_point(rig, map, k);
       used[i] = std::abs(d.dot(node_normal(rig, map, k))) < tolerance ? 1 : 0;
     }
-  }
+  });
   return used;
 }
 

@@ -18,6 +18,7 @@ namespace {
 struct Triangle {
   std::array<Vec3, 3> x;
   Vec3 low, high;  ///< bounding box
+  Vec3 normal;     ///< of twice the area as its length
 };
 
 Triangle triangle(const TriangleMesh& mesh, std::size_t face) {
@@ -26,6 +27,7 @@ Triangle triangle(const TriangleMesh& mesh, std::size_t face) {
     t.x[k] = mesh.vertices[static_cast<std::size_t>(mesh.faces[face][k])];
   t.low = t.x[0].cwiseMin(t.x[1]).cwiseMin(t.x[2]);
   t.high = t.x[0].cwiseMax(t.x[1]).cwiseMax(t.x[2]);
+  t.normal = (t.x[1] - t.x[0]).cross(t.x[2] - t.x[0]);
   return t;
 }
 
@@ -37,11 +39,10 @@ bool boxes_touch(const Triangle& a, const Triangle& b) {
   return (a.low.array() <= b.high.array()).all() && (b.low.array() <= a.high.array()).all();
 }
 
-/// Of the corners of `t` over the plane of `base`: times twice its area, and three.
+/// Of the corners of `t` over the plane of `base`, times the length of its normal.
 std::array<double, 3> heights(const Triangle& t, const Triangle& base) {
-  const auto& b = base.x;
-  return {volume(t.x[0], b[0], b[1], b[2]), volume(t.x[1], b[0], b[1], b[2]),
-          volume(t.x[2], b[0], b[1], b[2])};
+  const auto height = [&](std::size_t k) { return base.normal.dot(t.x[k] - base.x[0]); };
+  return {height(0), height(1), height(2)};
 }
 
 bool on_one_side(const std::array<double, 3>& heights) {
