@@ -62,7 +62,7 @@ Vec3 face_normal(const TriangleMesh& mesh, std::size_t face) {
 
 EdgeCounts count_edges(const TriangleMesh& mesh) {
   EdgeCounts counts;
-  for_each_edge(sides_by_edge(mesh), [&](std::span<const Side> sides) {
+  for_each_edge(sides_by_edge(mesh), [&](std::span<const FaceSide> sides) {
     counts.boundary += sides.size() == 1;
     counts.non_manifold += sides.size() > 2;
   });

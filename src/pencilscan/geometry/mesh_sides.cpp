@@ -7,7 +7,7 @@
 
 namespace pencilscan {
 
-std::vector<Side> sides_by_edge(const TriangleMesh& mesh) {
+std::vector<FaceSide> sides_by_edge(const TriangleMesh& mesh) {
   // Counted by the lower vertex, which takes no comparisons; of a vertex there are few sides.
   std::vector<std::size_t> next(mesh.vertices.size() + 1, 0);
   for (const auto& face : mesh.faces) {
@@ -15,7 +15,7 @@ std::vector<Side> sides_by_edge(const TriangleMesh& mesh) {
       ++next[static_cast<std::size_t>(std::min(face[k], face[(k + 1) % 3])) + 1];
   }
   for (std::size_t v = 1; v < next.size(); ++v) next[v] += next[v - 1];
-  std::vector<Side> sides(3 * mesh.faces.size());
+  std::vector<FaceSide> sides(3 * mesh.faces.size());
   for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
     const std::array<int, 3>& face = mesh.faces[f];
     for (std::size_t k = 0; k < 3; ++k) {
@@ -31,7 +31,7 @@ std::vector<Side> sides_by_edge(const TriangleMesh& mesh) {
   for (std::size_t v = 0; v + 1 < next.size(); ++v) {
     std::sort(sides.begin() + static_cast<std::ptrdiff_t>(begin),
               sides.begin() + static_cast<std::ptrdiff_t>(next[v]),
-              [](const Side& a, const Side& b) {
+              [](const FaceSide& a, const FaceSide& b) {
                 return std::pair(a.high, a.face) < std::pair(b.high, b.face);
               });
     begin = next[v];

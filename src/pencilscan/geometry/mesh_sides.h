@@ -9,7 +9,7 @@
 namespace pencilscan {
 
 /// Side of a face: from its vertex `corner` to the next one.
-struct Side {
+struct FaceSide {
   int low, high;  ///< vertices, low < high
   int face;
   std::int8_t corner;
@@ -17,11 +17,11 @@ struct Side {
 };
 
 /// The sides of all faces, ordered by (low, high, face): those of one edge follow each other.
-[[nodiscard]] std::vector<Side> sides_by_edge(const TriangleMesh& mesh);
+[[nodiscard]] std::vector<FaceSide> sides_by_edge(const TriangleMesh& mesh);
 
 /// visit(span of the edge's sides) for every edge.
 template <class Visit>
-void for_each_edge(std::span<const Side> sides, Visit visit) {
+void for_each_edge(std::span<const FaceSide> sides, Visit visit) {
   for (std::size_t i = 0; i < sides.size();) {
     std::size_t end = i;
     while (end < sides.size() && sides[end].low == sides[i].low && sides[end].high == sides[i].high)

@@ -46,16 +46,16 @@ TEST(MeshSides, AreThoseOfASort) {
     }
   }
   std::sort(expected.begin(), expected.end());
-  const std::vector<Side> sides = sides_by_edge(mesh);
+  const std::vector<FaceSide> sides = sides_by_edge(mesh);
   ASSERT_EQ(sides.size(), expected.size());
   std::size_t edges = 0;
-  for_each_edge(sides, [&](std::span<const Side> of_edge) {
+  for_each_edge(sides, [&](std::span<const FaceSide> of_edge) {
     ++edges;
     EXPECT_EQ(of_edge.front().high, of_edge.back().high);
   });
   EXPECT_GT(edges, 12U);
   for (std::size_t i = 0; i < sides.size(); ++i) {
-    const Side& s = sides[i];
+    const FaceSide& s = sides[i];
     EXPECT_EQ((std::array{s.low, s.high, s.face, static_cast<int>(s.corner)}), expected[i]);
     const std::array<int, 3>& face = mesh.faces[static_cast<std::size_t>(s.face)];
     EXPECT_EQ(s.rises, face[static_cast<std::size_t>(s.corner)] == s.low);

@@ -29,7 +29,7 @@ class Corners {
     return c;
   }
   /// The two faces go on into each other over this edge.
-  void join(const Side& rising, const Side& falling) {
+  void join(const FaceSide& rising, const FaceSide& falling) {
     join(index(rising.face, rising.corner), index(falling.face, falling.corner + 1));
     join(index(rising.face, rising.corner + 1), index(falling.face, falling.corner));
   }
@@ -44,7 +44,7 @@ class Corners {
 };
 
 /// Orders the sides of one edge by the angle of their faces around it, from low to high.
-void sort_by_angle(const TriangleMesh& mesh, std::vector<Side>& sides) {
+void sort_by_angle(const TriangleMesh& mesh, std::vector<FaceSide>& sides) {
   const auto vertex = [&](int v) -> const Vec3& {
     return mesh.vertices[static_cast<std::size_t>(v)];
   };
@@ -59,16 +59,17 @@ void sort_by_angle(const TriangleMesh& mesh, std::vector<Side>& sides) {
     order.emplace_back(std::atan2(d.dot(up), d.dot(right)), i);
   }
   std::sort(order.begin(), order.end());
-  std::vector<Side> sorted;
+  std::vector<FaceSide> sorted;
   for (const auto& [angle, i] : order) sorted.push_back(sides[i]);
   sides = std::move(sorted);
 }
 
 /// The faces of an edge with more than two, in pairs (rising, falling). Turning about the edge, a
 /// solid wedge begins at a falling side and ends at a rising one.
-std::vector<std::pair<Side, Side>> wedges(const TriangleMesh& mesh, std::vector<Side> sides) {
+std::vector<std::pair<FaceSide, FaceSide>> wedges(const TriangleMesh& mesh,
+                                                  std::vector<FaceSide> sides) {
   sort_by_angle(mesh, sides);
-  std::vector<std::pair<Side, Side>> pairs;
+  std::vector<std::pair<FaceSide, FaceSide>> pairs;
   while (sides.size() >= 2) {
     std::size_t falling = 0;
     while (falling < sides.size() &&
@@ -103,7 +104,7 @@ constexpr double kApart = 0.02;
 /// Gives every fan of faces around a vertex a vertex of its own. Returns the number of new ones.
 std::size_t split_fans(TriangleMesh& mesh) {
   Corners corners(mesh.faces.size());
-  for_each_edge(sides_by_edge(mesh), [&](std::span<const Side> sides) {
+  for_each_edge(sides_by_edge(mesh), [&](std::span<const FaceSide> sides) {
     if (sides.size() == 2 && sides[0].rises != sides[1].rises) {
       corners.join(sides[0].rises ? sides[0] : sides[1], sides[0].rises ? sides[1] : sides[0]);
     } else if (sides.size() > 2) {
@@ -156,8 +157,8 @@ std::size_t split_edges(TriangleMesh& mesh) {
   for (bool found = true; found;) {
     found = false;
     std::vector<char> is_cut(mesh.faces.size(), 0);
-    const std::vector<Side> all = sides_by_edge(mesh);
-    for_each_edge(all, [&](std::span<const Side> sides) {
+    const std::vector<FaceSide> all = sides_by_edge(mesh);
+    for_each_edge(all, [&](std::span<const FaceSide> sides) {
       if (sides.size() <= 2) return;
       const auto pairs = wedges(mesh, {sides.begin(), sides.end()});
       for (std::size_t k = 1; k < pairs.size(); ++k) {
@@ -174,7 +175,7 @@ std::size_t split_edges(TriangleMesh& mesh) {
         const int middle = copy_vertex(low, mesh);
         mesh.vertices.back() = 0.5 * (mesh.vertices[low] + mesh.vertices[high]) +
                                kApart * length * inwards.stableNormalized();
-        for (const Side& side : {pairs[k].first, pairs[k].second}) {
+        for (const FaceSide& side : {pairs[k].first, pairs[k].second}) {
           auto& face = mesh.faces[static_cast<std::size_t>(side.face)];
           auto rest = face;  // from the middle to the side's end
           rest[static_cast<std::size_t>(side.corner)] = middle;

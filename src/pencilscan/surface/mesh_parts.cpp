@@ -152,11 +152,11 @@ TriangleMesh with_caps(TriangleMesh mesh) {
                    mesh.color.empty());
   // Open edges by their start; where two loops touch in a vertex there are several.
   std::multimap<int, int> open;
-  for_each_edge(sides_by_edge(mesh), [&](std::span<const Side> sides) {
+  for_each_edge(sides_by_edge(mesh), [&](std::span<const FaceSide> sides) {
     const auto rising =
-        std::count_if(sides.begin(), sides.end(), [](const Side& side) { return side.rises; });
+        std::count_if(sides.begin(), sides.end(), [](const FaceSide& side) { return side.rises; });
     if (rising != 0 && rising != std::ssize(sides)) return;
-    for (const Side& side : sides)
+    for (const FaceSide& side : sides)
       open.emplace(side.rises ? side.low : side.high, side.rises ? side.high : side.low);
   });
   while (!open.empty()) {

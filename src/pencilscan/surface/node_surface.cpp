@@ -24,8 +24,8 @@ constexpr double kMostWidth = (kLanes - 2) / (2 * kReach);
 
 /// What the nodes of rows of one view say of a vertex, eight at once.
 struct Prediction {
-  Lanes height{};  ///< along the vertex normal
-  Lanes weight{};  ///< 0: nothing
+  std::array<float, kLanes> height;  ///< along the vertex normal
+  std::array<float, kLanes> weight;  ///< 0: nothing
 };
 
 /// What the arithmetic of a row needs, of the vertex and of its pixel.
@@ -86,8 +86,8 @@ PENCILSCAN_CLONES void predict_row(const NodeRow& row, const Place& at, float ri
   // A window covers more of a slanted surface: its relief counts more.
   const Lanes weight = bell / (sigma * sigma * cosine2 + kRelief2 / cosine2);
   const Lanes none{};
-  prediction.height = there ? height : none;
-  prediction.weight = there ? weight : none;
+  store(there ? height : none, prediction.height.data());
+  store(there ? weight : none, prediction.weight.data());
   const Lanes counted = there ? bell : none;
   bells = 0;
   for (int k = 0; k < kLanes; ++k) bells += counted[k];
@@ -101,14 +101,15 @@ PENCILSCAN_CLONES void agreed_height(const Prediction* predictions, std::size_t 
     Lanes sum{};
     Lanes total{};
     for (std::size_t i = 0; i < count; ++i) {
-      const Prediction& p = predictions[i];
-      Lanes weight = p.weight;
+      Lanes of_node, weight;
+      load(predictions[i].height.data(), of_node);
+      load(predictions[i].weight.data(), weight);
       if (round > 0) {
-        const Lanes off = (p.height - height) * inverse_robust;
+        const Lanes off = (of_node - height) * inverse_robust;
         const Lanes outlying = 1 + off * off;
         weight /= outlying * outlying;
       }
-      sum += weight * p.height;
+      sum += weight * of_node;
       total += weight;
     }
     float all = 0;

@@ -16,7 +16,7 @@ namespace {
 
 using Channels = Eigen::Array3f;
 
-constexpr float kTolerance = 2e-4F;  // of a vertex's albedo: a twentieth of a step of 8 bits
+constexpr float kTolerance = 1e-4F;  // of a vertex's albedo: a fortieth of a step of 8 bits
 
 /// What one camera says of one vertex that it sees: image = albedo * (light + ambient).
 struct Sample {
@@ -222,6 +222,23 @@ class Neighbors {
         neighbors_[at[static_cast<std::size_t>(face[k])]++] = face[(k + 1) % 3];
     }
   }
+  /// Of clusters of vertices, `count` of them: each edge between two of them stays one.
+  Neighbors(const Neighbors& fine, std::span<const int> cluster_of, std::size_t count)
+      : begin_(count + 1, 0) {
+    const auto for_each_edge = [&](auto visit) {
+      for (std::size_t v = 0; v < cluster_of.size(); ++v) {
+        for (const int k : fine.of(v)) {
+          const int other = cluster_of[static_cast<std::size_t>(k)];
+          if (other != cluster_of[v]) visit(static_cast<std::size_t>(cluster_of[v]), other);
+        }
+      }
+    };
+    for_each_edge([&](std::size_t cluster, int) { ++begin_[cluster + 1]; });
+    for (std::size_t c = 1; c < begin_.size(); ++c) begin_[c] += begin_[c - 1];
+    neighbors_.resize(begin_.back());
+    std::vector<std::size_t> at(begin_.begin(), begin_.end() - 1);
+    for_each_edge([&](std::size_t cluster, int other) { neighbors_[at[cluster]++] = other; });
+  }
   [[nodiscard]] std::span<const int> of(std::size_t v) const {
     return std::span(neighbors_).subspan(begin_[v], begin_[v + 1] - begin_[v]);
   }
@@ -285,6 +302,50 @@ std::vector<Channels> even_albedo(std::span<const Evidence> sums) {
   return {sums.size(), right / weight};
 }
 
+/// Vertices within two edges of each other, every vertex in one cluster; how many clusters.
+std::size_t find_clusters(const Neighbors& neighbors, std::vector<int>& cluster_of) {
+  int count = 0;
+  std::vector<std::size_t> near;
+  for (std::size_t seed = 0; seed < cluster_of.size(); ++seed) {
+    if (cluster_of[seed] >= 0) continue;
+    near.assign(1, seed);
+    cluster_of[seed] = count;
+    std::size_t begin = 0;
+    for (int edge = 0; edge < 2; ++edge) {
+      for (const std::size_t end = near.size(); begin < end; ++begin) {
+        for (const int k : neighbors.of(near[begin])) {
+          const auto v = static_cast<std::size_t>(k);
+          if (cluster_of[v] >= 0) continue;
+          cluster_of[v] = count;
+          near.push_back(v);
+        }
+      }
+    }
+    ++count;
+  }
+  return static_cast<std::size_t>(count);
+}
+
+/// The solution with one albedo per cluster: where little is seen, colours have far to come, which
+/// takes as many rounds as there are vertices on the way.
+std::vector<Channels> coarse_albedo(const Neighbors& neighbors, std::span<const Evidence> sums,
+                                    float smoothing, int rounds) {
+  std::vector<int> cluster_of(sums.size(), -1);
+  const std::size_t count = find_clusters(neighbors, cluster_of);
+  std::vector<Evidence> of_cluster(count);
+  for (std::size_t v = 0; v < sums.size(); ++v) {
+    Evidence& sum = of_cluster[static_cast<std::size_t>(cluster_of[v])];
+    sum.weight += sums[v].weight;
+    sum.right += sums[v].right;
+  }
+  std::vector<Channels> albedo = even_albedo(of_cluster);
+  solve(Neighbors(neighbors, cluster_of, count), of_cluster, smoothing, rounds, albedo);
+  std::vector<Channels> rho(sums.size());
+  for (std::size_t v = 0; v < rho.size(); ++v)
+    rho[v] = albedo[static_cast<std::size_t>(cluster_of[v])];
+  return rho;
+}
+
 }  // namespace
 
 std::vector<std::array<float, 3>> vertex_colors(const Rig& rig, const RayScene& surface,
@@ -299,7 +360,7 @@ std::vector<std::array<float, 3>> vertex_colors(const Rig& rig, const RayScene& 
   std::vector<Evidence> sums = evidence(samples, mesh.vertices.size(), ambient);
   const Neighbors neighbors(mesh);
   const auto smoothing = static_cast<float>(options.smoothing);
-  std::vector<Channels> rho = even_albedo(sums);
+  std::vector<Channels> rho = coarse_albedo(neighbors, sums, smoothing, options.rounds);
   solve(neighbors, sums, smoothing, options.rounds / 2, rho);
   if (!has_plain) {
     ambient = ambient_light(samples, views.size(), rho);
