@@ -39,6 +39,7 @@ struct SimulateOptions {
   double rotate_deg = 0;
   std::vector<double> translate_mm = {0, 0, 0};
   std::vector<double> speed_mm_s = {0, 0, 0};
+  std::vector<double> spin_deg_s = {0, 0, 0};
   double exposure_ms = 1;
 
   bool gray_code = false;
@@ -132,7 +133,10 @@ void write_frames(const SimulateOptions& options, const Rig& rig, const Triangle
   const fs::path out(options.out);
   const Motion motion{options.rotate_deg * M_PI / 180, vector_of(options.translate_mm),
                       working_volume(rig).center};
-  const Vec3 in_exposure = options.exposure_ms / 1000 * vector_of(options.speed_mm_s);
+  const double seconds = options.exposure_ms / 1000;
+  const ExposureMotion in_exposure{seconds * vector_of(options.speed_mm_s),
+                                   seconds * M_PI / 180 * vector_of(options.spin_deg_s),
+                                   working_volume(rig).center};
   const std::size_t total = static_cast<std::size_t>(options.frame_count) * rig.cameras.size();
   for (int frame = 0; frame < options.frame_count; ++frame) {
     const SimulatedObject object(mesh, options.surface, motion.at(frame));
@@ -262,7 +266,14 @@ void add_scene_options(CLI::App& command, SimulateOptions& options) {
                   "Gray-code captures stand still")
       ->expected(3)
       ->check(any_number<double>());
-  command.add_option("--exposure-ms", options.exposure_ms, "Of a frame, for --motion-mm-s")
+  command
+      .add_option("--spin-deg-s", options.spin_deg_s,
+                  "Turning speed about x y z through the volume's centre, likewise")
+      ->expected(3)
+      ->check(any_number<double>());
+  command
+      .add_option("--exposure-ms", options.exposure_ms,
+                  "Of a frame, for --motion-mm-s and --spin-deg-s")
       ->check(above_zero())
       ->capture_default_str();
   command

@@ -52,15 +52,19 @@ RenderOptions scene_light(const PhotographyOptions& options) {
 }
 
 std::vector<SimulatedObject> through_exposure(const TriangleMesh& mesh, const Reflectance& surface,
-                                              const RigidTransform& middle, const Vec3& shift,
-                                              double footprint_mm) {
+                                              const RigidTransform& middle,
+                                              const ExposureMotion& motion, double footprint_mm) {
   PENCILSCAN_CHECK(footprint_mm > 0);
   constexpr double kStep = 0.5;  // footprints
-  const int count = std::max(1, static_cast<int>(std::ceil(shift.norm() / (kStep * footprint_mm))));
+  double reach = 0;
+  if (!motion.turn_rad.isZero()) {
+    for (const Vec3& v : mesh.vertices) reach = std::max(reach, (middle * v - motion.pivot).norm());
+  }
+  const double way = motion.shift.norm() + motion.turn_rad.norm() * reach;
+  const int count = std::max(1, static_cast<int>(std::ceil(way / (kStep * footprint_mm))));
   std::vector<SimulatedObject> moments;
   for (int k = 0; k < count; ++k) {
-    RigidTransform at = middle;
-    at.translation += ((k + 0.5) / count - 0.5) * shift;
+    const RigidTransform at = motion.since_middle((k + 0.5) / count - 0.5) * middle;
     moments.emplace_back(mesh, surface, at);
   }
   return moments;

@@ -36,14 +36,14 @@ struct PhotographyOptions {
 /// options.render with the ambient light of the preset, unless it is stated.
 [[nodiscard]] RenderOptions scene_light(const PhotographyOptions& options);
 
-/// An object at even steps through an exposure, in which it goes `shift` (mm, world) at even speed
-/// without turning; `middle`: where half of the exposure has it. A step is at most half a footprint
-/// (mm), below what a pixel resolves: the mean of the moments' light is that of the exposure. One
-/// moment where nothing moves.
+/// An object at even steps through an exposure; `middle`: where half of the exposure has it. No
+/// vertex steps by more than half a footprint (mm), below what a pixel resolves: the mean of the
+/// moments' light is that of the exposure. One moment where nothing moves.
 [[nodiscard]] std::vector<SimulatedObject> through_exposure(const TriangleMesh& mesh,
                                                             const Reflectance& surface,
                                                             const RigidTransform& middle,
-                                                            const Vec3& shift, double footprint_mm);
+                                                            const ExposureMotion& motion,
+                                                            double footprint_mm);
 
 /// What camera `camera` of the rig stores of the rig's patterns on the object: 8U or 16U, RGB, or
 /// one channel of a camera with a mosaic. A texture camera sees white light instead. The

@@ -37,7 +37,7 @@ class PhotographyTest : public testing::Test {
   [[nodiscard]] std::vector<double> row(const Vec3& shift) const {
     const TriangleMesh board = make_box({10, 200, 400}, {-5, 100, 0});
     constexpr double kFootprint = 0.5;
-    const auto moments = through_exposure(board, surface_, {}, shift, kFootprint);
+    const auto moments = through_exposure(board, surface_, {}, {.shift = shift}, kFootprint);
     const cv::Mat picture = photograph(rig_, 0, moments, photo_, 0);
     std::vector<double> values;
     for (int x = 0; x < picture.cols; ++x)
@@ -74,13 +74,29 @@ TEST_F(PhotographyTest, WhatMovesAlongTheEdgeOrNotAtAllKeepsIt) {
 
 TEST_F(PhotographyTest, MomentsAreEvenAroundTheMiddleOfTheExposure) {
   const auto moments = through_exposure(make_box({1, 1, 1}, Vec3::Zero()), surface_,
-                                        {Mat3::Identity(), Vec3(5, 0, 0)}, Vec3(0, 2, 0), 0.5);
+                                        {Mat3::Identity(), Vec3(5, 0, 0)},
+                                        {.shift = Vec3(0, 2, 0)}, 0.5);
   ASSERT_EQ(moments.size(), 8U);
   Vec3 mean = Vec3::Zero();
   for (const SimulatedObject& moment : moments)
     mean += moment.world_from_object().translation / static_cast<double>(moments.size());
   EXPECT_LT((mean - Vec3(5, 0, 0)).norm(), 1e-12);
   EXPECT_NEAR(moments.front().world_from_object().translation.y(), -0.875, 1e-12);
+}
+
+TEST_F(PhotographyTest, WhatTurnsGoesFarthestAtItsRim) {
+  constexpr double kTurn = 0.1;  // rad, through the exposure
+  const Vec3 pivot(0, 5, 0);
+  const Vec3 rim(0, 105, 0);  // 100 mm off the axis: 10 mm of way, 40 half-millimetre steps at least
+  const auto moments = through_exposure(make_box({1, 1, 1}, rim), surface_, {},
+                                        {.turn_rad = kTurn * Vec3::UnitZ(), .pivot = pivot}, 0.5);
+  EXPECT_GE(moments.size(), 40U);
+  const RigidTransform& first = moments.front().world_from_object();
+  const RigidTransform& last = moments.back().world_from_object();
+  EXPECT_LT((first * pivot - pivot).norm(), 1e-12);
+  const auto steps = static_cast<double>(moments.size());
+  EXPECT_NEAR((last * rim - first * rim).norm(), 100 * kTurn * (steps - 1) / steps, 0.01);
+  EXPECT_LT((0.5 * (last * rim + first * rim) - rim).norm(), 0.2) << "sagitta of 10 mm";
 }
 
 }  // namespace

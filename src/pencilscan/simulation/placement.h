@@ -23,4 +23,15 @@ struct Motion {
   [[nodiscard]] RigidTransform at(int frame) const;
 };
 
+/// Rigid motion at even speed within one exposure: a turn about an axis through `pivot`, and a
+/// shift.
+struct ExposureMotion {
+  Vec3 shift = Vec3::Zero();     ///< mm, world, from the exposure's start to its end
+  Vec3 turn_rad = Vec3::Zero();  ///< the axis times the angle, likewise
+  Vec3 pivot = Vec3::Zero();     ///< world, mm
+
+  /// What has moved since the middle of the exposure; `share`: of the exposure, -0.5 to 0.5.
+  [[nodiscard]] RigidTransform since_middle(double share) const;
+};
+
 }  // namespace pencilscan
