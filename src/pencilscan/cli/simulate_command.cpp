@@ -134,9 +134,9 @@ void write_frames(const SimulateOptions& options, const Rig& rig, const Triangle
   const Motion motion{options.rotate_deg * M_PI / 180, vector_of(options.translate_mm),
                       working_volume(rig).center};
   const double seconds = options.exposure_ms / 1000;
-  const ExposureMotion in_exposure{seconds * vector_of(options.speed_mm_s),
-                                   seconds * M_PI / 180 * vector_of(options.spin_deg_s),
-                                   working_volume(rig).center};
+  const ExposurePath in_exposure{seconds * vector_of(options.speed_mm_s),
+                                 seconds * M_PI / 180 * vector_of(options.spin_deg_s),
+                                 working_volume(rig).center};
   const std::size_t total = static_cast<std::size_t>(options.frame_count) * rig.cameras.size();
   for (int frame = 0; frame < options.frame_count; ++frame) {
     const SimulatedObject object(mesh, options.surface, motion.at(frame));

@@ -142,6 +142,16 @@ double cost(const WindowFit& fit) { return static_cast<double>(fit.misfit); }
 
 }  // namespace
 
+/// A mosaic leaves a quarter of the samples, also where the camera fills its colours in, so noise
+/// at a window's centre doubles. It falls as 1 / r with the radius r, what a quadric leaves of the
+/// surface grows as r^4: the best r goes as the fifth root of the noise.
+DepthOptions options_for(const CameraLight& light, DepthOptions options) {
+  constexpr double kWider = 1.1487;  // 2^(1/5)
+  if (light.of_mosaic)
+    options.half = static_cast<int>(std::lround((options.half + 0.5) * kWider - 0.5));
+  return options;
+}
+
 void measure_light(const Rig& rig, int camera, const std::vector<ColorFamily>& families,
                    std::span<const MeasuredPoint> points, const DepthOptions& options,
                    CameraLight& light) {

@@ -23,6 +23,9 @@ struct DepthOptions {
   double max_move = 2;                  ///< footprints; of a node started from the closed surface
 };
 
+/// The options as they are for one camera's pictures: windows behind a mosaic are wider.
+[[nodiscard]] DepthOptions options_for(const CameraLight& light, DepthOptions options);
+
 /// Fills in the light of one camera whose images are there already: its patterns, and the blur and
 /// noise that its images show at the seeds.
 void measure_light(const Rig& rig, int camera, const std::vector<ColorFamily>& families,

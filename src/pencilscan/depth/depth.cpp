@@ -19,16 +19,6 @@ cv::Mat unsaturated(const cv::Mat& values) {
   return valid;
 }
 
-/// A mosaic leaves a quarter of the samples, also where the camera fills its colours in, so noise
-/// at a window's centre doubles. It falls as 1 / r with the radius r, what a quadric leaves of the
-/// surface grows as r^4: the best r goes as the fifth root of the noise.
-DepthOptions options_for(const CameraLight& light, DepthOptions options) {
-  constexpr double kWider = 1.1487;  // 2^(1/5)
-  if (light.of_mosaic)
-    options.half = static_cast<int>(std::lround((options.half + 0.5) * kWider - 0.5));
-  return options;
-}
-
 CameraDepthReport camera_report(const DepthMap& map, double blur_px) {
   CameraDepthReport report;
   report.camera = map.camera;

@@ -9,6 +9,7 @@
 #include "pencilscan/depth/dense_depth.h"
 #include "pencilscan/detection/detect.h"
 #include "pencilscan/geometry/ray_scene.h"
+#include "pencilscan/uncertainty/exposure_motion.h"
 
 namespace pencilscan {
 
@@ -50,6 +51,11 @@ struct DepthResult {
                                         std::span<const CameraDetection> detections,
                                         std::span<const MeasuredPoint> points,
                                         const DepthStageOptions& options = {});
+
+/// How the object moved within the exposure, from the blur of the lines on the measured surface
+/// (line_blur.h). `result`: with its lights.
+[[nodiscard]] ExposureMotion motion_in_exposure(const Rig& rig, const DepthStageOptions& options,
+                                                const DepthResult& result);
 
 /// Guided depth: windows of nodes without depth are fitted once more, started from the closed
 /// surface. Growth from neighbours does not cross a gap; the surface bridges it. A patch that no

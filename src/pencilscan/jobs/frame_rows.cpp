@@ -64,6 +64,9 @@ void read_report(const json& report, const SequenceDevices& devices, FrameRow& r
   const json crossings = report.value("crossing_disagreement", json::object());
   row.crossing_px = figure(crossings, "median_px");
   row.crossing_expected_px = figure(crossings, "expected_px");
+  const json motion = report.value("motion", json::object());
+  if (motion.contains("seen"))
+    row.motion_mm = motion.value("seen", false) ? figure(motion, "way_mm") : 0;
   const json surface = report.value("surface", json::object());
   if (figure(surface, "vertices") > 0) row.measured_share = figure(surface, "measured_share");
   double saturated = 0;

@@ -37,6 +37,7 @@ struct FrameRow {
   double line_height = kUnknownFigure;           ///< the same
   double saturated_pixels = kUnknownFigure;      ///< sum of the cameras
   double time_spread_us = kUnknownFigure;
+  double motion_mm = kUnknownFigure;  ///< way within the exposure; 0: none was seen
   std::vector<CameraRow> cameras;
   std::vector<double> device_crossing_px;  ///< cameras, then projectors
   std::vector<double> projector_points;

@@ -48,7 +48,8 @@ Columns columns_of(const FrameRow& row, const SequenceDevices& devices) {
                      {"line_width_px", row.line_width_px},
                      {"line_height", row.line_height},
                      {"saturated_pixels", row.saturated_pixels},
-                     {"time_spread_us", row.time_spread_us}};
+                     {"time_spread_us", row.time_spread_us},
+                     {"motion_mm", row.motion_mm}};
   const std::size_t cameras = devices.cameras.size();
   for (std::size_t c = 0; c < cameras; ++c) {
     const CameraRow& camera = row.cameras[c];

@@ -60,7 +60,8 @@ FrameResult measure_frame(const Rig& rig, const Frame& frame, PointResult lines,
   if (!options.meshes) return result;
   const Frame right = without(frame, result.points.left_out);
   result.shape = measure_shape(rig, right, result.points, options.shape, links, clock);
-  return match_on_surface(rig, std::move(result), options.points, clock);
+  result = match_on_surface(rig, std::move(result), options.points, clock);
+  return count_motion(rig, std::move(result));
 }
 
 PointResult measure_points(const Rig& stated, const Frame& frame, const PointOptions& options,
@@ -121,6 +122,11 @@ FrameResult in_unit(double unit, FrameResult result) {
       node.sigma *= f;
     }
   }
+  ExposureMotion& motion = shape.motion;
+  motion.shift *= unit;
+  motion.pivot *= unit;
+  for (double* length : {&motion.way, &motion.way_deviation, &motion.at_most}) *length *= unit;
+  if (motion.is_seen) result.points.warnings.push_back(motion_warning(motion));
   // Scaling and files round: what lay apart may lie at one place.
   separate_vertices(shape.surface.mesh);
   separate_vertices(shape.surface.measured);

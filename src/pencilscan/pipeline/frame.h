@@ -23,6 +23,7 @@
 #include "pencilscan/surface/surface.h"
 #include "pencilscan/tracking/tracked_surface.h"
 #include "pencilscan/uncertainty/error_model.h"
+#include "pencilscan/uncertainty/exposure_motion.h"
 
 namespace pencilscan {
 
@@ -101,6 +102,7 @@ struct ShapeResult {
   SurfaceResult surface;
   std::shared_ptr<const RayScene>
       scene;              ///< of surface.mesh before its colours; null without dense depth
+  ExposureMotion motion;  ///< within the exposure; not judged without dense depth
   int carried_since = 0;  ///< moments since the closed surface was made from nothing
 };
 
@@ -163,6 +165,10 @@ struct NothingFound : StageError {
                                            const PointOptions& options = {},
                                            const StageClock& clock = {});
 
+/// Where the object moved within the exposure, points and surface are as much less sure as that
+/// makes them.
+[[nodiscard]] FrameResult count_motion(const Rig& rig, FrameResult result);
+
 /// From lines to the whole result, in footprints. NothingFound when there are no points.
 [[nodiscard]] FrameResult measure_frame(const Rig& rig, const Frame& frame, PointResult lines,
                                         const FrameOptions& options, const FrameLinks& links,
@@ -173,7 +179,8 @@ struct NothingFound : StageError {
                                          const PointOptions& options = {},
                                          const StageClock& clock = {});
 
-/// A result in footprints in the unit that a footprint is `unit` of, without `scene`.
+/// A result in footprints in the unit that a footprint is `unit` of, without `scene`. Warns of
+/// motion within the exposure.
 [[nodiscard]] FrameResult in_unit(double unit, FrameResult result);
 
 }  // namespace pencilscan

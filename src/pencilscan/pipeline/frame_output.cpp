@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <numbers>
 #include <opencv2/core.hpp>
 
 #include "pencilscan/core/median.h"
@@ -192,6 +193,21 @@ std::vector<OverlayCurve> overlay_curves(const Rig& rig, const GridGraph& graph,
   return curves;
 }
 
+ordered_json vector_report(const Vec3& v) {
+  return ordered_json::array({number(v.x()), number(v.y()), number(v.z())});
+}
+
+ordered_json motion_report(const ExposureMotion& motion) {
+  ordered_json report = {{"seen", motion.is_seen}, {"at_most_mm", number(motion.at_most)}};
+  if (!motion.is_seen) return report;
+  report["way_mm"] = number(motion.way);
+  report["way_sigma_mm"] = number(motion.way_deviation);
+  report["shift_mm"] = vector_report(motion.shift);
+  report["turn_deg"] = vector_report(motion.turn * (180 / std::numbers::pi));
+  report["pivot_mm"] = vector_report(motion.pivot);
+  return report;
+}
+
 }  // namespace
 
 nlohmann::ordered_json frame_report(const Rig& rig, const Frame& frame, const PointResult& points,
@@ -224,6 +240,7 @@ nlohmann::ordered_json frame_report(const Rig& rig, const Frame& frame, const Po
   }
   if (!shape.depth.maps.empty())
     report["depth"] = depth_report(rig, shape.depth.report, shape.holes);
+  if (shape.motion.is_judged) report["motion"] = motion_report(shape.motion);
   const SurfaceReport& s = shape.surface.report;
   report["surface"] = {{"status", to_string(s.status)},
                        {"points_used", s.points_used},

@@ -173,6 +173,7 @@ ShapeResult measure_shape(const Rig& rig, const Frame& frame, const PointResult&
   ShapeResult result;
   if (options.depth.enabled) {
     clock("depth", [&] { result.depth = depth_of(rig, frame, points, options.depth); });
+    clock("motion", [&] { result.motion = motion_in_exposure(rig, options.depth, result.depth); });
     std::vector<ColorView> views;
     clock("surface", [&] {
       views = color_views(rig, frame, points, result.depth.report);

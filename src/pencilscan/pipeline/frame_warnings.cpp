@@ -112,4 +112,14 @@ Warning rig_warning(const CrossingDisagreement& crossings, bool is_corrected) {
           {{"median_px", crossings.median_px}, {"expected_px", crossings.expected_px}}};
 }
 
+Warning motion_warning(const ExposureMotion& motion) {
+  return {WarningCode::kMotion,
+          "the object moved by " + formatted(motion.way) + " mm, give or take " +
+              formatted(motion.way_deviation) +
+              ", while the shutters were open, which blurs lines: the shape is that of the middle "
+              "of the exposure; a shorter exposure is sharper",
+          {},
+          {{"way_mm", motion.way}, {"way_sigma_mm", motion.way_deviation}}};
+}
+
 }  // namespace pencilscan

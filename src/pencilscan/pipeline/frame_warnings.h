@@ -27,4 +27,7 @@ namespace pencilscan {
 /// as the frame corrects them.
 [[nodiscard]] Warning rig_warning(const CrossingDisagreement& crossings, bool is_corrected);
 
+/// That the object moved while the shutters were open; lengths in the rig's unit.
+[[nodiscard]] Warning motion_warning(const ExposureMotion& motion);
+
 }  // namespace pencilscan

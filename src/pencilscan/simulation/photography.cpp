@@ -53,7 +53,7 @@ RenderOptions scene_light(const PhotographyOptions& options) {
 
 std::vector<SimulatedObject> through_exposure(const TriangleMesh& mesh, const Reflectance& surface,
                                               const RigidTransform& middle,
-                                              const ExposureMotion& motion, double footprint_mm) {
+                                              const ExposurePath& motion, double footprint_mm) {
   PENCILSCAN_CHECK(footprint_mm > 0);
   constexpr double kStep = 0.5;  // footprints
   double reach = 0;

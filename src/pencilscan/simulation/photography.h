@@ -42,7 +42,7 @@ struct PhotographyOptions {
 [[nodiscard]] std::vector<SimulatedObject> through_exposure(const TriangleMesh& mesh,
                                                             const Reflectance& surface,
                                                             const RigidTransform& middle,
-                                                            const ExposureMotion& motion,
+                                                            const ExposurePath& motion,
                                                             double footprint_mm);
 
 /// What camera `camera` of the rig stores of the rig's patterns on the object: 8U or 16U, RGB, or

@@ -73,9 +73,9 @@ TEST_F(PhotographyTest, WhatMovesAlongTheEdgeOrNotAtAllKeepsIt) {
 }
 
 TEST_F(PhotographyTest, MomentsAreEvenAroundTheMiddleOfTheExposure) {
-  const auto moments = through_exposure(make_box({1, 1, 1}, Vec3::Zero()), surface_,
-                                        {Mat3::Identity(), Vec3(5, 0, 0)},
-                                        {.shift = Vec3(0, 2, 0)}, 0.5);
+  const auto moments =
+      through_exposure(make_box({1, 1, 1}, Vec3::Zero()), surface_,
+                       {Mat3::Identity(), Vec3(5, 0, 0)}, {.shift = Vec3(0, 2, 0)}, 0.5);
   ASSERT_EQ(moments.size(), 8U);
   Vec3 mean = Vec3::Zero();
   for (const SimulatedObject& moment : moments)
@@ -87,7 +87,8 @@ TEST_F(PhotographyTest, MomentsAreEvenAroundTheMiddleOfTheExposure) {
 TEST_F(PhotographyTest, WhatTurnsGoesFarthestAtItsRim) {
   constexpr double kTurn = 0.1;  // rad, through the exposure
   const Vec3 pivot(0, 5, 0);
-  const Vec3 rim(0, 105, 0);  // 100 mm off the axis: 10 mm of way, 40 half-millimetre steps at least
+  const Vec3 rim(0, 105,
+                 0);  // 100 mm off the axis: 10 mm of way, 40 half-millimetre steps at least
   const auto moments = through_exposure(make_box({1, 1, 1}, rim), surface_, {},
                                         {.turn_rad = kTurn * Vec3::UnitZ(), .pivot = pivot}, 0.5);
   EXPECT_GE(moments.size(), 40U);

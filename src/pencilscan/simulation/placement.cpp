@@ -30,7 +30,7 @@ RigidTransform Motion::at(int frame) const {
   return {turn, pivot - turn * pivot + frame * translate_mm};
 }
 
-RigidTransform ExposureMotion::since_middle(double share) const {
+RigidTransform ExposurePath::since_middle(double share) const {
   const double angle = turn_rad.norm();
   if (angle == 0) return {Mat3::Identity(), share * shift};
   const Mat3 turn = Eigen::AngleAxisd(share * angle, turn_rad / angle).toRotationMatrix();

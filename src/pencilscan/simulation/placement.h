@@ -25,7 +25,7 @@ struct Motion {
 
 /// Rigid motion at even speed within one exposure: a turn about an axis through `pivot`, and a
 /// shift.
-struct ExposureMotion {
+struct ExposurePath {
   Vec3 shift = Vec3::Zero();     ///< mm, world, from the exposure's start to its end
   Vec3 turn_rad = Vec3::Zero();  ///< the axis times the angle, likewise
   Vec3 pivot = Vec3::Zero();     ///< world, mm

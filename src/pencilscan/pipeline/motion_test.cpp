@@ -1,0 +1,94 @@
+// Motion within the exposure: a ball that rests or moves while the shutters are open.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "pencilscan/pipeline/frame.h"
+#include "pencilscan/planning/ring.h"
+#include "pencilscan/simulation/photography.h"
+
+namespace pencilscan {
+namespace {
+
+constexpr double kRadius = 90;  // mm
+constexpr int kSegments = 256;  // facets lie 0.007 mm within the ball, far below sigma
+
+Rig small_ring() {
+  RingOptions options;
+  options.camera_width = 640;
+  options.camera_height = 480;
+  options.camera_focal_px = 1600;
+  options.volume_radius_mm = 110;
+  return make_ring(options);
+}
+
+FrameResult result_of(const Vec3& shift) {
+  const Rig rig = small_ring();
+  const auto moments =
+      through_exposure(make_sphere(kRadius, kSegments), {}, {}, {.shift = shift}, footprint(rig));
+  PhotographyOptions photo;
+  photo.noise = "medium";
+  photo.render.samples = 2;
+  Frame frame;
+  frame.name = "000000";
+  for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
+    const cv::Mat picture = photograph(rig, c, moments, photo, static_cast<std::uint32_t>(c));
+    cv::Mat values;
+    picture.convertTo(values, CV_32FC3, 1.0 / 255);
+    frame.images.push_back(values);
+  }
+  return reconstruct_frame(rig, frame);
+}
+
+bool warns(const FrameResult& result) {
+  return std::any_of(result.points.warnings.begin(), result.points.warnings.end(),
+                     [](const Warning& w) { return w.code == WarningCode::kMotion; });
+}
+
+/// Shares of the points that lie within one and two sigma of the ball, along their rays, where the
+/// middle of the exposure has it.
+std::pair<double, double> coverage(const FrameResult& result) {
+  const Rig rig = small_ring();
+  std::size_t one = 0;
+  std::size_t two = 0;
+  std::size_t all = 0;
+  for (const MeasuredPoint& p : result.points.points) {
+    const Vec3 x(static_cast<double>(p.x), static_cast<double>(p.y), static_cast<double>(p.z));
+    const Vec3 ray = (x - rig.cameras[p.camera].center()).normalized();
+    const double cosine = std::max(0.2, std::abs(ray.dot(x.normalized())));
+    const double off = std::abs(x.norm() - kRadius) / cosine / static_cast<double>(p.sigma);
+    one += off < 1 ? 1U : 0U;
+    two += off < 2 ? 1U : 0U;
+    ++all;
+  }
+  return {static_cast<double>(one) / static_cast<double>(all),
+          static_cast<double>(two) / static_cast<double>(all)};
+}
+
+TEST(MotionInExposure, WhatRestsIsLeftAlone) {
+  const FrameResult result = result_of(Vec3::Zero());
+  EXPECT_TRUE(result.shape.motion.is_judged);
+  EXPECT_FALSE(result.shape.motion.is_seen);
+  EXPECT_FALSE(warns(result));
+  EXPECT_LT(result.shape.motion.at_most, 1.2);
+}
+
+TEST(MotionInExposure, AShiftIsMeasuredAndCounted) {
+  for (const Vec3& shift : {Vec3(1.5, -1, 0.5), Vec3(1, 1.5, -2)}) {
+    const FrameResult result = result_of(shift);
+    const ExposureMotion& motion = result.shape.motion;
+    ASSERT_TRUE(motion.is_seen) << shift.transpose();
+    EXPECT_TRUE(warns(result));
+    const double sign = motion.shift.dot(shift) > 0 ? 1 : -1;
+    EXPECT_LT((sign * motion.shift - shift).norm(), 0.2 * shift.norm()) << motion.shift.transpose();
+    EXPECT_NEAR(motion.way, shift.norm(), 0.15 * shift.norm());
+    EXPECT_GE(motion.at_most, 0.9 * shift.norm());
+    const auto [one, two] = coverage(result);
+    EXPECT_GT(one, 0.62);
+    EXPECT_GT(two, 0.92);
+  }
+}
+
+}  // namespace
+}  // namespace pencilscan
