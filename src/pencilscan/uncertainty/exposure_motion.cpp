@@ -16,7 +16,7 @@ using Eigen::VectorXd;
 
 // Of sixteen frames of resting objects (docs/sequences.md) some reach a gain of 60, some eight
 // deviations of the jackknife, some 1 % of the blur; none reaches all of them.
-constexpr double kLeastGain = 20;        // of the squared deviations
+constexpr double kLeastGain = 30;        // of the squared deviations
 constexpr double kLeastDeviations = 8;   // by the jackknife, of the best of all directions
 constexpr double kBaselineError = 0.01;  // share of the blur's variance
 constexpr std::size_t kLeastLines = 500;
