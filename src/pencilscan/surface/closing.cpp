@@ -59,7 +59,7 @@ TriangleMesh without_floaters(const TriangleMesh& mesh, double min_share, std::s
 }  // namespace
 
 ClosedSurface surface_within_cube(std::span<const SurfaceSample> samples, double cell_mm,
-                                  int max_depth) {
+                                  int max_depth, const std::optional<Floor>& floor) {
   const Cube cube = bounding_cube(samples);
   const double side = 2 * kRoom * std::max(cube.half_side, cell_mm);
   int cells = 32;
@@ -69,7 +69,7 @@ ClosedSurface surface_within_cube(std::span<const SurfaceSample> samples, double
   const double cell = std::max(cell_mm, side / cells);
   const Vec3 origin = cube.center - Vec3::Constant(0.5 * cell * cells);
   result.scale = 0.5 * cell * cells / std::max(cube.half_side, 0.5 * cell);
-  const InsideField field = inside_field(samples, origin, cell, cells);
+  const InsideField field = inside_field(samples, origin, cell, cells, floor);
   // Caps: where the surface leaves the cells around it, which its growth from level to level
   // prevents.
   result.mesh = with_caps(marching_cubes(field.lattice, field.values, field.origin, field.cell));
@@ -79,7 +79,8 @@ ClosedSurface surface_within_cube(std::span<const SurfaceSample> samples, double
 
 ClosedSurface closed_surface(std::span<const SurfaceSample> samples,
                              const ClosingOptions& options) {
-  ClosedSurface result = surface_within_cube(samples, options.cell_mm, options.max_depth);
+  ClosedSurface result =
+      surface_within_cube(samples, options.cell_mm, options.max_depth, options.floor);
   attribute_vertices(samples, options.reach_spacings, options.spacing_mm, result.mesh);
   result.mesh =
       without_floaters(result.mesh, options.min_component_share, result.components_removed);

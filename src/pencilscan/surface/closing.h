@@ -1,8 +1,10 @@
 #pragma once
 
+#include <optional>
 #include <span>
 
 #include "pencilscan/geometry/mesh.h"
+#include "pencilscan/rig/rig.h"
 #include "pencilscan/surface/sample.h"
 
 namespace pencilscan {
@@ -13,6 +15,7 @@ struct ClosingOptions {
   int max_depth = 9;                  ///< cells along the cube: at most 2 to this power
   double reach_spacings = 1;          ///< a vertex farther from all samples was not measured
   double min_component_share = 0.05;  ///< of the largest component's measured area
+  std::optional<Floor> floor;         ///< nothing is below it
 };
 
 struct ClosedSurface {
@@ -24,9 +27,10 @@ struct ClosedSurface {
 
 /// The closed surface of at least one oriented sample within a cube around all of them, without
 /// sigma and confidence. Cells are larger than cell_mm (> 0) where 2^max_depth of them do not cross
-/// the cube.
+/// the cube. Nothing is below the floor.
 [[nodiscard]] ClosedSurface surface_within_cube(std::span<const SurfaceSample> samples,
-                                                double cell_mm, int max_depth);
+                                                double cell_mm, int max_depth,
+                                                const std::optional<Floor>& floor = std::nullopt);
 
 /// The closed surface of the samples, without components that hardly anything measured.
 [[nodiscard]] ClosedSurface closed_surface(std::span<const SurfaceSample> samples,

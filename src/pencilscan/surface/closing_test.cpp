@@ -228,6 +228,36 @@ TEST(ClosedSurface, HoleIsBridgedNearItsRim) {
   }
 }
 
+TEST(ClosedSurface, AnObjectThatIsOpenBelowEndsOnTheFloor) {
+  constexpr double kBall = 20;
+  constexpr double kLowest = -6;  // of the samples; a dome that goes on to the floor
+  constexpr double kFloor = -8;
+  const auto samples = ball_samples(kBall, 6000, [](const Vec3& x) { return x.z() > kLowest; });
+  ClosingOptions options;
+  options.spacing_mm = options.cell_mm = samples[0].spacing;
+  const auto lowest = [](const TriangleMesh& mesh) {
+    double z = 0;
+    for (const Vec3& x : mesh.vertices) z = std::min(z, x.z());
+    return z;
+  };
+  EXPECT_LT(lowest(closed_surface(samples, options).mesh), kFloor - 2);  // bulges
+  options.floor = Floor{{5, 5, kFloor}, Vec3::UnitZ()};
+  const TriangleMesh mesh = closed_surface(samples, options).mesh;
+  const EdgeCounts edges = count_edges(mesh);
+  EXPECT_EQ(edges.boundary + edges.non_manifold, 0U);
+  EXPECT_NEAR(lowest(mesh), kFloor, 1e-3);
+  std::size_t on_floor = 0;
+  for (const Vec3& x : mesh.vertices) {
+    const double base = std::sqrt(kBall * kBall - kFloor * kFloor);
+    if (x.z() < kFloor + 1e-3 && x.head<2>().norm() < 0.8 * base) ++on_floor;
+    if (x.z() > kFloor + options.cell_mm) {
+      EXPECT_NEAR(x.norm(), kBall, 0.05 * kBall);
+    }
+    EXPECT_LT(x.norm(), 1.05 * kBall);
+  }
+  EXPECT_GT(on_floor, 100U);
+}
+
 TEST(ClosedSurface, SameBytesForAnyThreadCount) {
   const auto samples = ball_samples(20, 4000, [](const Vec3& x) { return x.x() < 12; });
   ClosingOptions options;

@@ -261,6 +261,18 @@ std::vector<float> prolonged(const Lattice& coarse, const std::vector<float>& va
   return result;
 }
 
+/// The field without what is below the floor: the distance to that, as a sample's, where it is
+/// less.
+std::vector<float> above_floor(const Floor& floor, const Vec3& origin, double cell,
+                               const Lattice& lattice, std::vector<float> values) {
+  parallel_chunks(lattice.size(), [&](std::size_t i) {
+    const Lattice::Node n = lattice.node(i);
+    const double height = floor.height(origin + cell * Vec3(n[0], n[1], n[2])) / cell;
+    values[i] = std::min(values[i], static_cast<float>(std::clamp(height / kStep, -0.5, 0.5)));
+  });
+  return values;
+}
+
 Lattice whole_cube() {
   constexpr std::size_t kCells = kCoarsest;
   return {kCoarsest, 1, std::vector<std::uint8_t>(kCells * kCells * kCells, 1)};
@@ -269,7 +281,7 @@ Lattice whole_cube() {
 }  // namespace
 
 InsideField inside_field(std::span<const SurfaceSample> samples, const Vec3& origin, double cell,
-                         int cells) {
+                         int cells, const std::optional<Floor>& floor) {
   PENCILSCAN_CHECK(cells >= kCoarsest && cells <= Lattice::kMaxCells && cell > 0);
   std::vector<std::vector<Patch>> levels{merged(patches_of(samples, origin, cell), cells)};
   for (int n = cells / 2; n >= kCoarsest; n /= 2) levels.push_back(coarser(levels.back(), n));
@@ -279,10 +291,15 @@ InsideField inside_field(std::span<const SurfaceSample> samples, const Vec3& ori
   field.values.assign(field.lattice.size(), -0.5F);
   solve_field(field.lattice, data_of(levels.back(), field.lattice), kCoarsestTolerance,
               field.values);
+  // Each level is solved as if there were no floor: the object's sides go on to it.
+  const auto without_floor = [&] {
+    const double side = cell * cells / field.lattice.cells();
+    return floor ? above_floor(*floor, origin, side, field.lattice, field.values) : field.values;
+  };
   for (std::size_t level = levels.size() - 1; level-- > 0;) {
     Marks marks(field.lattice.cells());
     marks.add(levels[level + 1]);
-    marks.add_surface(field.lattice, field.values);
+    marks.add_surface(field.lattice, without_floor());
     marks.keep_cells_of(field.lattice);
     Lattice fine(2 * field.lattice.cells(), 2, marks.bytes());
     std::vector<float> values = prolonged(field.lattice, field.values, fine);
@@ -290,6 +307,7 @@ InsideField inside_field(std::span<const SurfaceSample> samples, const Vec3& ori
     field.lattice = std::move(fine);
     field.values = std::move(values);
   }
+  field.values = without_floor();
   return field;
 }
 

@@ -1,8 +1,10 @@
 #pragma once
 
+#include <optional>
 #include <span>
 #include <vector>
 
+#include "pencilscan/rig/rig.h"
 #include "pencilscan/surface/lattice.h"
 #include "pencilscan/surface/sample.h"
 
@@ -31,8 +33,10 @@ struct InsideField {
 /// and keeps the coarser one's values at its rim.
 ///
 /// The cube has cells^3 cells; cells: 32 times a power of two, at most Lattice::kMaxCells. A sample
-/// reaches as far as its `spacing` demands. The bytes are the same for any thread count.
+/// reaches as far as its `spacing` demands. What is below a floor is outside: where nothing is
+/// known of an object's base, it ends there. The bytes are the same for any thread count.
 [[nodiscard]] InsideField inside_field(std::span<const SurfaceSample> samples, const Vec3& origin,
-                                       double cell, int cells);
+                                       double cell, int cells,
+                                       const std::optional<Floor>& floor = std::nullopt);
 
 }  // namespace pencilscan

@@ -169,6 +169,7 @@ SurfaceResult reconstruct_surface(const Rig& rig, std::span<const MeasuredPoint>
   closing.max_depth = options.max_depth;
   closing.reach_spacings = options.reach_spacings;
   closing.min_component_share = options.min_component_share;
+  closing.floor = rig.floor;
   take(closed_surface(kept, closing), result);
   report.seconds_closing = closing_watch.seconds();
   result.measured = measured_part(result.mesh, 4 * set.spacing * set.spacing);
@@ -203,6 +204,7 @@ SurfaceResult close_depth(const Rig& rig, std::span<const DepthMap> maps,
   closing.max_depth = options.max_depth;
   closing.reach_spacings = options.reach_spacings;
   closing.min_component_share = options.min_component_share;
+  closing.floor = rig.floor;
   take(closed_surface(samples, closing), result);
   report.seconds_closing = closing_watch.seconds();
   const std::vector<Vec3> closed = result.mesh.vertices;
