@@ -6,12 +6,16 @@
 
 #include "pencilscan/core/lanes.h"
 #include "pencilscan/core/median.h"
+#include "pencilscan/detection/profile_fit.h"
 #include "pencilscan/detection/refine.h"
 
 namespace pencilscan {
 namespace {
 
-constexpr int kHalf = 4;           ///< profile half-length, px
+constexpr int kHalf = 4;  ///< profile half-length, samples
+/// Widths that the half-length of a wide line holds: a box has ended at 1.7. Of lines that the full
+/// size shows, samples are 1 px apart.
+constexpr float kHalfWidths = 2.2F;
 constexpr int kColorUnknowns = 4;  ///< own line, other families, background level and slope
 
 constexpr int kRightSides = 3;  ///< red, green, blue
@@ -59,6 +63,8 @@ PENCILSCAN_CLONES
 void sum_profiles(const Images& images, const EightPoints& points,
                   std::array<Lanes, PointSums::kNumbers>& sums) {
   sums = {};
+  Lanes step = points.width * (kHalfWidths / static_cast<float>(kHalf));
+  step = points.width > kMaxLineWidth ? step : step - step + 1;
   const auto* color = images.color.ptr<float>();
   const auto* others = images.others.ptr<float>();
   const auto color_row = static_cast<int>(images.color.step1());
@@ -67,9 +73,9 @@ void sum_profiles(const Images& images, const EightPoints& points,
   for (int o = -kHalf; o <= kHalf; ++o) {
     // Nearest pixels; the shift makes truncation round.
     constexpr int kShift = 4096;
-    const auto fo = static_cast<float>(o);
-    const Lanes fx = points.x + fo * points.nx + (kShift + 0.5F);
-    const Lanes fy = points.y + fo * points.ny + (kShift + 0.5F);
+    const Lanes offset = static_cast<float>(o) * step;
+    const Lanes fx = points.x + offset * points.nx + (kShift + 0.5F);
+    const Lanes fy = points.y + offset * points.ny + (kShift + 0.5F);
     IntLanes x = __builtin_convertvector(fx, IntLanes) - kShift;
     IntLanes y = __builtin_convertvector(fy, IntLanes) - kShift;
     const IntLanes is_inside =
@@ -82,7 +88,7 @@ void sum_profiles(const Images& images, const EightPoints& points,
     exponential(-0.5F * d * d / (points.width * points.width), unknown[0]);
     gather(others, y * others_row + x, unknown[1]);
     unknown[2] = zero + 1;
-    unknown[3] = d * (1 / static_cast<float>(kHalf));
+    unknown[3] = d / (step * static_cast<float>(kHalf));
     for (Lanes& u : unknown) u = is_inside ? u : zero;
     std::size_t number = 0;
     for (std::size_t i = 0; i < kColorUnknowns; ++i) {

@@ -56,7 +56,9 @@ CameraDetection detect_curves(const Camera& camera, const Rig& rig,
     const std::vector<Ridgel> ridgels = find_ridgels(presence, options.ridge);
     std::vector<Curve> curves = trace_curves(ridgels, presence.size(), options.trace);
     for (Curve& curve : curves) curve.family = static_cast<int>(f);
-    curves_of[f] = refine_curves(presence, std::move(curves), options.refine);
+    RefineOptions refine = options.refine;
+    refine.sizes = std::max(refine.sizes, sizes_of(ridgels));
+    curves_of[f] = refine_curves(presence, std::move(curves), refine);
     // Dark outside the lit area.
     result.presence[f] = cv::Mat(image.size(), CV_32F, cv::Scalar(0));
     presence.copyTo(result.presence[f](area));

@@ -6,11 +6,13 @@
 #include <cmath>
 #include <numbers>
 #include <opencv2/imgproc.hpp>
+#include <string>
 #include <vector>
 
 #include "pencilscan/core/random.h"
 #include "pencilscan/detection/curve_smoothing.h"
 #include "pencilscan/detection/profile_fit.h"
+#include "pencilscan/detection/refine.h"
 #include "pencilscan/detection/ridge.h"
 #include "pencilscan/detection/trace.h"
 
@@ -111,7 +113,7 @@ TEST(FindRidgels, LieOnTheLineWithTheSecondDerivativeOfASmoothedOne) {
   constexpr int kSize = 120;
   constexpr double kWidth = 1.5;
   RidgeOptions options;
-  options.find_wide = false;
+  options.widest_px = 4;  // full size only
   const double q = std::hypot(kWidth, options.sigma_across_px);
   for (const double degrees : {0.0, 15.0, 37.0, 90.0, 128.0}) {
     const double angle = degrees * std::numbers::pi / 180;
@@ -136,8 +138,8 @@ TEST(TraceCurves, LinksTheRidgelsOfTwoLinesIntoTwoCurvesInOrder) {
   for (int i = 0; i < 60; ++i) {
     if (i >= 28 && i < 31) continue;  // a gap that is bridged
     const auto y = static_cast<float>(10 + i);
-    ridgels.push_back({20 + 0.2F * static_cast<float>(i), y, 0.98F, -0.196F, 1, 1.5F});
-    ridgels.push_back({50, y, 1, 0, 1, 1.5F});
+    ridgels.push_back({20 + 0.2F * static_cast<float>(i), y, 0.98F, -0.196F, 1, 1.5F, 1});
+    ridgels.push_back({50, y, 1, 0, 1, 1.5F, 1});
   }
   const std::vector<Curve> curves = trace_curves(ridgels, {80, 80});
   ASSERT_EQ(curves.size(), 2U);
@@ -149,6 +151,91 @@ TEST(TraceCurves, LinksTheRidgelsOfTwoLinesIntoTwoCurvesInOrder) {
       EXPECT_NEAR(x.x(), is_slanted ? 20 + 0.2F * (x.y() - 10) : 50, 0.05);
       if (i == 0) continue;
       EXPECT_LT((x - curve.points[i - 1].position).norm(), 5);
+    }
+  }
+}
+
+/// A box of `width` with edges blurred by `blur`, its normal at `angle`, in noise that grows with
+/// the light as a sensor's does.
+cv::Mat blurred_box(double width, double blur, double angle, cv::Size size, double noise) {
+  cv::Mat image(size, CV_32F);
+  const auto step = [&](double d) { return 0.5 * (1 + std::erf(d / (blur * std::sqrt(2.0)))); };
+  for (int v = 0; v < size.height; ++v) {
+    Random random(11, static_cast<std::uint64_t>(v));
+    for (int u = 0; u < size.width; ++u) {
+      const double d =
+          (u - 0.5 * size.width) * std::cos(angle) + (v - 0.5 * size.height) * std::sin(angle);
+      const double light = step(d + width / 2) - step(d - width / 2);
+      image.at<float>(v, u) = static_cast<float>(0.01 + 0.5 * light +
+                                                 random.normal(0, noise * std::sqrt(0.05 + light)));
+    }
+  }
+  return image;
+}
+
+std::vector<Curve> curves_of_all_sizes(const cv::Mat& image) {
+  const std::vector<Ridgel> ridgels = find_ridgels(image);
+  RefineOptions options;
+  options.sizes = sizes_of(ridgels);
+  return refine_curves(image, trace_curves(ridgels, image.size()), options);
+}
+
+TEST(FindRidgels, CoarseSizesChangeNothingInAPictureOfNarrowLinesAndShowWideOnes) {
+  const cv::Size size(200, 160);
+  const cv::Mat narrow = blurred_box(3, 0.7, 0.4, size, 0.005);
+  RidgeOptions up_to_half;
+  up_to_half.widest_px = 8;
+  const std::vector<Ridgel> expected = find_ridgels(narrow, up_to_half);
+  const std::vector<Ridgel> found = find_ridgels(narrow);
+  ASSERT_EQ(found.size(), expected.size());
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    EXPECT_EQ(found[i].x, expected[i].x);
+    EXPECT_EQ(found[i].y, expected[i].y);
+    EXPECT_EQ(found[i].scale, 1);
+  }
+  EXPECT_EQ(sizes_of(found), 1);
+  EXPECT_EQ(sizes_of(find_ridgels(blurred_box(7, 1.5, 0.4, size, 0.005))), 2);
+  EXPECT_EQ(sizes_of(find_ridgels(blurred_box(30, 6, 0.4, size, 0.005))), 4);
+}
+
+// From lines that are as narrow as a picture can show them to those that are ten times as wide as
+// usual, sharp or without any flat top.
+TEST(RefineCurves, ALineOfAnyWidthIsOneCurveInItsMiddle) {
+  constexpr double kNoise = 0.005;
+  // Root of the mean square; a line's noise moves it by a share of its width.
+  constexpr double kLargestErrorPx = 0.05;
+  constexpr double kLargestErrorOfWidth = 0.005;
+  const cv::Size size(260, 200);
+  for (const double width : {2, 3, 4, 5, 6, 8, 10, 13, 17, 22, 28, 34, 40}) {
+    for (const double share : {0.0, 0.2, 0.45}) {
+      for (const double degrees : {0.0, 23.0, 90.0}) {
+        SCOPED_TRACE("width " + std::to_string(width) + ", blur of it " + std::to_string(share) +
+                     ", degrees " + std::to_string(degrees));
+        const double angle = degrees * std::numbers::pi / 180;
+        const double blur = std::hypot(0.7, share * width);
+        const cv::Mat image = blurred_box(width, blur, angle, size, kNoise);
+        const std::vector<Curve> curves = curves_of_all_sizes(image);
+        // Towards the image's border profiles are cut off.
+        const double length = 80 - width;
+        int pieces = 0;
+        double points = 0;
+        double square = 0;
+        for (const Curve& curve : curves) {
+          const double before = points;
+          for (const CurvePoint& p : curve.points) {
+            const double x = p.position.x() - 0.5 * size.width;
+            const double y = p.position.y() - 0.5 * size.height;
+            if (std::abs(y * std::cos(angle) - x * std::sin(angle)) > length) continue;
+            const double d = x * std::cos(angle) + y * std::sin(angle);
+            points += 1;
+            square += d * d;
+          }
+          pieces += points > before ? 1 : 0;
+        }
+        EXPECT_EQ(pieces, 1);
+        EXPECT_GT(points, 0.95 * 2 * length);
+        EXPECT_LT(std::sqrt(square / points), kLargestErrorPx + kLargestErrorOfWidth * width);
+      }
     }
   }
 }

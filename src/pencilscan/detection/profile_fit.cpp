@@ -223,8 +223,13 @@ PENCILSCAN_INLINE void odd_variance(const std::array<Lanes, kProfileSize>& measu
 
 float line_profile_width(float line_px) {
   const float half = 0.5F * line_px;
-  return std::clamp(std::sqrt((half * half + kPi2 * kEdge * kEdge) / 3), kMinLineWidth,
-                    kMaxLineWidth);
+  return std::max(std::sqrt((half * half + kPi2 * kEdge * kEdge) / 3), kMinLineWidth);
+}
+
+float profile_scale(float width) {
+  float scale = 1;
+  while (width > kMaxLineWidth * scale) scale *= 2;
+  return scale;
 }
 
 PENCILSCAN_CLONES
@@ -243,7 +248,10 @@ void line_profile(float width, std::array<float, 2 * kLanes>& values) {
 PENCILSCAN_CLONES
 void add_line_profile(float amplitude, float width, float first, float step, int count,
                       float* image, std::ptrdiff_t stride) {
-  const LineShape<float> shape = make_shape(width);
+  const float shrink = 1 / profile_scale(width);
+  const LineShape<float> shape = make_shape(shrink * width);
+  first *= shrink;
+  step *= shrink;
   Lanes d;
   for (int k = 0; k < kLanes; ++k) d[k] = first + step * static_cast<float>(k);
   for (int i = 0; i < count; i += kLanes, d += step * static_cast<float>(kLanes)) {

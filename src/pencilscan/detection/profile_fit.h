@@ -17,6 +17,10 @@ constexpr float kMinLineWidth = 0.6F;  ///< px
 constexpr float kMaxLineWidth = 4.5F;
 constexpr float kModelReach = 3.0F;  ///< line profiles are rendered to this many widths
 
+/// Pixels that stand for one in the profile of a line of `width`: 1, or as many as the width is of
+/// kMaxLineWidth, rounded up to a power of two. Wider lines are narrow ones of a smaller image.
+[[nodiscard]] float profile_scale(float width);
+
 /// Width (root of the second moment, px) of the profile of a line that is `line_px` wide in the
 /// image before blur.
 [[nodiscard]] float line_profile_width(float line_px);
@@ -25,7 +29,7 @@ constexpr float kModelReach = 3.0F;  ///< line profiles are rendered to this man
 void line_profile(float width, std::array<float, 2 * kLanes>& values);
 
 /// Adds amplitude times the line profile of `width` at first + step i to image[stride i], i <
-/// count; all within kModelReach widths.
+/// count; all within kModelReach widths. A width beyond kMaxLineWidth is that of a smaller image.
 void add_line_profile(float amplitude, float width, float first, float step, int count,
                       float* image, std::ptrdiff_t stride);
 

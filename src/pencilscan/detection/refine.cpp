@@ -1,13 +1,16 @@
 #include "pencilscan/detection/refine.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <span>
+#include <utility>
 
 #include "pencilscan/core/lanes.h"
 #include "pencilscan/detection/curve_smoothing.h"
 #include "pencilscan/detection/profile_fit.h"
+#include "pencilscan/detection/refine_scales.h"
 #include "pencilscan/view/nearest.h"
 
 namespace pencilscan {
@@ -256,6 +259,103 @@ void render_curve(const Curve& curve, float sign, cv::Mat& model) {
   render_segment(points[n - 1], beyond(points[n - 1], points[n - 2]), sign, model);
 }
 
+/// The image at one size, less the curves where they are subtracted, and the curves that are fitted
+/// to it, in its pixels.
+struct SizedImage {
+  cv::Mat image;
+  std::vector<Curve> curves;
+};
+
+class ImageSizes {
+ public:
+  explicit ImageSizes(const cv::Mat& full) : sizes_{{full, {}}} {}
+
+  [[nodiscard]] SizedImage& at(std::size_t size) {
+    while (sizes_.size() <= size) sizes_.push_back({resized_image(sizes_.back().image, 1), {}});
+    return sizes_[size];
+  }
+  [[nodiscard]] std::vector<SizedImage>& all() { return sizes_; }
+
+  [[nodiscard]] std::vector<Curve> curves_at_full_size() const {
+    std::vector<Curve> result = sizes_[0].curves;
+    for (std::size_t size = 1; size < sizes_.size(); ++size) {
+      for (const Curve& curve : sizes_[size].curves) result.push_back(resized(curve, size, 0));
+    }
+    return result;
+  }
+
+  void subtract_all_curves(const cv::Mat& full) {
+    sizes_[0].image = full.clone();
+    for (const Curve& curve : curves_at_full_size()) subtract_curve(curve, sizes_[0].image);
+    for (std::size_t size = 1; size < sizes_.size(); ++size)
+      sizes_[size].image = resized_image(sizes_[size - 1].image, 1);
+  }
+
+ private:
+  std::vector<SizedImage> sizes_;
+};
+
+/// Fits a curve to the image, at the size that its width asks for.
+void fit_first(ImageSizes& sizes, const RefineOptions& options, Curve curve) {
+  constexpr int kMostTries = 3;  // the width that asks for a size is known better after each
+  const auto size_for = [&](const Curve& c, std::size_t given_at) {
+    return std::min(size_of_curve(c, given_at), static_cast<std::size_t>(options.sizes - 1));
+  };
+  std::size_t size = size_for(curve, 0);
+  curve = resized(std::move(curve), 0, size);
+  for (int t = 1;; ++t) {
+    smooth_positions(curve.points);
+    if (options.sizes > 1) {
+      // Of a curve that several sizes show, the size of most of it holds all.
+      for (CurvePoint& p : curve.points) p.width_px = std::min(p.width_px, kWidestProfilePx);
+    }
+    Curve fitted = curve;
+    fit_curve(sizes.at(size).image, true, options.half_arc, fitted);
+    smooth_widths(fitted.points);
+    const std::size_t wanted = size_for(fitted, size);
+    if (wanted == size || t == kMostTries) {
+      cut_and_trim(fitted, options, sizes.at(size).curves);
+      return;
+    }
+    for (std::size_t i = 0; i < curve.points.size(); ++i)
+      curve.points[i].width_px = fitted.points[i].width_px;
+    curve = resized(std::move(curve), size, wanted);
+    size = wanted;
+  }
+}
+
+/// Fits the curves of one size to its image without all others.
+void fit_again(SizedImage& size, const RefineOptions& options) {
+  std::vector<Curve> sound_curves;
+  for (Curve& curve : size.curves) {
+    const Curve before = curve;
+    fit_curve(size.image, false, options.half_arc, curve);
+    smooth_widths(curve.points);
+    // The curves beside it meet the new fit at once, which saves a round.
+    render_curve(before, 1, size.image);
+    subtract_curve(curve, size.image);
+    cut_and_trim(curve, options, sound_curves);
+  }
+  size.curves = std::move(sound_curves);
+}
+
+/// The part of the full image that the profiles of a curve need at `size`, whole pixels of that.
+cv::Rect profiles_of(const Curve& curve, std::size_t size, cv::Size image) {
+  constexpr float kBlur = 2;  // of pyrDown()
+  Eigen::AlignedBox2f box;
+  for (const CurvePoint& p : curve.points) box.extend(p.position);
+  const float unit = static_cast<float>(1U << size);
+  const float margin = unit * (kMaxHalf + kBlur);
+  const auto low = [&](float x) {
+    return static_cast<int>(std::floor((x - margin) / unit) * unit);
+  };
+  const auto high = [&](float x) { return static_cast<int>(std::ceil(x + margin)) + 1; };
+  const cv::Point from(std::max(0, low(box.min().x())), std::max(0, low(box.min().y())));
+  const cv::Point to(std::min(image.width, high(box.max().x())),
+                     std::min(image.height, high(box.max().y())));
+  return {from, to};
+}
+
 }  // namespace
 
 float sample_bilinear(const cv::Mat& image, float x, float y) {
@@ -280,37 +380,41 @@ void subtract_curve(const Curve& curve, cv::Mat& image) { render_curve(curve, -1
 
 std::vector<Curve> refine_curves(const cv::Mat& presence, std::vector<Curve> curves,
                                  const RefineOptions& options) {
-  cv::Mat residual = presence;
-  for (int round = 0; round < options.rounds; ++round) {
-    for (Curve& curve : curves) smooth_positions(curve.points);
-    if (round > 0) {
-      residual = presence.clone();
-      for (const Curve& curve : curves) subtract_curve(curve, residual);
+  ImageSizes sizes(presence);
+  for (Curve& curve : curves) fit_first(sizes, options, std::move(curve));
+  for (int round = 1; round < options.rounds; ++round) {
+    for (SizedImage& size : sizes.all()) {
+      for (Curve& curve : size.curves) smooth_positions(curve.points);
     }
-    for (Curve& curve : curves) {
-      const bool is_first = round == 0;
-      const Curve before = is_first ? Curve{} : curve;
-      fit_curve(residual, is_first, options.half_arc, curve);
-      smooth_widths(curve.points);
-      if (is_first) continue;
-      // The curves beside it meet the new fit at once, which saves a round.
-      render_curve(before, 1, residual);
-      subtract_curve(curve, residual);
-    }
-    std::vector<Curve> sound_curves;
-    for (const Curve& curve : curves) cut_and_trim(curve, options, sound_curves);
-    curves = std::move(sound_curves);
+    sizes.subtract_all_curves(presence);
+    for (SizedImage& size : sizes.all()) fit_again(size, options);
   }
-  return curves;
+  return sizes.curves_at_full_size();
 }
 
 std::vector<Curve> fit_guess(const cv::Mat& unexplained, Curve guess,
                              const RefineOptions& options) {
+  // No fit at full size gives a line that is wider.
+  const std::size_t size = median_width(guess) > kMaxLineWidth ? size_of_curve(guess, 0) : 0;
+  cv::Mat image = unexplained;
+  Vector2f corner(0, 0);
+  if (size > 0) {
+    const cv::Rect around = profiles_of(guess, size, unexplained.size());
+    image = resized_image(unexplained(around), size);
+    corner = {static_cast<float>(around.x), static_cast<float>(around.y)};
+    for (CurvePoint& p : guess.points) p.position -= corner;
+    guess = resized(std::move(guess), 0, size);
+  }
   // Once only: between lines this dense, a second fit to the others' residual moves away.
-  fit_curve(unexplained, true, options.half_arc, guess);
+  fit_curve(image, true, options.half_arc, guess);
   smooth_widths(guess.points);
   std::vector<Curve> pieces;
   cut_and_trim(guess, options, pieces);
+  if (size == 0) return pieces;
+  for (Curve& piece : pieces) {
+    piece = resized(std::move(piece), size, 0);
+    for (CurvePoint& p : piece.points) p.position += corner;
+  }
   return pieces;
 }
 

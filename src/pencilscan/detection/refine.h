@@ -14,6 +14,7 @@ struct RefineOptions {
                                      ///< of that 5 px further in
   double max_sigma_px = 0.8;         ///< less certain points are dropped
   int min_points = 6;
+  int sizes = 1;  ///< of the image that show lines best, each half of the one before; >= 1
 };
 
 /// Sub-pixel positions: on each point the cross profile, averaged along the curve, is fitted by a
@@ -21,6 +22,9 @@ struct RefineOptions {
 /// subtracted. Sets position,
 /// normal, amplitude, width and sigma of every point; cuts curves where they jump or vanish, and
 /// trims ends that overshoot a silhouette or depth step.
+///
+/// A profile has 15 samples. Lines that are too wide for them are fitted to an image of half,
+/// quarter ... size, whose pixels are the samples (refine_scales.h); points stay about 1 px apart.
 [[nodiscard]] std::vector<Curve> refine_curves(const cv::Mat& presence, std::vector<Curve> curves,
                                                const RefineOptions& options = {});
 

@@ -7,8 +7,7 @@
 #include <utility>
 
 #include "pencilscan/detection/oriented_filter.h"
-#include "pencilscan/view/cell_index.h"
-#include "pencilscan/view/nearest.h"
+#include "pencilscan/detection/ridge_scales.h"
 
 namespace pencilscan {
 namespace {
@@ -98,120 +97,97 @@ void add_ridgels(const std::vector<FilterMaximum>& maxima,
   }
 }
 
-std::vector<Ridgel> ridgels_at_scale(const cv::Mat& presence, const RidgeOptions& options) {
-  constexpr int kTile = FilterTile::kTile;
-  const double sigma = std::sqrt(options.sigma_along_px * options.sigma_along_px -
-                                 options.sigma_across_px * options.sigma_across_px);
-  const std::vector<FilterDirection> directions = filter_directions(options.orientations, sigma);
-  // A replicated border lets every tile read beyond the image without a test.
-  const int border = filter_reach(directions) + 1;
-  const int beyond = border + kTile + kLanes;
-  cv::Mat padded;
-  cv::copyMakeBorder(presence, padded, border, beyond, border, beyond, cv::BORDER_REPLICATE);
-  const Hessian h = gaussian_hessian(padded, options.sigma_across_px);
-  const Levels levels = response_levels(h, {border, border, presence.cols, presence.rows});
-  // Smoothing along a line keeps its response and divides that of white noise by about 2.
-  const float threshold = std::max(static_cast<float>(options.noise_factor) * 0.5F * levels.noise,
-                                   static_cast<float>(options.relative_threshold) * levels.strong);
-  std::vector<Ridgel> ridgels;
-  if (levels.strong <= 0) return ridgels;
-  FilterTile tile(directions);
-  std::vector<FilterMaximum> maxima;
-  for (int y0 = 0; y0 < presence.rows; y0 += kTile) {
-    for (int x0 = 0; x0 < presence.cols; x0 += kTile) {
-      const int width = std::min(kTile, presence.cols - x0);
-      const int height = std::min(kTile, presence.rows - y0);
-      const cv::Rect area(x0 + border, y0 + border, width, height);
-      if (-(lowest_value(h.xx, area) + lowest_value(h.yy, area)) < 0.7F * threshold)
-        continue;  // nothing bright and thin in here
-      tile.compute(h, area.x, area.y);
-      tile.find_maxima(threshold, width, height, maxima);
-      add_ridgels(maxima, directions, x0, y0, ridgels);
-    }
-  }
-  return ridgels;
-}
+/// The image at one size, ready to be looked at.
+struct Look {
+  cv::Mat image;
+  Hessian hessian;  ///< of the image with a border
+  Levels levels;
+};
 
-float value_at(const cv::Mat& image, float x, float y) {
-  const int ix = std::clamp(nearest(x), 0, image.cols - 1);
-  const int iy = std::clamp(nearest(y), 0, image.rows - 1);
-  return image.at<float>(iy, ix);
-}
+/// The filter for every size.
+class RidgeFilter {
+ public:
+  explicit RidgeFilter(const RidgeOptions& options)
+      : options_(options),
+        directions_(filter_directions(
+            options.orientations, std::sqrt(options.sigma_along_px * options.sigma_along_px -
+                                            options.sigma_across_px * options.sigma_across_px))),
+        border_(filter_reach(directions_) + 1) {}
 
-/// Adds the ridgels of wide lines and removes the edges that the finer look took for lines.
-std::vector<Ridgel> merged_scales(const cv::Mat& presence, const std::vector<Ridgel>& fine,
-                                  const std::vector<Ridgel>& wide) {
-  constexpr float kSameLinePx = 1.3F;  // a fine ridgel this near to the middle is the line itself
-  constexpr float kReachPx = 5.5F;     // half the width of the widest line
-  constexpr float kAlongPx = 2;
-  constexpr float kParallelCosine = 0.94F;
-  constexpr float kFlatTop = 0.88F;
-  constexpr float kWideLinePx = 2.6F;
-  constexpr int kCellPx = 4;
-  const CellIndex index(presence.size(), kCellPx, fine.size(),
-                        [&](std::size_t i) { return std::pair(fine[i].x, fine[i].y); });
-  std::vector<char> is_edge(fine.size(), 0);
-  std::vector<Ridgel> result;
-  std::vector<std::size_t> beside;
-  for (const Ridgel& w : wide) {
-    bool is_middle = true;
-    beside.clear();
-    const auto look = [&](float radius, float max_across) {
-      index.around(w.x, w.y, radius, [&](int item) {
-        const auto i = static_cast<std::size_t>(item);
-        const Ridgel& f = fine[i];
-        const float across = std::abs((f.x - w.x) * w.nx + (f.y - w.y) * w.ny);
-        const float along = std::abs(-(f.x - w.x) * w.ny + (f.y - w.y) * w.nx);
-        if (across > max_across || along > kAlongPx) return true;
-        if (std::abs(f.nx * w.nx + f.ny * w.ny) < kParallelCosine) return true;
-        if (across < kSameLinePx) is_middle = false;
-        beside.push_back(i);
-        return is_middle;
-      });
-    };
-    look(std::hypot(kSameLinePx, kAlongPx), kSameLinePx);  // mostly, this is a fine line too
-    if (!is_middle) continue;
-    beside.clear();
-    look(kReachPx, kReachPx);
-    const float middle = value_at(presence, w.x, w.y);
-    for (const std::size_t i : beside) {
-      is_middle = is_middle && middle >= kFlatTop * value_at(presence, fine[i].x, fine[i].y);
-    }
-    if (!is_middle) continue;
-    for (const std::size_t i : beside) is_edge[i] = 1;
-    result.push_back(w);
-    result.back().width_px = kWideLinePx;
+  [[nodiscard]] Look look_at(const cv::Mat& image) const {
+    // A replicated border lets every tile read beyond the image without a test.
+    const int beyond = border_ + FilterTile::kTile + kLanes;
+    cv::Mat padded;
+    cv::copyMakeBorder(image, padded, border_, beyond, border_, beyond, cv::BORDER_REPLICATE);
+    Look look{image, gaussian_hessian(padded, options_.sigma_across_px), {}};
+    look.levels = response_levels(look.hessian, {border_, border_, image.cols, image.rows});
+    return look;
   }
-  for (std::size_t i = 0; i < fine.size(); ++i) {
-    if (is_edge[i] == 0) result.push_back(fine[i]);
-  }
-  return result;
-}
 
-/// Ridgels of the half-size image in full-size pixels: two for each, so that they stay about one
-/// pixel apart along the line.
-std::vector<Ridgel> enlarged(const std::vector<Ridgel>& half_size) {
-  std::vector<Ridgel> result;
-  result.reserve(2 * half_size.size());
-  for (const Ridgel& r : half_size) {
-    for (const float along : {-0.5F, 0.5F}) {
-      Ridgel twice = r;
-      twice.x = 2 * r.x - along * r.ny;
-      twice.y = 2 * r.y + along * r.nx;
-      result.push_back(twice);
-    }
+  [[nodiscard]] float threshold_of(const Levels& levels) const {
+    // Smoothing along a line keeps its response and divides that of white noise by about 2.
+    return std::max(static_cast<float>(options_.noise_factor) * 0.5F * levels.noise,
+                    static_cast<float>(options_.relative_threshold) * levels.strong);
   }
-  return result;
-}
+
+  /// In pixels of the look's image.
+  [[nodiscard]] std::vector<Ridgel> ridgels(const Look& look) const {
+    constexpr int kTile = FilterTile::kTile;
+    std::vector<Ridgel> ridgels;
+    if (look.levels.strong <= 0) return ridgels;
+    const float threshold = threshold_of(look.levels);
+    FilterTile tile(directions_);
+    std::vector<FilterMaximum> maxima;
+    const Hessian& h = look.hessian;
+    for (int y0 = 0; y0 < look.image.rows; y0 += kTile) {
+      for (int x0 = 0; x0 < look.image.cols; x0 += kTile) {
+        const int width = std::min(kTile, look.image.cols - x0);
+        const int height = std::min(kTile, look.image.rows - y0);
+        const cv::Rect area(x0 + border_, y0 + border_, width, height);
+        if (-(lowest_value(h.xx, area) + lowest_value(h.yy, area)) < 0.7F * threshold)
+          continue;  // nothing bright and thin in here
+        tile.compute(h, area.x, area.y);
+        tile.find_maxima(threshold, width, height, maxima);
+        add_ridgels(maxima, directions_, x0, y0, ridgels);
+      }
+    }
+    return ridgels;
+  }
+
+ private:
+  RidgeOptions options_;
+  std::vector<FilterDirection> directions_;
+  int border_;
+};
 
 }  // namespace
 
 std::vector<Ridgel> find_ridgels(const cv::Mat& presence, const RidgeOptions& options) {
-  std::vector<Ridgel> fine = ridgels_at_scale(presence, options);
-  if (!options.find_wide) return fine;
-  cv::Mat half_size;
-  cv::pyrDown(presence, half_size);
-  return merged_scales(presence, fine, enlarged(ridgels_at_scale(half_size, options)));
+  // Of the filter's scale: the widest line that an image shows best (ridge_scales.h).
+  constexpr double kWidest = 3.3;
+  constexpr int kSmallestPx = 16;  // image: smaller than the filter, it shows no line
+  const RidgeFilter filter(options);
+  std::vector<SizedRidgels> sizes;
+  float strong = 0;
+  cv::Mat image = presence;
+  for (double widest = kWidest * options.sigma_across_px;; widest *= 2) {
+    const Look look = filter.look_at(image);
+    sizes.push_back({image, filter.ridgels(look)});
+    strong = std::max(strong, look.levels.strong);
+    if (widest >= options.widest_px) break;
+    cv::Mat half_size;
+    cv::pyrDown(image, half_size);
+    if (std::min(half_size.rows, half_size.cols) < kSmallestPx) break;
+    image = half_size;
+  }
+  const float weakest = static_cast<float>(options.relative_threshold) * strong;
+  return choose_sizes(sizes, weakest);
+}
+
+int sizes_of(const std::vector<Ridgel>& ridgels) {
+  float smallest = 1;
+  for (const Ridgel& r : ridgels) smallest = std::max(smallest, r.scale);
+  return 1 + std::ilogb(smallest);
 }
 
 }  // namespace pencilscan

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <utility>
 
 #include "pencilscan/core/lanes.h"
@@ -158,22 +159,37 @@ std::vector<std::vector<int>> chains_of(const std::vector<int>& best) {
 struct Vertex {
   Vector2f position;
   float width_px;
+  float scale;
 };
 using Polyline = std::vector<Vertex>;
 
-std::vector<Polyline> link_ridgels(std::span<const Ridgel> ridgels, cv::Size size,
-                                   const TraceOptions& options) {
-  const LinkRule rule{0.3F, 2.3F, 0.3F, 0.3F, static_cast<float>(std::cos(options.max_turn_rad))};
+/// Adds vertices up to the next one, about 1 px apart.
+void append_way(Polyline& line, const Vertex& to) {
+  const Vertex from = line.back();
+  const Vector2f way = to.position - from.position;
+  const int missing = static_cast<int>(std::lround(way.norm())) - 1;
+  for (int k = 1; k <= missing; ++k) {
+    const float share = static_cast<float>(k) / static_cast<float>(missing + 1);
+    line.push_back({from.position + share * way, from.width_px, from.scale});
+  }
+}
+
+/// Chains of all scales as polylines.
+std::vector<Polyline> chains_at_full_size(std::span<const Ridgel> ridgels, cv::Size size,
+                                          const TraceOptions& options) {
+  std::map<float, std::vector<Ridgel>> by_scale;
+  for (const Ridgel& r : ridgels) by_scale[r.scale].push_back(r);
   std::vector<Polyline> lines;
-  for (const auto& chain : chains_of(best_facing_ends(ridgels, size, rule))) {
-    if (chain.size() < 3) continue;
-    Polyline line;
-    line.reserve(chain.size());
-    for (const int e : chain) {
-      const Ridgel& r = ridgels[static_cast<std::size_t>(e / 2)];
-      line.push_back({{r.x, r.y}, r.width_px});
+  for (const auto& [scale, of_scale] : by_scale) {
+    for (const std::vector<std::size_t>& chain : link_ridgels(of_scale, size, options)) {
+      Polyline line;
+      for (const std::size_t i : chain) {
+        const Vertex vertex{{of_scale[i].x, of_scale[i].y}, of_scale[i].width_px, scale};
+        if (scale > 1 && !line.empty()) append_way(line, vertex);
+        line.push_back(vertex);
+      }
+      lines.push_back(std::move(line));
     }
-    lines.push_back(std::move(line));
   }
   return lines;
 }
@@ -182,39 +198,31 @@ std::vector<Polyline> link_ridgels(std::span<const Ridgel> ridgels, cv::Size siz
 struct End {
   Vector2f position;
   Vector2f outward;  ///< unit
+  float scale;
 };
 
 Vector2f outward_at_end(const Polyline& line, bool front) {
   constexpr std::size_t kReach = 5;
   const std::size_t n = line.size();
-  const std::size_t k = std::min(kReach, n - 1);
+  const float scale = (front ? line.front() : line.back()).scale;
+  const std::size_t k = std::min(kReach * static_cast<std::size_t>(scale), n - 1);
   return (front ? line[0].position - line[k].position
                 : line[n - 1].position - line[n - 1 - k].position)
       .normalized();
-}
-
-void append_bridged(Polyline& line, const Polyline& next) {
-  if (!line.empty()) {
-    const Vertex from = line.back();
-    const Vector2f way = next.front().position - from.position;
-    const int missing = static_cast<int>(std::lround(way.norm())) - 1;
-    for (int k = 1; k <= missing; ++k) {
-      const float share = static_cast<float>(k) / static_cast<float>(missing + 1);
-      line.push_back({from.position + share * way, from.width_px});
-    }
-  }
-  line.insert(line.end(), next.begin(), next.end());
 }
 
 std::vector<Polyline> bridge_gaps(std::vector<Polyline> lines, cv::Size size, double max_gap_px) {
   // Each item is a line with two far-apart ends: index both, by end.
   std::vector<End> ends;
   for (const Polyline& line : lines) {
-    ends.push_back({line.front().position, outward_at_end(line, true)});
-    ends.push_back({line.back().position, outward_at_end(line, false)});
+    ends.push_back({line.front().position, outward_at_end(line, true), line.front().scale});
+    ends.push_back({line.back().position, outward_at_end(line, false), line.back().scale});
   }
-  const auto max_gap = static_cast<float>(max_gap_px);
-  const auto lateral_limit = [](float along) { return 0.6F + 0.2F * along; };
+  float widest = 1;
+  for (const End& end : ends) widest = std::max(widest, end.scale);
+  const auto lateral_limit = [](float along, float scale) { return 0.6F * scale + 0.2F * along; };
+  const float farthest = static_cast<float>(max_gap_px) * widest;
+  const float around = std::hypot(farthest, lateral_limit(farthest, widest));
   const CellIndex index(size, kCellPx, ends.size(), [&](std::size_t e) {
     return std::pair(ends[e].position.x(), ends[e].position.y());
   });
@@ -222,14 +230,16 @@ std::vector<Polyline> bridge_gaps(std::vector<Polyline> lines, cv::Size size, do
   for (std::size_t e = 0; e < ends.size(); ++e) {
     float best_cost = std::numeric_limits<float>::max();
     const Vector2f& here = ends[e].position;
-    index.around(here.x(), here.y(), std::hypot(max_gap, lateral_limit(max_gap)), [&](int f) {
+    index.around(here.x(), here.y(), around, [&](int f) {
       if (f / 2 == static_cast<int>(e / 2)) return true;
       const End& other = ends[static_cast<std::size_t>(f)];
+      const float scale = std::max(ends[e].scale, other.scale);
+      const float max_gap = static_cast<float>(max_gap_px) * scale;
       const Vector2f way = other.position - ends[e].position;
       const float along = way.dot(ends[e].outward);
       const float cosine = -ends[e].outward.dot(other.outward);
       const float lateral = std::abs(way.x() * ends[e].outward.y() - way.y() * ends[e].outward.x());
-      if (along < 0 || along > max_gap || cosine < 0.9F || lateral > lateral_limit(along))
+      if (along < 0 || along > max_gap || cosine < 0.9F || lateral > lateral_limit(along, scale))
         return true;
       const float cost = along + 3 * lateral + 10 * (1 - cosine);
       if (cost < best_cost || (cost == best_cost && f < best[e])) {
@@ -245,7 +255,8 @@ std::vector<Polyline> bridge_gaps(std::vector<Polyline> lines, cv::Size size, do
     for (const int e : chain) {
       Polyline& part = lines[static_cast<std::size_t>(e / 2)];
       if (e % 2 == 0) std::reverse(part.begin(), part.end());
-      append_bridged(line, part);
+      if (!line.empty()) append_way(line, part.front());
+      line.insert(line.end(), part.begin(), part.end());
     }
     joined.push_back(std::move(line));
   }
@@ -254,9 +265,32 @@ std::vector<Polyline> bridge_gaps(std::vector<Polyline> lines, cv::Size size, do
 
 }  // namespace
 
+std::vector<std::vector<std::size_t>> link_ridgels(std::span<const Ridgel> ridgels,
+                                                   cv::Size image_size,
+                                                   const TraceOptions& options) {
+  if (ridgels.empty()) return {};
+  const float scale = ridgels.front().scale;
+  std::vector<Ridgel> own_size(ridgels.begin(), ridgels.end());
+  for (Ridgel& r : own_size) {
+    r.x /= scale;
+    r.y /= scale;
+  }
+  const LinkRule rule{0.3F, 2.3F, 0.3F, 0.3F, static_cast<float>(std::cos(options.max_turn_rad))};
+  const int shrink = static_cast<int>(scale);
+  const cv::Size size((image_size.width + shrink - 1) / shrink,
+                      (image_size.height + shrink - 1) / shrink);
+  std::vector<std::vector<std::size_t>> result;
+  for (const auto& chain : chains_of(best_facing_ends(own_size, size, rule))) {
+    if (chain.size() < 3) continue;
+    result.emplace_back();
+    for (const int e : chain) result.back().push_back(static_cast<std::size_t>(e / 2));
+  }
+  return result;
+}
+
 std::vector<Curve> trace_curves(std::span<const Ridgel> ridgels, cv::Size image_size,
                                 const TraceOptions& options) {
-  std::vector<Polyline> lines = link_ridgels(ridgels, image_size, options);
+  std::vector<Polyline> lines = chains_at_full_size(ridgels, image_size, options);
   lines = bridge_gaps(std::move(lines), image_size, options.max_gap_px);
   std::vector<Curve> curves;
   for (const Polyline& line : lines) {
