@@ -56,6 +56,7 @@ class Program:
         self.threads = args.threads
         self.memory = int(memory_gb * 2**30)  # address space that a command may take; 0: any
         self.log = open(args.out / "commands.log", "a")
+        self.complaint = ""  # of the last command that failed and might
 
     def _limit(self):
         if self.memory:
@@ -71,6 +72,7 @@ class Program:
             run = subprocess.run(command, capture_output=True, text=True, preexec_fn=self._limit)
             if (run.returncode == 1 and may_fail) or (run.returncode != 0 and may_crash):
                 print(f"exit {run.returncode}: {run.stderr[-300:]}", file=self.log, flush=True)
+                self.complaint = run.stderr
                 return None
             if run.returncode != 0:
                 raise SystemExit(f"{' '.join(command)}\n{run.stderr}")

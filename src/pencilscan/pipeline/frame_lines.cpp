@@ -60,8 +60,10 @@ std::optional<Rig> label_lines(const Rig& rig, const Frame& frame, const PointOp
         " show each other's patterns: their outputs or cables are exchanged (put them "
         "back; frames that are taken already fit a rig with the two patterns exchanged)");
   }
-  const std::vector<PictureFinding> misplaced =
+  std::vector<PictureFinding> misplaced =
       misplaced_pictures(rig, frame, result.graphs, result.labeling, options);
+  if (misplaced.empty())
+    misplaced = contradicting_pictures(rig, frame, result.graphs, result.labeling, options);
   if (!misplaced.empty()) {
     leave_out(rig, misplaced, result);
     result.labeling = solve();

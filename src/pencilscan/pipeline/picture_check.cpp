@@ -7,6 +7,8 @@
 
 #include "pencilscan/core/median.h"
 #include "pencilscan/core/parallel.h"
+#include "pencilscan/pipeline/view_agreement.h"
+#include "pencilscan/points/triangulate.h"
 #include "pencilscan/rig/camera_light.h"
 
 namespace pencilscan {
@@ -22,6 +24,8 @@ constexpr double kFew = 0.4;
 constexpr double kFarLess = 0.5;  // of what the other cameras have
 constexpr double kFarMore = 2;    // of what the picture as it is has, alone
 constexpr std::size_t kLeastPoints = 500;
+constexpr double kFewer = 0.75;  // of the others' usual share: a second sign of a wrong picture
+constexpr double kPlainContradiction = 0.25;  // agreement (view_agreement.h)
 
 /// Every eighth row, which tells as much of what a whole picture is; shares the pixels.
 cv::Mat some_rows(const cv::Mat& picture) {
@@ -63,10 +67,14 @@ bool needs_color(const Rig& rig) {
 bool is_grey(const cv::Mat& picture) {
   if (picture.channels() != 3) return false;
   constexpr float kStep = 2.5F / 255;  // JPEG's rounding of its colour differences
+  constexpr float kFaint = 0.05F;      // of the brightest: colours of a dark picture are small
   const cv::Mat rows = some_rows(picture);
   std::vector<cv::Mat> rgb;
   cv::split(rows, rgb);
-  const cv::Mat colorful = (cv::abs(rgb[0] - rgb[1]) > kStep) | (cv::abs(rgb[2] - rgb[1]) > kStep);
+  double brightest = 0;
+  cv::minMaxLoc(rgb[1], nullptr, &brightest);
+  const double step = std::min(kStep, kFaint * static_cast<float>(brightest));
+  const cv::Mat colorful = (cv::abs(rgb[0] - rgb[1]) > step) | (cv::abs(rgb[2] - rgb[1]) > step);
   return cv::countNonZero(colorful) * 1000 < static_cast<int>(rows.total());
 }
 
@@ -116,6 +124,14 @@ double named_share(const Labeling& labeling, std::size_t c) {
   return static_cast<double>(named) / static_cast<double>(named + unnamed);
 }
 
+/// Of every seventh pixel of the curves.
+std::vector<MeasuredPoint> some_points(const Rig& rig, const std::vector<GridGraph>& graphs,
+                                       const Labeling& labeling) {
+  TriangulationOptions options;
+  options.used_of_seven = 1;
+  return triangulate(rig, graphs, labeling, options);
+}
+
 /// Names the curves of single pictures.
 class PictureTrial {
  public:
@@ -130,16 +146,26 @@ class PictureTrial {
 
   /// named_share() of `light` where camera c stands.
   [[nodiscard]] double named(std::size_t c, const cv::Mat& light) const {
-    Frame frame;
-    frame.images.resize(rig_.cameras.size());
-    frame.images[c] = light;
-    const PointResult found = detect_frame(rig_, frame, options_);
-    const Labeling labeling =
-        solution_method(options_.method).solve(rig_, found.families, found.graphs, options_.method);
-    return named_share(labeling, c);
+    return named_share(solved(c, light).labeling, c);
+  }
+
+  /// What `light` measures where camera c stands.
+  [[nodiscard]] std::vector<MeasuredPoint> points(std::size_t c, const cv::Mat& light) const {
+    const PointResult result = solved(c, light);
+    return some_points(rig_, result.graphs, result.labeling);
   }
 
  private:
+  [[nodiscard]] PointResult solved(std::size_t c, const cv::Mat& light) const {
+    Frame frame;
+    frame.images.resize(rig_.cameras.size());
+    frame.images[c] = light;
+    PointResult found = detect_frame(rig_, frame, options_);
+    found.labeling =
+        solution_method(options_.method).solve(rig_, found.families, found.graphs, options_.method);
+    return found;
+  }
+
   Rig rig_;
   PointOptions options_;
 };
@@ -272,6 +298,60 @@ std::vector<PictureFinding> misplaced_pictures(const Rig& rig, const Frame& fram
     }
   }
   return findings;
+}
+
+std::vector<PictureFinding> contradicting_pictures(const Rig& rig, const Frame& frame,
+                                                   const std::vector<GridGraph>& graphs,
+                                                   const Labeling& labeling,
+                                                   const PointOptions& options) {
+  const std::size_t count = rig.cameras.size();
+  std::vector<std::vector<MeasuredPoint>> points(count);
+  for (const MeasuredPoint& p : some_points(rig, graphs, labeling)) points[p.camera].push_back(p);
+  const ViewAgreement agreement(rig, points);
+  const std::vector<std::size_t> doubtful = agreement.doubtful_cameras();
+  if (doubtful.empty()) return {};
+
+  // The pictures of two cameras, each where the other stands.
+  const PictureTrial trial(rig, options);
+  std::vector<std::pair<std::size_t, std::size_t>> swaps;
+  for (const std::size_t a : doubtful) {
+    for (const std::size_t b : doubtful) {
+      if (b <= a || frame.images[a].size() != frame.images[b].size()) continue;
+      if (rig.cameras[a].mosaic.has_value() == rig.cameras[b].mosaic.has_value())
+        swaps.emplace_back(a, b);
+    }
+  }
+  std::vector<char> agrees(swaps.size(), 0);
+  parallel_for(swaps.size(), [&](std::size_t i) {
+    const auto [a, b] = swaps[i];
+    std::vector<std::vector<MeasuredPoint>> exchanged = points;
+    exchanged[a] = trial.points(a, linear_light(rig.cameras[b], frame.images[b]));
+    exchanged[b] = trial.points(b, linear_light(rig.cameras[a], frame.images[a]));
+    const bool is_measured =
+        2 * exchanged[a].size() > points[b].size() && 2 * exchanged[b].size() > points[a].size();
+    agrees[i] = is_measured && ViewAgreement(rig, exchanged).doubtful_pairs() == 0 ? 1 : 0;
+  });
+  if (std::count(agrees.begin(), agrees.end(), 1) == 1) {
+    const auto i = std::find(agrees.begin(), agrees.end(), 1) - agrees.begin();
+    const auto a = static_cast<int>(swaps[static_cast<std::size_t>(i)].first);
+    const auto b = static_cast<int>(swaps[static_cast<std::size_t>(i)].second);
+    return {{PictureFault::kExchanged, a, b}, {PictureFault::kExchanged, b, a}};
+  }
+
+  // One camera alone against the others: the one that agrees least, if nothing is left without it.
+  const auto share = [&](std::size_t c) { return agreement.with_others(c).share(); };
+  const std::size_t alone =
+      *std::min_element(doubtful.begin(), doubtful.end(),
+                        [&](std::size_t a, std::size_t b) { return share(a) < share(b); });
+  std::vector<double> of_others;
+  for (std::size_t c = 0; c < count; ++c)
+    if (c != alone && !points[c].empty()) of_others.push_back(named_share(labeling, c));
+  points[alone].clear();
+  // Without a second sign, such as few names, the contradiction must be plain.
+  const bool is_plain = share(alone) < kPlainContradiction ||
+                        named_share(labeling, alone) < kFewer * upper_median(std::move(of_others));
+  if (count < 3 || !is_plain || ViewAgreement(rig, points).doubtful_pairs() > 0) return {};
+  return {{PictureFault::kDoesNotFit, static_cast<int>(alone), -1}};
 }
 
 std::optional<std::pair<int, int>> exchanged_projectors(const Rig& rig, const Frame& frame,

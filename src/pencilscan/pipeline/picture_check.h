@@ -42,6 +42,13 @@ struct PictureFinding {
                                                              const Labeling& labeling,
                                                              const PointOptions& options);
 
+/// Finds the picture that fits the projectors but not what the other cameras see: two cameras are
+/// exchanged in a ring that repeats itself, or one took its picture at another moment. Tried is
+/// only what takes all contradictions away (view_agreement.h). `labeling` as above.
+[[nodiscard]] std::vector<PictureFinding> contradicting_pictures(
+    const Rig& rig, const Frame& frame, const std::vector<GridGraph>& graphs,
+    const Labeling& labeling, const PointOptions& options);
+
 /// Finds two projectors that show each other's pictures: several cameras have few names, and get
 /// many once the patterns of the two are exchanged. `labeling` as above. Only projectors with the
 /// same panel size are tried.

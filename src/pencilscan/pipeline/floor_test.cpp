@@ -1,0 +1,101 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include "pencilscan/pipeline/frame.h"
+#include "pencilscan/planning/ring.h"
+#include "pencilscan/simulation/photography.h"
+#include "pencilscan/simulation/simulated_object.h"
+
+namespace pencilscan {
+namespace {
+
+// A ball that touches a lit floor, before three cameras and three projectors. Lines of the ball go
+// on over the floor one or more lines off.
+constexpr double kBallRadius = 60;
+const Vec3 kBallCenter(0, 0, -10);
+constexpr double kFloorHeight = -70;  // mm, height
+
+Rig rig_before_floor() {
+  RingOptions ring;
+  ring.cameras = ring.projectors = 3;
+  ring.arc_rad = 2.4;
+  ring.camera_width = 640;
+  ring.camera_height = 480;
+  ring.camera_focal_px = 1150;
+  return make_ring(ring);
+}
+
+Frame frame_of(const Rig& rig) {
+  TriangleMesh mesh = make_sphere(kBallRadius, 96, kBallCenter);
+  const auto first = static_cast<int>(mesh.vertices.size());
+  constexpr double kHalf = 400;
+  for (const auto& [x, y] : {std::pair(-kHalf, -kHalf), std::pair(kHalf, -kHalf),
+                             std::pair(kHalf, kHalf), std::pair(-kHalf, kHalf)})
+    mesh.vertices.emplace_back(x, y, kFloorHeight);
+  mesh.faces.push_back({first, first + 1, first + 2});
+  mesh.faces.push_back({first, first + 2, first + 3});
+  const SimulatedObject object(mesh);
+  PhotographyOptions photo;
+  photo.noise = "medium";
+  Frame frame;
+  frame.name = "000000";
+  for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
+    cv::Mat values;
+    photograph(rig, c, object, photo, static_cast<std::uint32_t>(c))
+        .convertTo(values, CV_32F, 1 / 255.0);
+    frame.images.push_back(values);
+  }
+  return frame;
+}
+
+/// Where points or vertices lie.
+struct Places {
+  std::size_t on_ball = 0, on_floor = 0, in_air = 0;
+
+  void add(const Vec3& x) {
+    constexpr double kNear = 1.5;  // mm
+    if (std::abs((x - kBallCenter).norm() - kBallRadius) < kNear) {
+      ++on_ball;
+    } else if (std::abs(x.z() - kFloorHeight) < kNear) {
+      ++on_floor;
+    } else {
+      ++in_air;
+    }
+  }
+};
+
+TEST(StatedFloor, LeavesTheObjectAloneWithoutFlapsBesideIt) {
+  Rig rig = rig_before_floor();
+  const Frame frame = frame_of(rig);
+  std::array<Places, 2> points;
+  std::array<Places, 2> surface;
+  std::array<double, 2> lowest{};
+  for (const std::size_t stated : {0, 1}) {
+    if (stated == 1) rig.floor = Floor{{0, 0, kFloorHeight}, Vec3::UnitZ()};
+    FrameResult result{measure_points(rig, frame), {}, {}};
+    result.shape = measure_shape(rig, frame, result.points, {});
+    for (const MeasuredPoint& p : result.points.points)
+      points[stated].add({double{p.x}, double{p.y}, double{p.z}});
+    for (const Vec3& x : result.shape.surface.measured.vertices) surface[stated].add(x);
+    for (const Vec3& x : result.shape.surface.mesh.vertices)
+      lowest[stated] = std::min(lowest[stated], x.z());
+  }
+  // Without a word of the floor it is measured like the ball.
+  EXPECT_GT(points[0].on_floor, points[0].on_ball / 50);
+  EXPECT_GT(surface[0].on_floor, surface[0].on_ball / 20);
+  EXPECT_GT(surface[0].in_air, surface[0].on_ball / 100);
+  EXPECT_EQ(points[1].on_floor, 0U);
+  EXPECT_EQ(surface[1].on_floor, 0U);
+  EXPECT_LT(points[1].in_air, points[1].on_ball / 100);
+  EXPECT_LT(surface[1].in_air, surface[1].on_ball / 200);
+  EXPECT_GT(points[1].on_ball, 98 * points[0].on_ball / 100);
+  EXPECT_GT(surface[1].on_ball, surface[0].on_ball);
+  EXPECT_GT(lowest[1], kFloorHeight - 0.1);
+}
+
+}  // namespace
+}  // namespace pencilscan

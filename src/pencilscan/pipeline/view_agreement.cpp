@@ -1,0 +1,126 @@
+#include "pencilscan/pipeline/view_agreement.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <utility>
+
+#include "pencilscan/core/parallel.h"
+#include "pencilscan/rig/object_space.h"
+
+namespace pencilscan {
+namespace {
+
+constexpr std::size_t kLeastPoints = 200;
+/// Of what a pair says. Pairs of right pictures have .60 and more, of intricate objects
+/// (docs/sensors.md); where one picture is another camera's, .05 and less.
+constexpr double kLeastSame = 0.5;
+
+/// Depths that a camera measured, by cells of the picture.
+class MeasuredDepths {
+ public:
+  MeasuredDepths(const Camera& camera, std::span<const MeasuredPoint> points)
+      : camera_(camera),
+        columns_(camera.width / kCell + 1),
+        cells_(static_cast<std::size_t>(columns_ * (camera.height / kCell + 1))) {
+    for (const MeasuredPoint& p : points) {
+      const std::optional<std::size_t> at = cell({double{p.u}, double{p.v}});
+      if (!at) continue;
+      const double depth = depth_of(p);
+      cells_[*at] = {std::min(cells_[*at].nearest, depth), std::max(cells_[*at].farthest, depth)};
+    }
+  }
+
+  /// Says of a point of another camera whether this one measured it; what lies behind says nothing.
+  void judge(const MeasuredPoint& p, double tolerance, PairAgreement& agreement) const {
+    const std::optional<Vec2> pixel = camera_.project({double{p.x}, double{p.y}, double{p.z}});
+    const std::optional<std::size_t> at = pixel ? cell(*pixel) : std::nullopt;
+    if (!at || cells_[*at].farthest < cells_[*at].nearest) return;
+    const double depth = depth_of(p);
+    if (depth < cells_[*at].nearest - tolerance) {
+      ++agreement.apart;
+    } else if (depth <= cells_[*at].farthest + tolerance) {
+      ++agreement.same;
+    }
+  }
+
+ private:
+  static constexpr int kCell = 8;  // px
+  struct Depths {
+    double nearest = std::numeric_limits<double>::max();
+    double farthest = std::numeric_limits<double>::lowest();
+  };
+
+  [[nodiscard]] double depth_of(const MeasuredPoint& p) const {
+    return (camera_.device_from_world * Vec3(double{p.x}, double{p.y}, double{p.z})).z();
+  }
+  [[nodiscard]] std::optional<std::size_t> cell(const Vec2& pixel) const {
+    const Vec2 at = (pixel / kCell).array().floor();
+    if (!(at.minCoeff() >= 0) || at.x() >= columns_) return std::nullopt;
+    const std::size_t index =
+        static_cast<std::size_t>(at.y()) * static_cast<std::size_t>(columns_) +
+        static_cast<std::size_t>(at.x());
+    return index < cells_.size() ? std::optional(index) : std::nullopt;
+  }
+
+  const Camera& camera_;
+  int columns_;
+  std::vector<Depths> cells_;
+};
+
+}  // namespace
+
+bool PairAgreement::is_doubtful() const {
+  return same + apart >= kLeastPoints && share() < kLeastSame;
+}
+
+ViewAgreement::ViewAgreement(const Rig& rig, std::span<const std::vector<MeasuredPoint>> points)
+    : count_(points.size()), pairs_(count_ * count_) {
+  // A camera that was moved names lines one off. Less than this, and relief between two lines of a
+  // cell counts as well.
+  constexpr double kSpacings = 0.3;
+  const double tolerance = kSpacings * line_spacing(rig);
+  std::vector<PairAgreement> said(count_ * count_);
+  parallel_for(count_, [&](std::size_t b) {
+    const MeasuredDepths depths(rig.cameras[b], points[b]);
+    for (std::size_t a = 0; a < count_; ++a) {
+      if (a == b) continue;
+      for (const MeasuredPoint& p : points[a]) depths.judge(p, tolerance, said[a * count_ + b]);
+    }
+  });
+  for (std::size_t a = 0; a < count_; ++a) {
+    for (std::size_t b = 0; b < a; ++b) {
+      const PairAgreement& one = said[a * count_ + b];
+      const PairAgreement& other = said[b * count_ + a];
+      pairs_[a * count_ + b] = {one.same + other.same, one.apart + other.apart};
+    }
+  }
+}
+
+PairAgreement ViewAgreement::with_others(std::size_t camera) const {
+  PairAgreement sum;
+  for (std::size_t other = 0; other < count_; ++other) {
+    if (other == camera) continue;
+    sum.same += of(camera, other).same;
+    sum.apart += of(camera, other).apart;
+  }
+  return sum;
+}
+
+std::size_t ViewAgreement::doubtful_pairs() const {
+  return static_cast<std::size_t>(std::count_if(
+      pairs_.begin(), pairs_.end(), [](const PairAgreement& pair) { return pair.is_doubtful(); }));
+}
+
+std::vector<std::size_t> ViewAgreement::doubtful_cameras() const {
+  std::vector<std::size_t> cameras;
+  for (std::size_t a = 0; a < count_; ++a) {
+    bool is_doubtful = false;
+    for (std::size_t b = 0; b < count_; ++b) is_doubtful |= a != b && of(a, b).is_doubtful();
+    if (is_doubtful) cameras.push_back(a);
+  }
+  return cameras;
+}
+
+}  // namespace pencilscan

@@ -1,0 +1,70 @@
+#include "pencilscan/pipeline/view_agreement.h"
+
+#include <gtest/gtest.h>
+
+#include "pencilscan/rig/object_space.h"
+#include "pencilscan/rig/sample_devices.h"
+
+namespace pencilscan {
+namespace {
+
+constexpr double kBallSeen = 60;
+
+/// Points of a ball around `center` that the camera sees.
+std::vector<MeasuredPoint> seen_points(const Camera& camera, const Vec3& center) {
+  std::vector<MeasuredPoint> points;
+  for (int i = 0; i < 120; ++i) {
+    for (int k = 0; k < 240; ++k) {
+      const double a = M_PI * (i + 0.5) / 120;
+      const double b = 2 * M_PI * k / 240;
+      const Vec3 normal(std::sin(a) * std::cos(b), std::sin(a) * std::sin(b), std::cos(a));
+      const Vec3 x = center + kBallSeen * normal;
+      if (normal.dot(camera.center() - x) <= 0) continue;
+      const Vec2 pixel = camera.project(x).value();
+      MeasuredPoint p;
+      p.x = static_cast<float>(x.x());
+      p.y = static_cast<float>(x.y());
+      p.z = static_cast<float>(x.z());
+      p.u = static_cast<float>(pixel.x());
+      p.v = static_cast<float>(pixel.y());
+      points.push_back(p);
+    }
+  }
+  return points;
+}
+
+PairAgreement agreement(const Rig& rig, const Vec3& of_first, const Vec3& of_second) {
+  const std::vector<std::vector<MeasuredPoint>> points{seen_points(rig.cameras[0], of_first),
+                                                       seen_points(rig.cameras[1], of_second)};
+  return ViewAgreement(rig, points).of(0, 1);
+}
+
+TEST(ViewAgreement, CamerasThatSeeOneBallAgreeAndThoseThatSeeTwoDoNot) {
+  const Rig rig = sample::small_rig(480, 360, 110);
+  const PairAgreement one = agreement(rig, Vec3::Zero(), Vec3::Zero());
+  EXPECT_GT(one.same, 1000U);
+  EXPECT_EQ(one.apart, 0U);
+  EXPECT_FALSE(one.is_doubtful());
+  // Towards both cameras, three line spacings.
+  const PairAgreement two =
+      agreement(rig, Vec3::Zero(), {3 * line_spacing(rig), 0, 0.4 * line_spacing(rig)});
+  EXPECT_TRUE(two.is_doubtful());
+  EXPECT_GT(two.apart, 5 * two.same);
+  // What is far apart says nothing.
+  const PairAgreement none = agreement(rig, {0, 0, 0}, {0, 0, 2.5 * kBallSeen});
+  EXPECT_LT(none.same, one.same / 10);
+}
+
+TEST(ViewAgreement, NamesTheCamerasOfDoubtfulPairs) {
+  Rig rig = sample::small_rig(480, 360, 110);
+  rig.cameras.push_back(sample::device_at<Camera>({560, 0, 120}, "cam2", 480, 360, 900));
+  std::vector<std::vector<MeasuredPoint>> points;
+  for (const Camera& camera : rig.cameras) points.push_back(seen_points(camera, Vec3::Zero()));
+  EXPECT_EQ(ViewAgreement(rig, points).doubtful_pairs(), 0U);
+  points[2] = seen_points(rig.cameras[2], {3 * line_spacing(rig), 0, 0});
+  EXPECT_EQ(ViewAgreement(rig, points).doubtful_pairs(), 2U);
+  EXPECT_EQ(ViewAgreement(rig, points).doubtful_cameras(), (std::vector<std::size_t>{0, 1, 2}));
+}
+
+}  // namespace
+}  // namespace pencilscan
