@@ -369,16 +369,17 @@ double window_overlap(const DepthMap& map, int half, int stride) {
 
 ExposureMotion motion_in_exposure(const Rig& rig, const DepthStageOptions& options,
                                   const DepthResult& result) {
-  // A window per 4 px knows more than one per 8 px, as windows are 11 px wide; where there are many
-  // of them, half of the rows and columns are enough and cost a quarter.
-  constexpr std::size_t kManyNodes = 16000;
+  // Windows are 11 px wide, nodes a few: of many nodes, this number in even rows and columns tell
+  // as much of one rigid motion as the frame needs (docs/sequences.md), at a fixed cost.
+  constexpr double kEnoughWindows = 6000;
   constexpr double kLeastVariancePx2 = 0.05;  // of a start: below, the series has no end
   std::size_t nodes = 0;
   for (const DepthMap& map : result.maps)
     nodes += static_cast<std::size_t>(std::count_if(
         map.nodes.begin(), map.nodes.end(), [](const DepthNode& node) { return node.measured(); }));
   if (nodes == 0) return {};
-  const int stride = nodes > kManyNodes ? 2 : 1;
+  const int stride = std::max(
+      1, static_cast<int>(std::ceil(std::sqrt(static_cast<double>(nodes) / kEnoughWindows))));
   const std::size_t cameras = result.maps.size();
   std::vector<std::vector<NodeLines>> lines(cameras);
   ExposureMotion motion;

@@ -253,11 +253,31 @@ float share_of_wide(const std::vector<Ridgel>& ridgels) {
   return all > 0 ? wide / all : 0.F;
 }
 
+/// share_of_wide(), from every fourth coarse ridgel by itself.
+float sampled_share_of_wide(const std::vector<SizedRidgels>& sizes, float weakest) {
+  constexpr std::size_t kStep = 4;
+  const cv::Size full_size = sizes[0].image.size();
+  float wide = 0;
+  float scale = 2;
+  std::vector<Ridgel> finer = sizes[0].ridgels;
+  for (std::size_t k = 1; k < sizes.size(); ++k, scale *= 2) {
+    std::vector<Ridgel> coarse = at_full_size(sizes[k].ridgels, scale, weakest);
+    const FinerLook look(finer, sizes[k - 1].image, 0.5F * scale, full_size);
+    for (std::size_t i = 0; i < coarse.size(); i += kStep)
+      if (look.is_best(coarse[i])) wide += kStep * scale;
+    finer = std::move(coarse);
+  }
+  return wide > 0 ? wide / (wide + static_cast<float>(sizes[0].ridgels.size())) : 0.F;
+}
+
 }  // namespace
 
 std::vector<Ridgel> choose_sizes(std::vector<SizedRidgels>& sizes, float weakest) {
   std::vector<Ridgel>& fine = sizes[0].ridgels;
   if (sizes.size() == 1) return std::move(fine);
+  // Mostly, a look at a sample is enough.
+  if (sampled_share_of_wide(sizes, weakest) < 0.5F * kWidePicture)
+    return merged_scales(sizes[0].image, fine, enlarged(sizes[1].ridgels));
   std::vector<Ridgel> chosen = fine;
   float scale = 2;
   for (std::size_t k = 1; k < sizes.size(); ++k, scale *= 2) {
