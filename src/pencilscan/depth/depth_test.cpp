@@ -61,10 +61,7 @@ struct BallScene {
           const double dy = light.line[0].at<double>(v + 1, u) - line;
           if (!(std::abs(line - std::round(line)) < 0.5 * std::hypot(dx, dy))) continue;
           MeasuredPoint point;
-          const Vec3 x = camera.point_at_depth(Vec2(u, v), z + random.normal(0, 0.1));
-          point.x = static_cast<float>(x.x());
-          point.y = static_cast<float>(x.y());
-          point.z = static_cast<float>(x.z());
+          set_position(camera.point_at_depth(Vec2(u, v), z + random.normal(0, 0.1)), point);
           point.u = static_cast<float>(u);
           point.v = static_cast<float>(v);
           point.camera = static_cast<std::uint8_t>(c);
@@ -154,9 +151,7 @@ TEST(Seeds, TwoSurfacesGiveTwoPlanes) {
       const Vec2 pixel(100 + column, 100 + i);
       const Vec3 x = camera.point_at_depth(pixel, column < 0 ? 500 : 530);
       MeasuredPoint p;
-      p.x = static_cast<float>(x.x());
-      p.y = static_cast<float>(x.y());
-      p.z = static_cast<float>(x.z());
+      set_position(x, p);
       p.u = static_cast<float>(pixel.x());
       p.v = static_cast<float>(pixel.y());
       p.sigma = 0.1F;

@@ -79,7 +79,7 @@ CurveSeeds::CurveSeeds(const Camera& camera, int camera_index,
   cells_.resize(static_cast<std::size_t>(columns_ * rows_));
   for (const MeasuredPoint& p : points) {
     if (p.camera != camera_index) continue;
-    const double z = (camera.device_from_world * Vec3(p.x, p.y, p.z)).z();
+    const double z = (camera.device_from_world * position_of(p)).z();
     const int x = cell(p.u);
     const int y = cell(p.v);
     if (!(z > 0) || x < 0 || y < 0 || x >= columns_ || y >= rows_) continue;

@@ -25,7 +25,6 @@ constexpr float kLeastLight = 0.6F;   // share of the predicted light that a sid
 constexpr float kLeastEnergy = 40.F;  // ... where that would be beyond noise
 constexpr float kMiddle2 = 0.2F;      // squared radius of the middle, in radii
 
-constexpr double kTiltPrecision = 11;  // of the prior on the slope of albedo: 0.3 over the window
 constexpr double kBow = 6;  // footprints over the window's half, of the prior on curvature
 constexpr double kRidge = 1e-6;
 constexpr double kLongestStep = 0.15;  // lines, within which the profile is well linear

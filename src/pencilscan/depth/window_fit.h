@@ -49,6 +49,9 @@ struct WindowFit {
   float lines_per_w = 0;        ///< largest |dl / dw| of a lit pattern
 };
 
+/// Of the prior on the slope of albedo over a window, e_f below: 0.3, as 1 / variance.
+constexpr double kTiltPrecision = 11;
+
 /// Fits inverse depth to the image of a circular window by Gauss-Newton. The image of family f is
 ///   I_f = o_f + (1 + e_f . (x, y)) * sum over its lit patterns k of A_k P(l_k(dx, dy, w)),
 /// P: box of the line's width blurred by a bell of standard deviation s_k (lines), to which camera

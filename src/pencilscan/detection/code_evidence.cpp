@@ -6,8 +6,8 @@
 
 #include "pencilscan/core/lanes.h"
 #include "pencilscan/core/median.h"
+#include "pencilscan/detection/curve_rendering.h"
 #include "pencilscan/detection/profile_fit.h"
-#include "pencilscan/detection/refine.h"
 
 namespace pencilscan {
 namespace {

@@ -219,17 +219,19 @@ PENCILSCAN_INLINE void odd_variance(const std::array<Lanes, kProfileSize>& measu
   variance = 0.5F * sum / (half - 2);
 }
 
+/// Pixels that stand for one in the profile of a line of `width`: 1, or as many as the width is of
+/// kMaxLineWidth, rounded up to a power of two. Wider lines are narrow ones of a smaller image.
+float profile_scale(float width) {
+  float scale = 1;
+  while (width > kMaxLineWidth * scale) scale *= 2;
+  return scale;
+}
+
 }  // namespace
 
 float line_profile_width(float line_px) {
   const float half = 0.5F * line_px;
   return std::max(std::sqrt((half * half + kPi2 * kEdge * kEdge) / 3), kMinLineWidth);
-}
-
-float profile_scale(float width) {
-  float scale = 1;
-  while (width > kMaxLineWidth * scale) scale *= 2;
-  return scale;
 }
 
 PENCILSCAN_CLONES

@@ -17,10 +17,6 @@ constexpr float kMinLineWidth = 0.6F;  ///< px
 constexpr float kMaxLineWidth = 4.5F;
 constexpr float kModelReach = 3.0F;  ///< line profiles are rendered to this many widths
 
-/// Pixels that stand for one in the profile of a line of `width`: 1, or as many as the width is of
-/// kMaxLineWidth, rounded up to a power of two. Wider lines are narrow ones of a smaller image.
-[[nodiscard]] float profile_scale(float width);
-
 /// Width (root of the second moment, px) of the profile of a line that is `line_px` wide in the
 /// image before blur.
 [[nodiscard]] float line_profile_width(float line_px);

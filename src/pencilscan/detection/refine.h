@@ -33,12 +33,6 @@ struct RefineOptions {
 [[nodiscard]] std::vector<Curve> fit_guess(const cv::Mat& unexplained, Curve guess,
                                            const RefineOptions& options = {});
 
-/// Sum of the profiles of all curves, CV_32FC1.
-[[nodiscard]] cv::Mat render_curves(const std::vector<Curve>& curves, cv::Size size);
-
-/// Takes the profile of a curve from a CV_32FC1 image.
-void subtract_curve(const Curve& curve, cv::Mat& image);
-
 /// Bilinear sample; outside, the nearest pixel's value.
 [[nodiscard]] float sample_bilinear(const cv::Mat& image, float x, float y);
 

@@ -45,6 +45,19 @@ float value_at(const cv::Mat& image, float scale, const Ridgel& r) {
   return image.at<float>(iy, ix);
 }
 
+bool are_parallel(const Ridgel& f, const Ridgel& wide) {
+  return std::abs(f.nx * wide.nx + f.ny * wide.ny) >= kParallelCosine;
+}
+
+/// Of a finer ridgel from a wide one's line, and along that line.
+struct RidgelDistance {
+  float across, along;
+};
+RidgelDistance distance(const Ridgel& f, const Ridgel& w) {
+  return {std::abs((f.x - w.x) * w.nx + (f.y - w.y) * w.ny),
+          std::abs(-(f.x - w.x) * w.ny + (f.y - w.y) * w.nx)};
+}
+
 /// What finer looks found around wide ridgels.
 class FinerLook {
  public:
@@ -98,18 +111,13 @@ class FinerLook {
     return f.response < kNoiseShare * wide.response;
   }
 
-  static bool are_parallel(const Ridgel& f, const Ridgel& wide) {
-    return std::abs(f.nx * wide.nx + f.ny * wide.ny) >= kParallelCosine;
-  }
-
   /// visit(finer ridgel, its index, distance across, along) until it gives false.
   template <class Visit>
   void around(const Ridgel& w, float reach_along, Visit visit) const {
     index_.around(w.x, w.y, unit_ * std::hypot(kReach, reach_along), [&](int item) {
       const auto i = static_cast<std::size_t>(item);
       const Ridgel& f = finer_[i];
-      const float across = std::abs((f.x - w.x) * w.nx + (f.y - w.y) * w.ny);
-      const float along = std::abs(-(f.x - w.x) * w.ny + (f.y - w.y) * w.nx);
+      const auto [across, along] = distance(f, w);
       if (across > kReach * unit_ || along > reach_along * unit_) return true;
       return visit(f, i, across, along);
     });
@@ -165,11 +173,6 @@ void add_wider(const std::vector<Ridgel>& wide, const cv::Mat& finer_image, cv::
 /// Adds the ridgels of wide lines and removes the edges that the finer look took for lines.
 std::vector<Ridgel> merged_scales(const cv::Mat& presence, const std::vector<Ridgel>& fine,
                                   const std::vector<Ridgel>& wide) {
-  constexpr float kSameLinePx = 1.3F;  // a fine ridgel this near to the middle is the line itself
-  constexpr float kReachPx = 5.5F;     // half the width of the widest line
-  constexpr float kAlongPx = 2;
-  constexpr float kParallelCosine = 0.94F;
-  constexpr float kFlatTop = 0.88F;
   constexpr float kWideLinePx = 2.6F;
   constexpr int kCellPx = 4;
   const CellIndex index(presence.size(), kCellPx, fine.size(),
@@ -184,19 +187,17 @@ std::vector<Ridgel> merged_scales(const cv::Mat& presence, const std::vector<Rid
       index.around(w.x, w.y, radius, [&](int item) {
         const auto i = static_cast<std::size_t>(item);
         const Ridgel& f = fine[i];
-        const float across = std::abs((f.x - w.x) * w.nx + (f.y - w.y) * w.ny);
-        const float along = std::abs(-(f.x - w.x) * w.ny + (f.y - w.y) * w.nx);
-        if (across > max_across || along > kAlongPx) return true;
-        if (std::abs(f.nx * w.nx + f.ny * w.ny) < kParallelCosine) return true;
-        if (across < kSameLinePx) is_middle = false;
+        const auto [across, along] = distance(f, w);
+        if (across > max_across || along > kAlong || !are_parallel(f, w)) return true;
+        if (across < kSameLine) is_middle = false;
         beside.push_back(i);
         return is_middle;
       });
     };
-    look(std::hypot(kSameLinePx, kAlongPx), kSameLinePx);  // mostly, this is a fine line too
+    look(std::hypot(kSameLine, kAlong), kSameLine);  // mostly, this is a fine line too
     if (!is_middle) continue;
     beside.clear();
-    look(kReachPx, kReachPx);
+    look(kReach, kReach);
     const float middle = value_at(presence, 1, w);
     for (const std::size_t i : beside) {
       is_middle = is_middle && middle >= kFlatTop * value_at(presence, 1, fine[i]);
@@ -272,20 +273,20 @@ float sampled_share_of_wide(const std::vector<SizedRidgels>& sizes, float weakes
 
 }  // namespace
 
-std::vector<Ridgel> choose_sizes(std::vector<SizedRidgels>& sizes, float weakest) {
-  std::vector<Ridgel>& fine = sizes[0].ridgels;
-  if (sizes.size() == 1) return std::move(fine);
+std::vector<Ridgel> choose_sizes(const std::vector<SizedRidgels>& sizes, float weakest) {
+  const SizedRidgels& full = sizes[0];
+  if (sizes.size() == 1) return full.ridgels;
   // Mostly, a look at a sample is enough.
-  if (sampled_share_of_wide(sizes, weakest) < 0.5F * kWidePicture)
-    return merged_scales(sizes[0].image, fine, enlarged(sizes[1].ridgels));
-  std::vector<Ridgel> chosen = fine;
-  float scale = 2;
-  for (std::size_t k = 1; k < sizes.size(); ++k, scale *= 2) {
-    add_wider(at_full_size(sizes[k].ridgels, scale, weakest), sizes[k - 1].image,
-              sizes[0].image.size(), chosen);
+  if (sampled_share_of_wide(sizes, weakest) >= 0.5F * kWidePicture) {
+    std::vector<Ridgel> chosen = full.ridgels;
+    float scale = 2;
+    for (std::size_t k = 1; k < sizes.size(); ++k, scale *= 2) {
+      add_wider(at_full_size(sizes[k].ridgels, scale, weakest), sizes[k - 1].image,
+                full.image.size(), chosen);
+    }
+    if (share_of_wide(chosen) >= kWidePicture) return chosen;
   }
-  if (share_of_wide(chosen) >= kWidePicture) return chosen;
-  return merged_scales(sizes[0].image, fine, enlarged(sizes[1].ridgels));
+  return merged_scales(full.image, full.ridgels, enlarged(sizes[1].ridgels));
 }
 
 }  // namespace pencilscan

@@ -26,6 +26,7 @@ struct SizedRidgels {
 /// A pattern has lines of one width, so a picture of one has narrow ones or wide ones. In a picture
 /// of narrow lines, half the size adds what the full size does not show, nothing else. In one of
 /// wide lines every size competes, and ridgels weaker than `weakest` do not take part.
-[[nodiscard]] std::vector<Ridgel> choose_sizes(std::vector<SizedRidgels>& sizes, float weakest);
+[[nodiscard]] std::vector<Ridgel> choose_sizes(const std::vector<SizedRidgels>& sizes,
+                                               float weakest);
 
 }  // namespace pencilscan

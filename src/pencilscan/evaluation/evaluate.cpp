@@ -8,10 +8,6 @@
 namespace pencilscan {
 namespace {
 
-Vec3 position(const MeasuredPoint& p) {
-  return {static_cast<double>(p.x), static_cast<double>(p.y), static_cast<double>(p.z)};
-}
-
 void require_index(std::size_t vertex, const char* property, std::size_t value, std::size_t count) {
   if (value < count) return;
   throw InputError("points.ply", "vertex " + std::to_string(vertex) + " " + property,
@@ -37,7 +33,7 @@ AlignmentReport align(const TriangleMesh& truth, const EvaluationInput& result,
                       AlignmentKind kind) {
   std::vector<Vec3> points;
   if (result.points) {
-    for (const MeasuredPoint& p : *result.points) points.push_back(position(p));
+    for (const MeasuredPoint& p : *result.points) points.push_back(position_of(p));
   } else {
     points = result.mesh->vertices;
   }
@@ -65,7 +61,7 @@ void evaluate_points(const TruthScene& truth, const std::vector<MeasuredPoint>& 
                      double mm_per_unit, const Progress& progress, Evaluation& evaluation) {
   evaluation.point_count = points.size();
   std::vector<Vec3> positions;
-  for (const MeasuredPoint& p : points) positions.push_back(position(p));
+  for (const MeasuredPoint& p : points) positions.push_back(position_of(p));
   auto distances = distances_to(truth.scene(), positions);
   for (double& d : distances) d *= mm_per_unit;
   evaluation.point_distance = distance_figures(distances);

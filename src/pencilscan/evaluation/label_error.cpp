@@ -47,8 +47,7 @@ double ray_error(const TruthScene& truth, const MeasuredPoint& p) {
   const Ray ray = truth.rig().cameras[p.camera].ray(pixel_of(p));
   const auto hit = truth.scene().first_hit(ray);
   if (!hit) return std::numeric_limits<double>::infinity();
-  const Vec3 vertex(static_cast<double>(p.x), static_cast<double>(p.y), static_cast<double>(p.z));
-  return std::abs((vertex - ray.origin).dot(ray.direction) - hit->distance);
+  return std::abs((position_of(p) - ray.origin).dot(ray.direction) - hit->distance);
 }
 
 void judge(const TruthScene& truth, const MeasuredPoint& p, const std::vector<Vec2>& disc,

@@ -8,6 +8,7 @@
 
 #include "pencilscan/core/median.h"
 #include "pencilscan/core/parallel.h"
+#include "pencilscan/detection/curve_rendering.h"
 #include "pencilscan/detection/profile_fit.h"
 #include "pencilscan/detection/refine.h"
 #include "pencilscan/guided/line_chains.h"

@@ -8,7 +8,7 @@
 #include <tuple>
 
 #include "pencilscan/core/random.h"
-#include "pencilscan/detection/refine.h"
+#include "pencilscan/detection/curve_rendering.h"
 #include "pencilscan/labeling/two_projector_scene.h"
 #include "pencilscan/points/settle.h"
 #include "pencilscan/points/triangulate.h"
@@ -250,10 +250,7 @@ TEST_F(LabeledScene, SurfaceThatGrewIsThatOfAllPointsAtOnce) {
       std::vector<MeasuredPoint> all = points();
       for (MeasuredPoint& p : all) {
         if (p.u < static_cast<float>(cut + beside)) continue;
-        const Vec3 x = center + 1.1 * (Vec3(p.x, p.y, p.z) - center);
-        p.x = static_cast<float>(x.x());
-        p.y = static_cast<float>(x.y());
-        p.z = static_cast<float>(x.z());
+        set_position(center + 1.1 * (position_of(p) - center), p);
       }
       std::vector<MeasuredPoint> right;
       std::vector<MeasuredPoint> left;
@@ -282,7 +279,7 @@ TEST_F(LabeledScene, SettledPointsAreCloserToTheSurface) {
   const auto rms = [&](const std::vector<MeasuredPoint>& list) {
     double sum = 0;
     for (const MeasuredPoint& p : list) {
-      const double z = (camera().device_from_world * Vec3(p.x, p.y, p.z)).z();
+      const double z = (camera().device_from_world * position_of(p)).z();
       sum += std::pow(z - depth_of_surface(camera(), Vec2(p.u, p.v)), 2);
     }
     return std::sqrt(sum / static_cast<double>(list.size()));
@@ -291,7 +288,7 @@ TEST_F(LabeledScene, SettledPointsAreCloserToTheSurface) {
   // Dozens of points share a patch; its own error and bumps beyond quadratic leave part of it.
   EXPECT_LT(rms(after), 0.65 * rms(before));
   for (const MeasuredPoint& p : after) {
-    const auto pixel = camera().project(Vec3(p.x, p.y, p.z));
+    const auto pixel = camera().project(position_of(p));
     ASSERT_TRUE(pixel);
     EXPECT_NEAR(pixel->x(), p.u, 1e-2);
     EXPECT_NEAR(pixel->y(), p.v, 1e-2);

@@ -2,6 +2,8 @@
 
 #include <cstdint>
 
+#include "pencilscan/geometry/types.h"
+
 namespace pencilscan {
 
 /// One measured curve pixel: a vertex of points.ply (docs/formats.md).
@@ -19,5 +21,20 @@ struct MeasuredPoint {
   /// Colour of the surface as a screen shows it (sRGB); 0 where the normal is.
   std::uint8_t red = 0, green = 0, blue = 0;
 };
+
+[[nodiscard]] inline Vec3 position_of(const MeasuredPoint& p) {
+  return {static_cast<double>(p.x), static_cast<double>(p.y), static_cast<double>(p.z)};
+}
+
+/// Unit; 0 where it is not known.
+[[nodiscard]] inline Vec3 normal_of(const MeasuredPoint& p) {
+  return {static_cast<double>(p.nx), static_cast<double>(p.ny), static_cast<double>(p.nz)};
+}
+
+inline void set_position(const Vec3& x, MeasuredPoint& p) {
+  p.x = static_cast<float>(x.x());
+  p.y = static_cast<float>(x.y());
+  p.z = static_cast<float>(x.z());
+}
 
 }  // namespace pencilscan

@@ -6,8 +6,8 @@
 #include <utility>
 
 #include "pencilscan/pipeline/frame.h"
+#include "pencilscan/pipeline/sample_frame.h"
 #include "pencilscan/planning/ring.h"
-#include "pencilscan/simulation/photography.h"
 #include "pencilscan/simulation/simulated_object.h"
 
 namespace pencilscan {
@@ -38,18 +38,9 @@ Frame frame_of(const Rig& rig) {
     mesh.vertices.emplace_back(x, y, kFloorHeight);
   mesh.faces.push_back({first, first + 1, first + 2});
   mesh.faces.push_back({first, first + 2, first + 3});
-  const SimulatedObject object(mesh);
   PhotographyOptions photo;
   photo.noise = "medium";
-  Frame frame;
-  frame.name = "000000";
-  for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
-    cv::Mat values;
-    photograph(rig, c, object, photo, static_cast<std::uint32_t>(c))
-        .convertTo(values, CV_32F, 1 / 255.0);
-    frame.images.push_back(values);
-  }
-  return frame;
+  return sample::photographed_frame(rig, SimulatedObject(mesh), photo);
 }
 
 /// Where points or vertices lie.
@@ -78,8 +69,7 @@ TEST(StatedFloor, LeavesTheObjectAloneWithoutFlapsBesideIt) {
     if (stated == 1) rig.floor = Floor{{0, 0, kFloorHeight}, Vec3::UnitZ()};
     FrameResult result{measure_points(rig, frame), {}, {}};
     result.shape = measure_shape(rig, frame, result.points, {});
-    for (const MeasuredPoint& p : result.points.points)
-      points[stated].add({double{p.x}, double{p.y}, double{p.z}});
+    for (const MeasuredPoint& p : result.points.points) points[stated].add(position_of(p));
     for (const Vec3& x : result.shape.surface.measured.vertices) surface[stated].add(x);
     for (const Vec3& x : result.shape.surface.mesh.vertices)
       lowest[stated] = std::min(lowest[stated], x.z());

@@ -1,6 +1,5 @@
 #include <cmath>
 
-#include "pencilscan/core/parallel.h"
 #include "pencilscan/pipeline/frame.h"
 
 namespace pencilscan {
@@ -10,17 +9,13 @@ float widened(float sigma, double by) {
   return static_cast<float>(std::hypot(static_cast<double>(sigma), by));
 }
 
-Vec3 normal_of(const MeasuredPoint& p) {
-  return Vec3(static_cast<double>(p.nx), static_cast<double>(p.ny), static_cast<double>(p.nz));
-}
-
 }  // namespace
 
 FrameResult count_motion(const Rig& rig, FrameResult result) {
   const ExposureMotion& motion = result.shape.motion;
   if (!motion.is_seen) return result;
   for (MeasuredPoint& p : result.points.points) {
-    const Vec3 x(static_cast<double>(p.x), static_cast<double>(p.y), static_cast<double>(p.z));
+    const Vec3 x = position_of(p);
     const Vec3 ray = (x - rig.cameras[p.camera].center()).normalized();
     p.sigma = widened(p.sigma, motion_sigma(motion.way_of(x), normal_of(p), &ray));
   }

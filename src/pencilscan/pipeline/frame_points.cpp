@@ -28,9 +28,7 @@ std::vector<MeasuredPoint> dense_points(const Rig& rig, std::span<const DepthMap
       const Vec3 x = node_point(rig, map, i);
       const Vec2 pixel = map.pixel(i);
       MeasuredPoint p;
-      p.x = static_cast<float>(x.x());
-      p.y = static_cast<float>(x.y());
-      p.z = static_cast<float>(x.z());
+      set_position(x, p);
       p.u = static_cast<float>(pixel.x());
       p.v = static_cast<float>(pixel.y());
       p.camera = static_cast<std::uint8_t>(map.camera);

@@ -5,8 +5,8 @@
 #include <cmath>
 
 #include "pencilscan/pipeline/frame.h"
+#include "pencilscan/pipeline/sample_frame.h"
 #include "pencilscan/planning/ring.h"
-#include "pencilscan/simulation/photography.h"
 
 namespace pencilscan {
 namespace {
@@ -30,15 +30,7 @@ FrameResult result_of(const Vec3& shift) {
   PhotographyOptions photo;
   photo.noise = "medium";
   photo.render.samples = 2;
-  Frame frame;
-  frame.name = "000000";
-  for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
-    const cv::Mat picture = photograph(rig, c, moments, photo, static_cast<std::uint32_t>(c));
-    cv::Mat values;
-    picture.convertTo(values, CV_32FC3, 1.0 / 255);
-    frame.images.push_back(values);
-  }
-  return reconstruct_frame(rig, frame);
+  return reconstruct_frame(rig, sample::photographed_frame(rig, moments, photo));
 }
 
 bool warns(const FrameResult& result) {
@@ -54,7 +46,7 @@ std::pair<double, double> coverage(const FrameResult& result) {
   std::size_t two = 0;
   std::size_t all = 0;
   for (const MeasuredPoint& p : result.points.points) {
-    const Vec3 x(static_cast<double>(p.x), static_cast<double>(p.y), static_cast<double>(p.z));
+    const Vec3 x = position_of(p);
     const Vec3 ray = (x - rig.cameras[p.camera].center()).normalized();
     const double cosine = std::max(0.2, std::abs(ray.dot(x.normalized())));
     const double off = std::abs(x.norm() - kRadius) / cosine / static_cast<double>(p.sigma);

@@ -180,6 +180,36 @@ struct Suspect {
   double best_named = 0;
 };
 
+/// The two of the doubtful cameras whose pictures contradict nothing where the other one stands, if
+/// there are no other two. `points`: what each measured.
+std::optional<std::pair<int, int>> exchanged_pair(
+    const Rig& rig, const Frame& frame, const std::vector<std::vector<MeasuredPoint>>& points,
+    const std::vector<std::size_t>& doubtful, const PointOptions& options) {
+  const PictureTrial trial(rig, options);
+  std::vector<cv::Mat> light(rig.cameras.size());
+  for (const std::size_t c : doubtful) light[c] = linear_light(rig.cameras[c], frame.images[c]);
+  std::vector<std::pair<std::size_t, std::size_t>> pairs;
+  for (const std::size_t a : doubtful) {
+    for (const std::size_t b : doubtful) {
+      if (a < b && light[a].size() == light[b].size()) pairs.emplace_back(a, b);
+    }
+  }
+  std::vector<char> agrees(pairs.size(), 0);
+  parallel_for(pairs.size(), [&](std::size_t i) {
+    const auto [a, b] = pairs[i];
+    std::vector<std::vector<MeasuredPoint>> exchanged = points;
+    exchanged[a] = trial.points(a, light[b]);
+    exchanged[b] = trial.points(b, light[a]);
+    const bool is_measured =
+        2 * exchanged[a].size() > points[b].size() && 2 * exchanged[b].size() > points[a].size();
+    agrees[i] = is_measured && ViewAgreement(rig, exchanged).doubtful_pairs() == 0 ? 1 : 0;
+  });
+  if (std::count(agrees.begin(), agrees.end(), 1) != 1) return std::nullopt;
+  const auto i = std::find(agrees.begin(), agrees.end(), 1) - agrees.begin();
+  const auto [a, b] = pairs[static_cast<std::size_t>(i)];
+  return std::pair(static_cast<int>(a), static_cast<int>(b));
+}
+
 }  // namespace
 
 std::string describe(const Rig& rig, const PictureFinding& finding) {
@@ -311,30 +341,8 @@ std::vector<PictureFinding> contradicting_pictures(const Rig& rig, const Frame& 
   const std::vector<std::size_t> doubtful = agreement.doubtful_cameras();
   if (doubtful.empty()) return {};
 
-  // The pictures of two cameras, each where the other stands.
-  const PictureTrial trial(rig, options);
-  std::vector<std::pair<std::size_t, std::size_t>> swaps;
-  for (const std::size_t a : doubtful) {
-    for (const std::size_t b : doubtful) {
-      if (b <= a || frame.images[a].size() != frame.images[b].size()) continue;
-      if (rig.cameras[a].mosaic.has_value() == rig.cameras[b].mosaic.has_value())
-        swaps.emplace_back(a, b);
-    }
-  }
-  std::vector<char> agrees(swaps.size(), 0);
-  parallel_for(swaps.size(), [&](std::size_t i) {
-    const auto [a, b] = swaps[i];
-    std::vector<std::vector<MeasuredPoint>> exchanged = points;
-    exchanged[a] = trial.points(a, linear_light(rig.cameras[b], frame.images[b]));
-    exchanged[b] = trial.points(b, linear_light(rig.cameras[a], frame.images[a]));
-    const bool is_measured =
-        2 * exchanged[a].size() > points[b].size() && 2 * exchanged[b].size() > points[a].size();
-    agrees[i] = is_measured && ViewAgreement(rig, exchanged).doubtful_pairs() == 0 ? 1 : 0;
-  });
-  if (std::count(agrees.begin(), agrees.end(), 1) == 1) {
-    const auto i = std::find(agrees.begin(), agrees.end(), 1) - agrees.begin();
-    const auto a = static_cast<int>(swaps[static_cast<std::size_t>(i)].first);
-    const auto b = static_cast<int>(swaps[static_cast<std::size_t>(i)].second);
+  if (const auto pair = exchanged_pair(rig, frame, points, doubtful, options)) {
+    const auto [a, b] = *pair;
     return {{PictureFault::kExchanged, a, b}, {PictureFault::kExchanged, b, a}};
   }
 

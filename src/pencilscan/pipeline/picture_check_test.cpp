@@ -8,8 +8,8 @@
 #include <utility>
 
 #include "pencilscan/core/error.h"
+#include "pencilscan/pipeline/sample_frame.h"
 #include "pencilscan/planning/ring.h"
-#include "pencilscan/simulation/photography.h"
 #include "pencilscan/simulation/simulated_object.h"
 
 namespace pencilscan {
@@ -42,18 +42,9 @@ class PictureCheck : public testing::Test {
   }
 
   static Frame frame_of(const TriangleMesh& mesh) {
-    const SimulatedObject object(mesh);
     PhotographyOptions photo;
     photo.noise = "medium";
-    Frame frame;
-    frame.name = "000000";
-    for (std::size_t c = 0; c < rig_->cameras.size(); ++c) {
-      cv::Mat values;
-      photograph(*rig_, c, object, photo, static_cast<std::uint32_t>(c))
-          .convertTo(values, CV_32F, 1 / 255.0);
-      frame.images.push_back(values);
-    }
-    return frame;
+    return sample::photographed_frame(*rig_, SimulatedObject(mesh), photo);
   }
 
   /// What is said of a frame, and of which cameras.

@@ -189,7 +189,7 @@ TEST_F(PipelineTest, LinesWithoutACodeAreToldApartWhereFourProjectorsShareAColou
 double distance_from_ball(const PointResult& result) {
   std::vector<double> distances;
   for (const MeasuredPoint& p : result.points)
-    distances.push_back(std::abs(Vec3(double{p.x}, double{p.y}, double{p.z}).norm() - 95));
+    distances.push_back(std::abs(position_of(p).norm() - 95));
   return upper_median(std::move(distances));
 }
 

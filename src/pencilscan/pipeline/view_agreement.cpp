@@ -34,7 +34,7 @@ class MeasuredDepths {
 
   /// Says of a point of another camera whether this one measured it; what lies behind says nothing.
   void judge(const MeasuredPoint& p, double tolerance, PairAgreement& agreement) const {
-    const std::optional<Vec2> pixel = camera_.project({double{p.x}, double{p.y}, double{p.z}});
+    const std::optional<Vec2> pixel = camera_.project(position_of(p));
     const std::optional<std::size_t> at = pixel ? cell(*pixel) : std::nullopt;
     if (!at || cells_[*at].farthest < cells_[*at].nearest) return;
     const double depth = depth_of(p);
@@ -53,7 +53,7 @@ class MeasuredDepths {
   };
 
   [[nodiscard]] double depth_of(const MeasuredPoint& p) const {
-    return (camera_.device_from_world * Vec3(double{p.x}, double{p.y}, double{p.z})).z();
+    return (camera_.device_from_world * position_of(p)).z();
   }
   [[nodiscard]] std::optional<std::size_t> cell(const Vec2& pixel) const {
     const Vec2 at = (pixel / kCell).array().floor();

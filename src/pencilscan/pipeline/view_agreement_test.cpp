@@ -22,9 +22,7 @@ std::vector<MeasuredPoint> seen_points(const Camera& camera, const Vec3& center)
       if (normal.dot(camera.center() - x) <= 0) continue;
       const Vec2 pixel = camera.project(x).value();
       MeasuredPoint p;
-      p.x = static_cast<float>(x.x());
-      p.y = static_cast<float>(x.y());
-      p.z = static_cast<float>(x.z());
+      set_position(x, p);
       p.u = static_cast<float>(pixel.x());
       p.v = static_cast<float>(pixel.y());
       points.push_back(p);

@@ -227,7 +227,7 @@ int LocalSurface::cell_row(float y) const {
 void LocalSurface::add(std::span<const MeasuredPoint> points) {
   for (const MeasuredPoint& p : points) {
     if (!is_on_lattice(p.u, p.v, options_.used_of_seven)) continue;
-    const Vec3 way = Vec3(p.x, p.y, p.z) - center_;
+    const Vec3 way = position_of(p) - center_;
     const float relative = p.sigma / static_cast<float>(way.norm());
     auto& cell = cells_[static_cast<std::size_t>(cell_row(p.v) * cell_columns_ + cell_column(p.u))];
     cell.push_back({Vector2f(p.u, p.v), static_cast<float>(1 / way.dot(forward_)),

@@ -73,11 +73,8 @@ std::optional<MeasuredPoint> settled(const MeasuredPoint& point, const LocalSurf
   const double own_share = others2 / (own2 + others2);
   // Inverse depth is what varies linearly over the image.
   const double w = 1 / others.depth + own_share * (1 / depth - 1 / others.depth);
-  const Vec3 x = center + way / (depth * w);
   MeasuredPoint result = point;
-  result.x = static_cast<float>(x.x());
-  result.y = static_cast<float>(x.y());
-  result.z = static_cast<float>(x.z());
+  set_position(center + way / (depth * w), result);
   result.sigma = static_cast<float>(settled_sigma(std::sqrt(own_share * own2), deviations, camera,
                                                   others.depth / camera.K(0, 0), *patch));
   if (options.errors_are_shared) result.sigma = std::max(result.sigma, point.sigma);

@@ -185,8 +185,7 @@ SettledPoints settle_on_surface(const Rig& rig, const RayScene& surface,
     const double cosine = -face_normal(mesh, hit->face).dot(ray.direction);
     const double of_surface = across / std::max(cosine, kLeastCosine);
     const double of_point = static_cast<double>(points[i].sigma);
-    const Vec3 x(static_cast<double>(p.x), static_cast<double>(p.y), static_cast<double>(p.z));
-    const double difference = hit->distance - (x - ray.origin).dot(ray.direction);
+    const double difference = hit->distance - (position_of(p) - ray.origin).dot(ray.direction);
     const double deviations = std::abs(difference) / std::hypot(of_surface, of_point);
     if (deviations > kLeftOut) keep[i] = 0;
     evidence.surface = static_cast<float>(of_surface);

@@ -66,9 +66,7 @@ void add_run(const Rig& rig, const GridGraph& graph, const LabeledRun& run,
     const double footprint = options.footprint_sigma_px * *depth / camera.K(0, 0);
     const double ray_length = direction.norm();
     MeasuredPoint point;
-    point.x = static_cast<float>(x.x());
-    point.y = static_cast<float>(x.y());
-    point.z = static_cast<float>(x.z());
+    set_position(x, point);
     point.u = p.position.x();
     point.v = p.position.y();
     point.camera = static_cast<std::uint8_t>(graph.camera);

@@ -12,8 +12,6 @@
 namespace pencilscan {
 namespace {
 
-Vec3 position(const MeasuredPoint& p) { return {p.x, p.y, p.z}; }
-
 void check_devices(const Rig& rig, const MeasuredPoint& p) {
   if (p.camera >= rig.cameras.size()) {
     throw InputError("points", "camera", std::to_string(p.camera), "must be an index of the rig");
@@ -63,18 +61,18 @@ SampleSet sample_curves(const Rig& rig, std::span<const MeasuredPoint> points,
   std::vector<double> spacings;
   for (std::size_t i = 0; i < points.size(); ++i) {
     check_devices(rig, points[i]);
-    if (!position(points[i]).allFinite() || position(points[i]).norm() > kFarthest) continue;
+    if (!position_of(points[i]).allFinite() || position_of(points[i]).norm() > kFarthest) continue;
     order.push_back(static_cast<std::uint32_t>(i));
-    spacings.push_back(
-        light_sheet_at(rig.projectors[points[i].projector], points[i].pattern, position(points[i]))
-            .first);
+    spacings.push_back(light_sheet_at(rig.projectors[points[i].projector], points[i].pattern,
+                                      position_of(points[i]))
+                           .first);
   }
   set.spacing = upper_median(spacings);
   if (order.empty() || !(set.spacing > 0)) return set;
 
   const double cell = sample_spacings * set.spacing;
   const auto key = [&](std::uint32_t i) {
-    const Vec3 x = position(points[i]) / cell;
+    const Vec3 x = position_of(points[i]) / cell;
     return std::tuple(curve_key(points[i]), std::floor(x[0]), std::floor(x[1]), std::floor(x[2]),
                       i);
   };
@@ -101,7 +99,7 @@ SampleSet sample_curves(const Rig& rig, std::span<const MeasuredPoint> points,
       const double sigma =
           std::max(std::isfinite(p.sigma) ? static_cast<double>(p.sigma) : 0.0, 0.01 * set.spacing);
       const double weight = 1 / (sigma * sigma);
-      sample.position += weight * position(p);
+      sample.position += weight * position_of(p);
       sample.confidence += std::isfinite(p.confidence) ? static_cast<double>(p.confidence) : 0.0;
       weight_sum += weight;
       ++sample.count;

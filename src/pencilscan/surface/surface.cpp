@@ -75,7 +75,7 @@ std::vector<char> points_on_maps(const Rig& rig, std::span<const MeasuredPoint> 
       if (row < 0 || column < 0 || row >= map.rows || column >= map.columns) continue;
       const std::size_t k = map.index(row, column);
       if (!map.nodes[k].measured()) continue;
-      const Vec3 d = Vec3(p.x, p.y, p.z) - node_point(rig, map, k);
+      const Vec3 d = position_of(p) - node_point(rig, map, k);
       used[i] = std::abs(d.dot(node_normal(rig, map, k))) < tolerance ? 1 : 0;
     }
   });
