@@ -1,7 +1,6 @@
 // What newcomers get wrong at the keyboard: each mistake ends in one line on stderr that names the
 // wrong word and says what to do, with exit code 2, and nothing is written or replaced.
 
-#include <sstream>
 #include <vector>
 
 #include "program.h"
@@ -22,22 +21,6 @@ class Newcomer : public ProgramTest {
     write("mesh.obj",
           "v -60 -60 -50\nv 60 -60 -50\nv 0 70 -50\nv 0 0 80\n"
           "f 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n");
-  }
-  /// Every command, as the program lists them.
-  std::vector<std::string> commands(const std::string& above) {
-    std::istringstream lines(run(above + "--help").output);
-    std::vector<std::string> names;
-    bool listed = false;
-    for (std::string line; std::getline(lines, line);) {
-      if (listed && line.starts_with("  ")) {
-        std::string name;
-        std::istringstream(line) >> name;
-        if (line[2] != ' ') names.push_back(above + name);
-      } else {
-        listed = line == "Commands:";
-      }
-    }
-    return names;
   }
   /// `arguments` refuse to replace `file`, leave it alone, and replace it with --overwrite.
   void expect_kept(const std::string& arguments, const std::string& file) {
@@ -178,24 +161,6 @@ TEST_F(Newcomer, IsToldOfObjectsInAnotherUnit) {
   const Outcome fitted = run(simulate + " --fit --up y --texture stripes --out fitted");
   EXPECT_EQ(fitted.code, 0) << fitted.error;
   EXPECT_THAT(fitted.error, Not(HasSubstr("warning")));
-}
-
-TEST_F(Newcomer, ReadsHelpInPlainWords) {
-  EXPECT_EQ(run("-V").output, run("--version").output);
-  EXPECT_THAT(run("-V").output, ::testing::StartsWith("pencilscan "));
-  std::vector<std::string> all = commands("");
-  ASSERT_GE(all.size(), 10U);
-  for (const std::string& group : commands(""))
-    for (const std::string& command : commands(group + " ")) all.push_back(command);
-  ASSERT_GE(all.size(), 20U);
-  for (const std::string& command : all) {
-    const Outcome help = run(command + " --help");
-    EXPECT_EQ(help.code, 0) << command;
-    EXPECT_THAT(help.output, HasSubstr("Example:\n")) << command;
-    for (const char* jargon : {"INT", "FLOAT", "ENUM", "UINT", " in [", " in {", "->", "SUBCOMMAND",
-                               "REQUIRED", "Needs:"})
-      EXPECT_THAT(help.output, Not(HasSubstr(jargon))) << command;
-  }
 }
 
 TEST_F(Newcomer, IsToldThatTheMemoryDoesNotSuffice) {

@@ -1,4 +1,5 @@
-"""Man pages and completion that the program writes know every command, option and word of its help.
+"""Man pages and completion that the program writes know every command, option and word of its help,
+and the help is in plain words.
 
     written_test.py PROGRAM
 """
@@ -98,6 +99,16 @@ class Written(unittest.TestCase):
         self.assertIn(":word:(linear multiview joint single-projector)", script)
         if shutil.which("zsh"):
             run("zsh", "-n", "-s", text=script)
+
+    def test_help_is_in_plain_words_with_an_example(self):
+        for path in COMMANDS[1:]:
+            self.assertIn("Example:\n", help_of(path), path)
+            for jargon in ("INT", "FLOAT", "ENUM", "UINT", " in [", " in {", "->", "SUBCOMMAND", "REQUIRED", "Needs:"):
+                self.assertNotIn(jargon, help_of(path), path)
+
+    def test_version_has_a_short_option(self):
+        self.assertRegex(run(PROGRAM, "-V"), "^pencilscan ")
+        self.assertEqual(run(PROGRAM, "-V"), run(PROGRAM, "--version"))
 
     def test_help_does_not_list_them(self):
         self.assertNotIn("completion", help_of(()))
