@@ -43,11 +43,35 @@ double level_of(const cv::Mat& coarse, const LitView& view) {
   return all > 0 ? light / all : 0;
 }
 
-/// Bounds of the delay in one camera, ms.
+/// What one flash says of the delay in one camera, ms.
 struct Bounds {
   double least = 0;
   double most = std::numeric_limits<double>::infinity();
 };
+
+/// More flashes than this share that came at another time are the projector's doing: a computer
+/// that pauses hits one or two in a row.
+constexpr double kFewStrays = 0.25;
+
+/// The delays that most flashes allow; of several such, the shortest: a busy computer makes light
+/// late and never early.
+Bounds agreed(const std::vector<Bounds>& flashes) {
+  Bounds best;
+  std::size_t most = 0;
+  for (const Bounds& first : flashes) {  // what several have in common begins with one of them
+    Bounds common{first.least, std::numeric_limits<double>::infinity()};
+    std::size_t count = 0;
+    for (const Bounds& flash : flashes) {
+      if (flash.least > first.least || flash.most < first.least) continue;
+      common.most = std::min(common.most, flash.most);
+      ++count;
+    }
+    if (count < most || (count == most && common.least >= best.least)) continue;
+    best = common;
+    most = count;
+  }
+  return best;
+}
 
 class Tester {
  public:
@@ -65,10 +89,12 @@ class Tester {
   [[nodiscard]] std::vector<cv::Mat> settled_pictures();
   void look(std::size_t projector, ProjectorTiming& timing);
   void judge_flicker(std::size_t projector, ProjectorTiming& timing, std::vector<Fault>& faults);
+  /// Adds what this flash says to every camera's.
   void flash(std::size_t projector, bool white, const ProjectorTiming& timing,
-             std::vector<Bounds>& bounds);
-  void flash_triggered(std::size_t projector, bool white, const ProjectorTiming& timing,
-                       std::vector<Bounds>& bounds, double after_ms);
+             std::vector<std::vector<Bounds>>& flashes);
+  /// One picture, so long after the flash; whether the light was there before it in all cameras.
+  bool flash_triggered(std::size_t projector, bool white, const ProjectorTiming& timing,
+                       std::vector<std::vector<Bounds>>& flashes, double after_ms);
   void measure_delay(std::size_t projector, ProjectorTiming& timing, std::vector<Fault>& faults);
   [[nodiscard]] double refresh(std::size_t projector) const {
     const double stated = screen_.refresh_hz(projector);
@@ -144,11 +170,12 @@ void Tester::judge_flicker(std::size_t projector, ProjectorTiming& timing,
 }
 
 void Tester::flash(std::size_t projector, bool white, const ProjectorTiming& timing,
-                   std::vector<Bounds>& bounds) {
+                   std::vector<std::vector<Bounds>>& flashes) {
   const double rate = cameras_.group().settings(0).rate_hz.value_or(10);
   // Flashes fall anywhere between two pictures.
   std::this_thread::sleep_for(std::chrono::nanoseconds(ns(random_.uniform(0, 1000 / rate))));
   const std::int64_t shown = screen_.show(projector, {white ? Kind::kWhite : Kind::kBlack, 0, {}});
+  std::vector<Bounds> bounds(flashes.size());
   std::vector<char> done(bounds.size());
   std::vector<std::int64_t> seen_until(bounds.size(), shown);
   const std::int64_t until = shown + ns(1000 * options_.patience_s);
@@ -165,7 +192,8 @@ void Tester::flash(std::size_t projector, bool white, const ProjectorTiming& tim
       if ((white ? level : 1 - level) < kAllLight) {
         bounds[c].least = std::max(bounds[c].least, after_ms);
       } else {
-        bounds[c].most = std::min(bounds[c].most, after_ms);
+        bounds[c].most = after_ms;
+        flashes[c].push_back(bounds[c]);
         done[c] = 1;
       }
     }
@@ -174,8 +202,8 @@ void Tester::flash(std::size_t projector, bool white, const ProjectorTiming& tim
   }
 }
 
-void Tester::flash_triggered(std::size_t projector, bool white, const ProjectorTiming& timing,
-                             std::vector<Bounds>& bounds, double after_ms) {
+bool Tester::flash_triggered(std::size_t projector, bool white, const ProjectorTiming& timing,
+                             std::vector<std::vector<Bounds>>& flashes, double after_ms) {
   const std::int64_t shown = screen_.show(projector, {white ? Kind::kWhite : Kind::kBlack, 0, {}});
   std::this_thread::sleep_for(
       std::chrono::nanoseconds(std::max<std::int64_t>(0, shown + ns(after_ms) - host_now_ns())));
@@ -183,48 +211,58 @@ void Tester::flash_triggered(std::size_t projector, bool white, const ProjectorT
   cameras_.group().trigger();
   const auto frames = cameras_.first_since(since, since + ns(1000 * options_.patience_s));
   const double triggered_ms = static_cast<double>(since - shown) / 1e6;
-  for (std::size_t c = 0; c < bounds.size(); ++c) {
+  bool there = true;
+  for (std::size_t c = 0; c < flashes.size(); ++c) {
     if (timing.views[c].share < kLeastSeen || !frames[c].frame) continue;
     const double level = level_of(coarse_picture(frames[c].frame->image), timing.views[c]);
-    if ((white ? level : 1 - level) < kAllLight)
-      bounds[c].least = std::max(bounds[c].least, triggered_ms);
+    const bool late = (white ? level : 1 - level) < kAllLight;
+    if (late)
+      flashes[c].push_back({triggered_ms, std::numeric_limits<double>::infinity()});
     else
-      bounds[c].most = std::min(bounds[c].most, triggered_ms);
+      flashes[c].push_back({0, triggered_ms});
+    there = there && !late;
   }
   // What is shown now has to be all there before it changes again.
   std::this_thread::sleep_for(
       std::chrono::nanoseconds(std::max<std::int64_t>(0, shown + ns(kLongestMs) - host_now_ns())));
+  return there;
 }
 
 void Tester::measure_delay(std::size_t projector, ProjectorTiming& timing,
                            std::vector<Fault>& faults) {
-  std::vector<Bounds> bounds(timing.views.size());
+  std::vector<std::vector<Bounds>> flashes(timing.views.size());
   bool white = true;  // as it is now
   double low = 0;
   double high = kLongestMs;
   for (int k = 0; k < (software_ ? kSteps : 2 * options_.flashes); ++k) {
     white = !white;
-    if (!software_) {
-      flash(projector, white, timing, bounds);
-      continue;
-    }
     const double middle = 0.5 * (low + high);
-    flash_triggered(projector, white, timing, bounds, middle);
-    double least = 0;
-    for (const Bounds& bound : bounds) least = std::max(least, bound.least);
-    (least >= middle ? low : high) = middle;
-  }
-  double jitter = 0;
-  for (std::size_t c = 0; c < bounds.size(); ++c) {
-    if (timing.views[c].share < kLeastSeen || !std::isfinite(bounds[c].most)) continue;
-    timing.measured = true;
-    timing.least_ms = std::max(timing.least_ms, bounds[c].least);
-    timing.most_ms = std::max({timing.most_ms, bounds[c].most, bounds[c].least});
-    jitter = std::max(jitter, bounds[c].least - bounds[c].most);
+    if (!software_)
+      flash(projector, white, timing, flashes);
+    else
+      (flash_triggered(projector, white, timing, flashes, middle) ? high : low) = middle;
   }
   const double period = 1000 / refresh(projector);
-  timing.use_ms = timing.most_ms + period;
-  if (!timing.measured || jitter <= period) return;
+  double jitter = 0;
+  for (const std::vector<Bounds>& own : flashes) {
+    const Bounds usual = agreed(own);
+    if (own.empty() || !std::isfinite(usual.most)) continue;
+    timing.measured = true;
+    timing.least_ms = std::max(timing.least_ms, usual.least);
+    timing.most_ms = std::max(timing.most_ms, usual.most);
+    std::size_t strays = 0;
+    double farthest = 0;
+    for (const Bounds& flash : own) {
+      const double off = std::max(flash.least - usual.most, usual.least - flash.most);
+      if (off <= period) continue;
+      ++strays;
+      farthest = std::max(farthest, off);
+    }
+    if (static_cast<double>(strays) > kFewStrays * static_cast<double>(own.size()))
+      jitter = std::max(jitter, farthest);
+  }
+  timing.use_ms = timing.most_ms + jitter + period;
+  if (jitter == 0) return;
   faults.push_back({"jitter", screen_.projectors()[projector].name,
                     "its delay changes by " + formatted(jitter, "%.0f ms") + " from flash to flash",
                     "switch off its picture processing; trigger the cameras by a wire"});

@@ -13,7 +13,7 @@ namespace pencilscan {
 /// What a projector's flashes show.
 struct ProjectorTiming {
   /// From show() to the first picture (its time of soonest arrival, or our trigger) that has all of
-  /// the new light: at least and at most, over all flashes and cameras that see it.
+  /// the new light: at least and at most, as most flashes say, in the slowest camera that sees it.
   double least_ms = 0;
   double most_ms = 0;
   double use_ms = 0;  ///< to wait for, with a frame of the projector to spare
@@ -47,7 +47,8 @@ using ProjectorTestWatch = std::function<bool(const std::string& what, double sh
 ///
 /// A picture that began before the light changed has a part of the old light; one that has all of
 /// the new began after. So every flash bounds the delay from both sides, within the time between
-/// two pictures; flashes at random moments narrow it.
+/// two pictures; flashes at random moments narrow it. Single flashes that come at another time are
+/// the computer's doing and are left out; more than a quarter are jitter.
 [[nodiscard]] ProjectorTestReport test_projectors(LiveCameras& cameras, ProjectorScreen& screen,
                                                   const ProjectorTestOptions& options = {},
                                                   const ProjectorTestWatch& watch = {});

@@ -65,6 +65,21 @@ TEST_F(ProjectorTests, DelaysAreBoundedFromBothSides) {
   EXPECT_THAT(report.faults[0].what, HasSubstr("after that of proj0"));
 }
 
+TEST_F(ProjectorTests, APauseOfTheComputerIsNoDelayOfTheProjector) {
+  // Shows are of black and white to look at, then eight flashes, for one projector after the other.
+  room_.pause_ns = [](int show) { return show == 7 ? 130'000'000 : 0; };
+  const ProjectorTestReport report = test();
+  EXPECT_THAT(report.faults, IsEmpty());
+  EXPECT_LT(report.projectors[0].most_ms, 100);
+}
+
+TEST_F(ProjectorTests, DelaysThatChangeAreJitter) {
+  room_.pause_ns = [](int show) { return show % 2 == 0 ? 130'000'000 : 0; };
+  const ProjectorTestReport report = test();
+  EXPECT_THAT(kinds(report), Contains("proj0 jitter"));
+  EXPECT_GT(report.projectors[0].use_ms, 130);
+}
+
 TEST_F(ProjectorTests, SoftwareTriggersFindTheDelayItself) {
   room_.delay_ns[0] = room_.delay_ns[1] = 60'000'000;
   const ProjectorTestReport report = test(Trigger::kSoftware);

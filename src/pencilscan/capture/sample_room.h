@@ -42,8 +42,7 @@ class Room : public ProjectorScreen {
     const cv::Mat panel = render_picture(picture, projectors_[projector]);
     const std::lock_guard lock(mutex_);
     const std::int64_t now = host_now_ns();
-    shown_[projector].push_back({now, panel});
-    ++shows;
+    shown_[projector].push_back({now + pause_ns(++shows), panel});
     return now;
   }
 
@@ -77,6 +76,8 @@ class Room : public ProjectorScreen {
   std::array<std::atomic<double>, 2> flicker{0, 0};  ///< by which light changes within 1/60 s
   std::atomic<int> shows = 0;
   std::atomic<bool> moved = false;
+  /// What a busy computer adds to the delay of the show of this number, from 1.
+  std::function<std::int64_t(int show)> pause_ns = [](int) { return 0; };
   std::function<bool(std::size_t camera, std::size_t projector)> blind =
       [](std::size_t, std::size_t) { return false; };
 
