@@ -6,6 +6,7 @@
 
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/grid/local_ids.h"
+#include "pencilscan/joint/darkness.h"
 #include "pencilscan/joint/min_sum.h"
 #include "pencilscan/joint/next_lines.h"
 #include "pencilscan/joint/other_views.h"
@@ -76,6 +77,22 @@ PairwiseEnergy pairwise_energy(const LabelledPieces& pieces, const JointOptions&
              });
   }
   return energy;
+}
+
+/// Adds what darkness in other cameras says to the labels' own costs.
+void add_darkness(const Rig& rig, std::span<const GridGraph> graphs,
+                  std::vector<LabelledPieces>& pieces) {
+  std::vector<std::vector<std::vector<float>>> costs(graphs.size());
+  {
+    const Darkness darkness(rig, graphs, pieces);
+    parallel_for(graphs.size(), [&](std::size_t g) { costs[g] = darkness.costs(g); });
+  }
+  for (std::size_t g = 0; g < graphs.size(); ++g) {
+    add(costs[g], pieces[g].scores);
+    for (std::size_t p = 0; p < costs[g].size(); ++p)
+      for (std::size_t k = 0; k < costs[g][p].size(); ++k)
+        pieces[g].labels[p][k].cost += costs[g][p][k];
+  }
 }
 
 /// Leaves out labels that the other cameras make hopeless (`views`: what they cost there). Time and
@@ -277,6 +294,7 @@ Labeling solve_joint(const Rig& rig, const std::vector<ColorFamily>& families,
   parallel_for(graphs.size(), [&](std::size_t g) {
     pieces[g] = possible_labels(rig, families, graphs[g], options);
   });
+  add_darkness(rig, graphs, pieces);
   OtherViews others(rig, graphs, pieces);
   std::vector<std::vector<std::vector<int>>> new_index(graphs.size());
   parallel_for(graphs.size(), [&](std::size_t g) {

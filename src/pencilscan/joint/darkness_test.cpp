@@ -1,0 +1,138 @@
+#include "pencilscan/joint/darkness.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "pencilscan/rig/object_space.h"
+#include "pencilscan/rig/sample_devices.h"
+
+namespace pencilscan {
+namespace {
+
+constexpr double kHalf = 20;     ///< of a lit square in the plane x = 0
+constexpr double kInFront = 90;  ///< so far before it is where wrong labels lie
+
+/// Lines on a lit square before three cameras. Each piece has two labels: on the square, which
+/// crossings support, and far before it.
+struct LitSquare {
+  /// `missed`: camera 2 has not found the lines of this share of the square.
+  explicit LitSquare(double missed) {
+    rig = sample::small_rig(240, 200, 110);
+    rig.cameras.push_back(sample::device_at<Camera>({540, 200, 160}, "cam2", 240, 200, 850));
+    for (int c = 0; c < 3; ++c) add_view(c, c == 2 ? kHalf * (1 - 2 * missed) : kHalf);
+  }
+
+  void add_view(int c, double end) {
+    const Camera& camera = rig.camera(c);
+    GridGraph& graph = graphs.emplace_back();
+    graph.camera = c;
+    for (double y = -kHalf; y <= end; y += line_spacing(rig)) {
+      Curve curve;
+      for (double z = -kHalf; z <= kHalf; z += 0.6) {
+        CurvePoint point;
+        point.position = camera.project({0, y, z})->cast<float>();
+        curve.points.push_back(point);
+      }
+      graph.curves.push_back(curve);
+    }
+    LabelledPieces& own = pieces.emplace_back();
+    own.graph = cut_into_pieces(camera, graph, 12);
+    for (std::size_t p = 0; p < own.graph.pieces.size(); ++p) {
+      own.labels.push_back({label_at(camera, 0), label_at(camera, kInFront)});
+      own.scores.push_back({0, 9});
+      if (p == 0) continue;
+      PieceCrossing crossing;
+      crossing.a = static_cast<int>(p) - 1;
+      crossing.b = static_cast<int>(p);
+      own.graph.crossings.push_back(crossing);
+    }
+  }
+
+  /// A label whose sheet is the plane x = `at`.
+  static PieceLabel label_at(const Camera& camera, double at) {
+    const RigidTransform& t = camera.device_from_world;
+    const Vec3 normal = t.rotation.col(0);
+    PieceLabel label;
+    label.q = (normal / (normal.dot(t.translation) + at)).cast<float>();
+    return label;
+  }
+
+  /// From where camera o would see a label of a piece to its nearest line, in line spacings;
+  /// negative: not in its picture.
+  [[nodiscard]] double spacings_to_line(std::size_t g, std::size_t p, std::size_t k,
+                                        std::size_t o) const {
+    const Camera& camera = rig.cameras[g];
+    const Vec3 ray = pieces[g].graph.pieces[p].middle.homogeneous().cast<double>();
+    const double depth = 1 / pieces[g].labels[p][k].q.cast<double>().dot(ray);
+    const auto at =
+        rig.cameras[o].project(camera.device_from_world.inverse() * (depth * ray).eval());
+    if (!at || !rig.cameras[o].contains(*at)) return -1;
+    double nearest = std::numeric_limits<double>::infinity();
+    for (const Curve& curve : graphs[o].curves)
+      for (const CurvePoint& point : curve.points)
+        nearest = std::min(nearest, (point.position.cast<double>() - *at).norm());
+    const double distance = rig.cameras[o].center().norm();
+    return nearest / (line_spacing(rig) * rig.cameras[o].K(0, 0) / distance);
+  }
+
+  Rig rig;
+  std::vector<GridGraph> graphs;
+  std::vector<LabelledPieces> pieces;
+};
+
+TEST(Darkness, WhatLiesBeforeNothingCostsAndWhatLiesOnLinesDoesNot) {
+  const LitSquare scene(0);
+  const Darkness darkness(scene.rig, scene.graphs, scene.pieces);
+  int dark = 0;
+  for (std::size_t g = 0; g < 3; ++g) {
+    const auto costs = darkness.costs(g);
+    ASSERT_EQ(costs.size(), scene.pieces[g].labels.size());
+    for (std::size_t p = 0; p < costs.size(); ++p) {
+      EXPECT_EQ(costs[p][0], 0);
+      double farthest = -1;
+      for (std::size_t o = 0; o < 3; ++o)
+        if (o != g) farthest = std::max(farthest, scene.spacings_to_line(g, p, 1, o));
+      if (farthest < 2) {
+        EXPECT_EQ(costs[p][1], 0) << g << " " << p;
+      }
+      if (farthest < 6) continue;  // in between, cells decide
+      ++dark;
+      EXPECT_GT(costs[p][1], 3) << g << " " << p;
+    }
+  }
+  EXPECT_GT(dark, 30);
+}
+
+TEST(Darkness, ACameraThatMissesLinesHasLittleToSay) {
+  const LitSquare whole(0);
+  const LitSquare half(0.5);
+  const auto greatest = [](const LitSquare& scene) {
+    // What camera 2 alone says of camera 0's labels.
+    std::vector<GridGraph> graphs = scene.graphs;
+    graphs[1].curves.clear();
+    const Darkness darkness(scene.rig, graphs, scene.pieces);
+    float most = 0;
+    for (const auto& costs : darkness.costs(0)) most = std::max(most, costs[1]);
+    return most;
+  };
+  EXPECT_GT(greatest(whole), 3);
+  EXPECT_LT(greatest(half), 1.5);
+  EXPECT_GT(greatest(half), 0);
+}
+
+TEST(Darkness, ACameraWithoutAnyLineSaysNothing) {
+  LitSquare scene(0);
+  for (const std::size_t c : {1U, 2U}) {
+    scene.graphs[c].curves.clear();
+    scene.pieces[c] = {};
+  }
+  const Darkness darkness(scene.rig, scene.graphs, scene.pieces);
+  for (const auto& costs : darkness.costs(0)) EXPECT_EQ(costs, (std::vector<float>{0, 0}));
+}
+
+}  // namespace
+}  // namespace pencilscan
