@@ -6,6 +6,7 @@
 #include "pencilscan/detection/detect.h"
 #include "pencilscan/grid/crossings.h"
 #include "pencilscan/grid/line_candidates.h"
+#include "pencilscan/grid/lit_cells.h"
 
 namespace pencilscan {
 
@@ -26,6 +27,7 @@ struct GridGraph {
   std::vector<int> component_of_curve;    ///< -1: no crossing with another projector's curve
   int component_count = 0;
   std::size_t cut_connections = 0;  ///< wrong connections cut by code or neighbours
+  LitCells lit;                     ///< where the camera sees light at all; may be unknown
 };
 
 [[nodiscard]] std::size_t curve_points(const GridGraph& graph);

@@ -8,12 +8,12 @@
 
 namespace pencilscan {
 
-/// The darkness term: a label that places its piece where another camera sees no line at all, of no
-/// projector, is hardly true. Whatever hides the piece from that camera would show lines itself.
+/// The darkness term: a label that places its piece where another camera sees no light of any
+/// projector is hardly true. Whatever hides the piece from that camera would be lit itself.
 ///
 /// How often true labels lie in the dark of a camera differs: of a well exposed one in a thousand,
-/// of one that sees half of its lines every second. So each camera's share is taken from the frame:
-/// from the labels that crossings support best (`scores`).
+/// of one that sees half of the light every second. So each camera's share is taken from the frame:
+/// from the labels that crossings support far more than all others of their piece (`scores`).
 class Darkness {
  public:
   Darkness(const Rig& rig, std::span<const GridGraph> graphs,
@@ -24,14 +24,6 @@ class Darkness {
   [[nodiscard]] std::vector<std::vector<float>> costs(std::size_t g) const;
 
  private:
-  /// Where a camera sees lines, in cells.
-  struct View {
-    int columns = 0;
-    float cell_px = 1;
-    std::vector<char> is_lit;  ///< a line is in the cell or beside it; empty: no lines at all
-    float cost = 0;            ///< of a label in the dark
-  };
-  [[nodiscard]] static View make_view(const Rig& rig, const GridGraph& graph);
   /// Per label of graphs[g], per piece one after the other, and per view: kOut, kLit or kDark.
   [[nodiscard]] std::vector<char> look_from_others(std::size_t g) const;
   void weigh_views();
@@ -39,7 +31,7 @@ class Darkness {
   const Rig& rig_;
   std::span<const GridGraph> graphs_;
   std::span<const LabelledPieces> pieces_;
-  std::vector<View> views_;              ///< per graph
+  std::vector<float> weights_;           ///< per graph: cost of a label in its dark
   std::vector<std::vector<char>> seen_;  ///< per graph: what look_from_others() gives
 };
 

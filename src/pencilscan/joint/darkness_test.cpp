@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <opencv2/imgproc.hpp>
 #include <vector>
 
 #include "pencilscan/rig/object_space.h"
@@ -19,7 +20,7 @@ constexpr double kInFront = 90;  ///< so far before it is where wrong labels lie
 /// Lines on a lit square before three cameras. Each piece has two labels: on the square, which
 /// crossings support, and far before it.
 struct LitSquare {
-  /// `missed`: camera 2 has not found the lines of this share of the square.
+  /// `missed`: camera 2 does not see the light on this share of the square.
   explicit LitSquare(double missed) {
     rig = sample::small_rig(240, 200, 110);
     rig.cameras.push_back(sample::device_at<Camera>({540, 200, 160}, "cam2", 240, 200, 850));
@@ -30,15 +31,20 @@ struct LitSquare {
     const Camera& camera = rig.camera(c);
     GridGraph& graph = graphs.emplace_back();
     graph.camera = c;
+    cv::Mat presence(camera.height, camera.width, CV_32FC1, cv::Scalar(0.1));
     for (double y = -kHalf; y <= end; y += line_spacing(rig)) {
       Curve curve;
       for (double z = -kHalf; z <= kHalf; z += 0.6) {
         CurvePoint point;
         point.position = camera.project({0, y, z})->cast<float>();
+        point.amplitude = 1;
         curve.points.push_back(point);
+        cv::circle(presence, cv::Point(cv::Point2f(point.position.x(), point.position.y())), 2, 1,
+                   cv::FILLED);
       }
       graph.curves.push_back(curve);
     }
+    graph.lit = lit_cells(rig, c, graph.curves, {&presence, 1});
     LabelledPieces& own = pieces.emplace_back();
     own.graph = cut_into_pieces(camera, graph, 12);
     for (std::size_t p = 0; p < own.graph.pieces.size(); ++p) {
@@ -84,6 +90,19 @@ struct LitSquare {
   std::vector<LabelledPieces> pieces;
 };
 
+TEST(LitCells, GrazingLightIsLightAndNoiseIsNot) {
+  LitSquare scene(0);
+  cv::Mat presence(200, 240, CV_32FC1);
+  cv::theRNG().state = 1;
+  cv::randn(presence, 0.1, 0.02);
+  presence(cv::Rect(160, 100, 40, 40)) += 0.05;  // no line is found in it
+  const LitCells cells = lit_cells(scene.rig, 0, scene.graphs[0].curves, {&presence, 1});
+  EXPECT_FALSE(cells.is_dark({180, 120}));
+  for (const Vec2& pixel : {Vec2(30, 30), Vec2(30, 170), Vec2(0, 0), Vec2(239, 10)})
+    EXPECT_TRUE(cells.is_dark(pixel)) << pixel.transpose();
+  EXPECT_FALSE(lit_cells(scene.rig, 0, {}, {&presence, 1}).is_dark({30, 30}));
+}
+
 TEST(Darkness, WhatLiesBeforeNothingCostsAndWhatLiesOnLinesDoesNot) {
   const LitSquare scene(0);
   const Darkness darkness(scene.rig, scene.graphs, scene.pieces);
@@ -107,13 +126,13 @@ TEST(Darkness, WhatLiesBeforeNothingCostsAndWhatLiesOnLinesDoesNot) {
   EXPECT_GT(dark, 30);
 }
 
-TEST(Darkness, ACameraThatMissesLinesHasLittleToSay) {
+TEST(Darkness, ACameraThatMissesLightHasLittleToSay) {
   const LitSquare whole(0);
   const LitSquare half(0.5);
   const auto greatest = [](const LitSquare& scene) {
     // What camera 2 alone says of camera 0's labels.
     std::vector<GridGraph> graphs = scene.graphs;
-    graphs[1].curves.clear();
+    graphs[1] = {};
     const Darkness darkness(scene.rig, graphs, scene.pieces);
     float most = 0;
     for (const auto& costs : darkness.costs(0)) most = std::max(most, costs[1]);
@@ -124,11 +143,10 @@ TEST(Darkness, ACameraThatMissesLinesHasLittleToSay) {
   EXPECT_GT(greatest(half), 0);
 }
 
-TEST(Darkness, ACameraWithoutAnyLineSaysNothing) {
+TEST(Darkness, ACameraWhoseLightIsUnknownSaysNothing) {
   LitSquare scene(0);
   for (const std::size_t c : {1U, 2U}) {
-    scene.graphs[c].curves.clear();
-    scene.pieces[c] = {};
+    scene.graphs[c].lit = {};
   }
   const Darkness darkness(scene.rig, scene.graphs, scene.pieces);
   for (const auto& costs : darkness.costs(0)) EXPECT_EQ(costs, (std::vector<float>{0, 0}));

@@ -99,6 +99,8 @@ PointResult detect_frame(const Rig& rig, const Frame& frame, const PointOptions&
     parallel_for(cameras, [&](std::size_t c) {
       result.graphs[c] = build_grid_graph(rig, result.families, static_cast<int>(c),
                                           std::move(result.detections[c].curves), grid);
+      result.graphs[c].lit = lit_cells(rig, static_cast<int>(c), result.graphs[c].curves,
+                                       result.detections[c].presence);
     });
   });
   return result;

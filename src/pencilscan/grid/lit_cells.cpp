@@ -1,0 +1,68 @@
+#include "pencilscan/grid/lit_cells.h"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+#include "pencilscan/rig/object_space.h"
+
+namespace pencilscan {
+namespace {
+
+constexpr double kCellSpacings = 2;
+constexpr float kLeastLight = 1.F / 50;    ///< of a line's amplitude, in a cell's mean
+constexpr std::size_t kDarkestShare = 10;  ///< one in so many cells is dark, if any is
+
+float quantile_of(std::vector<float> values, std::size_t one_in) {
+  const auto at = values.begin() + static_cast<std::ptrdiff_t>(values.size() / one_in);
+  std::nth_element(values.begin(), at, values.end());
+  return *at;
+}
+
+/// The median amplitude of a family's lines; 0: it has none.
+float line_amplitude(std::span<const Curve> curves, int family) {
+  std::vector<float> amplitudes;
+  for (const Curve& curve : curves)
+    if (curve.family == family)
+      for (const CurvePoint& point : curve.points) amplitudes.push_back(point.amplitude);
+  return amplitudes.empty() ? 0 : quantile_of(std::move(amplitudes), 2);
+}
+
+}  // namespace
+
+bool LitCells::is_dark(const Vec2& pixel) const {
+  if (is_lit.empty()) return false;
+  const int x = std::clamp(static_cast<int>(static_cast<float>(pixel.x()) / cell_px.width), 0,
+                           is_lit.cols - 1);
+  const int y = std::clamp(static_cast<int>(static_cast<float>(pixel.y()) / cell_px.height), 0,
+                           is_lit.rows - 1);
+  return is_lit.at<std::uint8_t>(y, x) == 0;
+}
+
+LitCells lit_cells(const Rig& rig, int camera, std::span<const Curve> curves,
+                   std::span<const cv::Mat> presence) {
+  LitCells cells;
+  if (curves.empty() || presence.empty()) return cells;
+  const Camera& device = rig.camera(camera);
+  const double distance = (device.center() - working_volume(rig).center).norm();
+  const double cell_px = std::max(1.0, kCellSpacings * line_spacing(rig) *
+                                           std::sqrt(device.K(0, 0) * device.K(1, 1)) / distance);
+  const cv::Size image = presence.front().size();
+  const cv::Size size(std::max(1, static_cast<int>(std::lround(image.width / cell_px))),
+                      std::max(1, static_cast<int>(std::lround(image.height / cell_px))));
+  cells.cell_px = cv::Size2f(static_cast<float>(image.width) / static_cast<float>(size.width),
+                             static_cast<float>(image.height) / static_cast<float>(size.height));
+  cv::Mat lit = cv::Mat::zeros(size, CV_8UC1);
+  cv::Mat mean;
+  for (std::size_t f = 0; f < presence.size(); ++f) {
+    const float amplitude = line_amplitude(curves, static_cast<int>(f));
+    if (amplitude <= 0) continue;
+    cv::resize(presence[f], mean, size, 0, 0, cv::INTER_AREA);
+    const float dark = quantile_of({mean.begin<float>(), mean.end<float>()}, kDarkestShare);
+    lit |= (mean > dark + kLeastLight * amplitude) / 255;
+  }
+  cv::dilate(lit, cells.is_lit, cv::Mat::ones(3, 3, CV_8UC1));
+  return cells;
+}
+
+}  // namespace pencilscan
