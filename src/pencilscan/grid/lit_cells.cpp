@@ -4,20 +4,15 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "pencilscan/core/median.h"
 #include "pencilscan/rig/object_space.h"
 
 namespace pencilscan {
 namespace {
 
 constexpr double kCellSpacings = 2;
-constexpr float kLeastLight = 1.F / 50;    ///< of a line's amplitude, in a cell's mean
-constexpr std::size_t kDarkestShare = 10;  ///< one in so many cells is dark, if any is
-
-float quantile_of(std::vector<float> values, std::size_t one_in) {
-  const auto at = values.begin() + static_cast<std::ptrdiff_t>(values.size() / one_in);
-  std::nth_element(values.begin(), at, values.end());
-  return *at;
-}
+constexpr float kLeastLight = 1.F / 50;  ///< of a line's amplitude, in a cell's mean
+constexpr double kDarkestShare = 0.1;    ///< so many cells are dark, if any are
 
 /// The median amplitude of a family's lines; 0: it has none.
 float line_amplitude(std::span<const Curve> curves, int family) {
@@ -25,7 +20,7 @@ float line_amplitude(std::span<const Curve> curves, int family) {
   for (const Curve& curve : curves)
     if (curve.family == family)
       for (const CurvePoint& point : curve.points) amplitudes.push_back(point.amplitude);
-  return amplitudes.empty() ? 0 : quantile_of(std::move(amplitudes), 2);
+  return upper_median(std::move(amplitudes));
 }
 
 }  // namespace
@@ -58,7 +53,8 @@ LitCells lit_cells(const Rig& rig, int camera, std::span<const Curve> curves,
     const float amplitude = line_amplitude(curves, static_cast<int>(f));
     if (amplitude <= 0) continue;
     cv::resize(presence[f], mean, size, 0, 0, cv::INTER_AREA);
-    const float dark = quantile_of({mean.begin<float>(), mean.end<float>()}, kDarkestShare);
+    const float dark =
+        lower_quantile<float>({mean.begin<float>(), mean.end<float>()}, kDarkestShare);
     lit |= (mean > dark + kLeastLight * amplitude) / 255;
   }
   cv::dilate(lit, cells.is_lit, cv::Mat::ones(3, 3, CV_8UC1));

@@ -11,9 +11,9 @@ namespace pencilscan {
 /// The darkness term: a label that places its piece where another camera sees no light of any
 /// projector is hardly true. Whatever hides the piece from that camera would be lit itself.
 ///
-/// How often true labels lie in the dark of a camera differs: of a well exposed one in a thousand,
-/// of one that sees half of the light every second. So each camera's share is taken from the frame:
-/// from the labels that crossings support far more than all others of their piece (`scores`).
+/// How often true labels lie in a camera's dark depends on the camera: one in a thousand for a well
+/// exposed one, half of them for one that sees half of the light. So each camera's share is taken
+/// from the frame: from labels whose `scores` lead those of all others of their piece clearly.
 class Darkness {
  public:
   Darkness(const Rig& rig, std::span<const GridGraph> graphs,

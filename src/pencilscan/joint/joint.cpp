@@ -82,16 +82,12 @@ PairwiseEnergy pairwise_energy(const LabelledPieces& pieces, const JointOptions&
 /// Adds what darkness in other cameras says to the labels' own costs.
 void add_darkness(const Rig& rig, std::span<const GridGraph> graphs,
                   std::vector<LabelledPieces>& pieces) {
-  std::vector<std::vector<std::vector<float>>> costs(graphs.size());
-  {
-    const Darkness darkness(rig, graphs, pieces);
-    parallel_for(graphs.size(), [&](std::size_t g) { costs[g] = darkness.costs(g); });
-  }
+  const Darkness darkness(rig, graphs, pieces);
   for (std::size_t g = 0; g < graphs.size(); ++g) {
-    add(costs[g], pieces[g].scores);
-    for (std::size_t p = 0; p < costs[g].size(); ++p)
-      for (std::size_t k = 0; k < costs[g][p].size(); ++k)
-        pieces[g].labels[p][k].cost += costs[g][p][k];
+    const auto costs = darkness.costs(g);
+    add(costs, pieces[g].scores);
+    for (std::size_t p = 0; p < costs.size(); ++p)
+      for (std::size_t k = 0; k < costs[p].size(); ++k) pieces[g].labels[p][k].cost += costs[p][k];
   }
 }
 

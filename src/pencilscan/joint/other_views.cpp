@@ -85,12 +85,8 @@ std::vector<OtherViews::Sighting> OtherViews::look_from_others(std::size_t g,
     const int family = graphs_[g].curves[static_cast<std::size_t>(piece.curve)].family;
     for (std::size_t k = 0; k < pieces_[g].labels[p].size(); ++k) {
       const PieceLabel& label = pieces_[g].labels[p][k];
-      const auto point = [&](const Eigen::Vector2f& at) -> Vec3 {
-        const Eigen::Vector3f ray = at.homogeneous();
-        return world_from_camera * (ray / label.q.dot(ray)).cast<double>().eval();
-      };
-      const Vec3 here = point(piece.middle);
-      const Vec3 next = point(piece.middle + ahead * piece.tangent);
+      const Vec3 here = world_from_camera * label.place(piece.middle);
+      const Vec3 next = world_from_camera * label.place(piece.middle + ahead * piece.tangent);
       for (const std::size_t o : others) {
         const Camera& other = rig_.camera(graphs_[o].camera);
         const auto a = other.project(here);

@@ -19,6 +19,12 @@ struct PieceLabel {
   Eigen::Vector3f q = Eigen::Vector3f::Zero();  ///< inverse depth = q . (x, y, 1)
   float inverse_depth_per_px = 0;               ///< per projector px across the line
   float cost = 0;                               ///< negative log-likelihood without other pieces
+
+  /// Where it puts what the camera sees at normalised (x, y), in the camera's frame.
+  [[nodiscard]] Vec3 place(const Eigen::Vector2f& at) const {
+    const Eigen::Vector3f ray = at.homogeneous();
+    return (ray / q.dot(ray)).cast<double>();
+  }
 };
 
 /// The pieces of one camera with their possible labels.
