@@ -29,7 +29,7 @@ FrameResult result_of(const Vec3& shift) {
       through_exposure(make_sphere(kRadius, kSegments), {}, {}, {.shift = shift}, footprint(rig));
   PhotographyOptions photo;
   photo.noise = "medium";
-  photo.render.samples = 2;
+  photo.render.samples = 1;
   return reconstruct_frame(rig, sample::photographed_frame(rig, moments, photo));
 }
 

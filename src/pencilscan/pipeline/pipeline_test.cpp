@@ -274,11 +274,6 @@ TEST_F(PipelineTest, BytesAreTheSameForAnyThreadCount) {
   }
 }
 
-TEST_F(PipelineTest, ThreadsRaceNowhereWhileMeasuringPoints) {
-  const ThreadLimit limit(4);
-  EXPECT_FALSE(measure_points(*rig_, *frame_).points.empty());
-}
-
 TEST_F(PipelineTest, ResumesItsOwnOutputAndRefusesThatOfOtherOptions) {
   const fs::path out = *folder_ / "out_resume";
   EXPECT_FALSE(run(*folder_ / "frames", out, quick()).front().resumed);
