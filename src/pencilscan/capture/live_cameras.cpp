@@ -71,7 +71,8 @@ std::vector<ClockFit> LiveCameras::clocks() const {
   return clocks;
 }
 
-std::vector<TimedFrame> LiveCameras::first_since(std::int64_t since_ns, std::int64_t until_ns) {
+template <class IsMeant>
+std::vector<TimedFrame> LiveCameras::first_that(IsMeant is_meant, std::int64_t until_ns) {
   std::vector<TimedFrame> found(group_.size());
   std::unique_lock lock(mutex_);
   for (;;) {
@@ -79,7 +80,7 @@ std::vector<TimedFrame> LiveCameras::first_since(std::int64_t since_ns, std::int
     for (std::size_t c = 0; c < seen_.size(); ++c) {
       if (found[c].frame) continue;
       for (const TimedFrame& timed : seen_[c].last) {
-        if (timed.time_ns < since_ns) continue;
+        if (!is_meant(timed)) continue;
         found[c] = timed;
         break;
       }
@@ -89,6 +90,17 @@ std::vector<TimedFrame> LiveCameras::first_since(std::int64_t since_ns, std::int
     if (all || left <= 0) return found;
     arrived_.wait_for(lock, std::chrono::nanoseconds(left));
   }
+}
+
+std::vector<TimedFrame> LiveCameras::first_since(std::int64_t since_ns, std::int64_t until_ns) {
+  return first_that([&](const TimedFrame& timed) { return timed.time_ns >= since_ns; }, until_ns);
+}
+
+std::vector<TimedFrame> LiveCameras::trigger(double patience_s) {
+  const std::int64_t since = host_now_ns();
+  group_.trigger();
+  return first_that([&](const TimedFrame& timed) { return timed.frame->arrival_ns >= since; },
+                    since + static_cast<std::int64_t>(1e9 * patience_s));
 }
 
 LiveCameras::Listener::Listener(LiveCameras& cameras, CameraGroup::Sink sink) : cameras_(cameras) {

@@ -38,6 +38,10 @@ class LiveCameras {
   /// The first whole picture of every camera whose time is not before `since_ns`, waited for until
   /// host_now_ns() is `until_ns`; frames are null where none came.
   [[nodiscard]] std::vector<TimedFrame> first_since(std::int64_t since_ns, std::int64_t until_ns);
+  /// Triggers all cameras by software and waits so long for the picture of each; frames are null
+  /// where none came. Pictures are told by their arrival: the clocks of cameras that take pictures
+  /// now and then only, on a busy computer, are not known well enough.
+  [[nodiscard]] std::vector<TimedFrame> trigger(double patience_s);
   /// Whole and incomplete pictures of a camera so far.
   struct Count {
     std::size_t whole = 0;
@@ -68,6 +72,9 @@ class LiveCameras {
     std::deque<std::int64_t> arrivals;
   };
   void take(std::size_t camera, CameraFrame frame);
+  /// The first whole picture of every camera that `is_meant`, waited for as in first_since().
+  template <class IsMeant>
+  [[nodiscard]] std::vector<TimedFrame> first_that(IsMeant is_meant, std::int64_t until_ns);
 
   CameraGroup group_;
   mutable std::mutex mutex_;

@@ -87,6 +87,8 @@ class Tester {
  private:
   /// One picture of every camera, that begins when everything shown now is there.
   [[nodiscard]] std::vector<cv::Mat> settled_pictures();
+  /// Of all cameras, taken so long from now or later.
+  [[nodiscard]] std::vector<TimedFrame> pictures_after(double ms);
   void look(std::size_t projector, ProjectorTiming& timing);
   void judge_flicker(std::size_t projector, ProjectorTiming& timing, std::vector<Fault>& faults);
   /// Adds what this flash says to every camera's.
@@ -108,16 +110,18 @@ class Tester {
   Random random_{1};
 };
 
-std::vector<cv::Mat> Tester::settled_pictures() {
-  std::int64_t since = host_now_ns() + ns(kLongestMs);
-  if (software_) {
-    std::this_thread::sleep_for(std::chrono::nanoseconds(ns(kLongestMs)));
-    since = host_now_ns();
-    cameras_.group().trigger();
+std::vector<TimedFrame> Tester::pictures_after(double ms) {
+  if (!software_) {
+    const std::int64_t since = host_now_ns() + ns(ms);
+    return cameras_.first_since(since, since + ns(1000 * options_.patience_s));
   }
+  std::this_thread::sleep_for(std::chrono::nanoseconds(ns(ms)));
+  return cameras_.trigger(options_.patience_s);
+}
+
+std::vector<cv::Mat> Tester::settled_pictures() {
   std::vector<cv::Mat> pictures;
-  for (const TimedFrame& frame :
-       cameras_.first_since(since, since + ns(1000 * options_.patience_s)))
+  for (const TimedFrame& frame : pictures_after(kLongestMs))
     pictures.push_back(frame.frame ? coarse_picture(frame.frame->image) : cv::Mat());
   return pictures;
 }
@@ -136,14 +140,8 @@ void Tester::judge_flicker(std::size_t projector, ProjectorTiming& timing,
                            std::vector<Fault>& faults) {
   std::vector<std::vector<double>> levels(timing.views.size());
   for (int k = 0; k < options_.still_pictures; ++k) {
-    std::int64_t since = host_now_ns();
-    if (software_) {
-      // At any phase of the refresh.
-      std::this_thread::sleep_for(std::chrono::nanoseconds(ns(random_.uniform(0, 40))));
-      since = host_now_ns();
-      cameras_.group().trigger();
-    }
-    const auto frames = cameras_.first_since(since, since + ns(1000 * options_.patience_s));
+    // Triggered at any phase of the refresh.
+    const auto frames = pictures_after(software_ ? random_.uniform(0, 40) : 0);
     for (std::size_t c = 0; c < frames.size(); ++c)
       if (frames[c].frame && timing.views[c].share >= kLeastSeen)
         levels[c].push_back(level_of(coarse_picture(frames[c].frame->image), timing.views[c]));
@@ -207,10 +205,8 @@ bool Tester::flash_triggered(std::size_t projector, bool white, const ProjectorT
   const std::int64_t shown = screen_.show(projector, {white ? Kind::kWhite : Kind::kBlack, 0, {}});
   std::this_thread::sleep_for(
       std::chrono::nanoseconds(std::max<std::int64_t>(0, shown + ns(after_ms) - host_now_ns())));
-  const std::int64_t since = host_now_ns();
-  cameras_.group().trigger();
-  const auto frames = cameras_.first_since(since, since + ns(1000 * options_.patience_s));
-  const double triggered_ms = static_cast<double>(since - shown) / 1e6;
+  const double triggered_ms = static_cast<double>(host_now_ns() - shown) / 1e6;
+  const auto frames = cameras_.trigger(options_.patience_s);
   bool there = true;
   for (std::size_t c = 0; c < flashes.size(); ++c) {
     if (timing.views[c].share < kLeastSeen || !frames[c].frame) continue;
