@@ -7,6 +7,7 @@
 #include "pencilscan/capture/scripted_camera.h"
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/host_clock.h"
+#include "pencilscan/core/random.h"
 #include "pencilscan/io/image.h"
 #include "pencilscan/io/temporary_folder.h"
 #include "pencilscan/pattern/gray_code.h"
@@ -239,6 +240,29 @@ TEST(PictureCheck, TellsAMovedSceneFromAWarmLamp) {
   EXPECT_THAT(white_again_trouble(white, 0.8 * white, view), HasSubstr("lamp"));
   const cv::Mat moved = blocks([](int x, int y) { return x < 17 && y > 3; });
   EXPECT_THAT(white_again_trouble(white, moved, view), HasSubstr("moved"));
+}
+
+TEST(PictureCheck, NoiseOfDimLightIsNoMotion) {
+  // A projector that lights the rim of what a camera sees: blocks of .02 to .1 of the full scale,
+  // the dimmest uncertain by a tenth.
+  Random random(1);
+  cv::Mat white(24, 32, CV_32FC1, cv::Scalar(0));
+  for (int y = 4; y < white.rows; ++y)
+    for (int x = 0; x < 20; ++x)
+      white.at<float>(y, x) = 0.022F + 0.004F * static_cast<float>((7 * x + 3 * y) % 20);
+  const auto noisy = [&](const cv::Mat& picture) {
+    cv::Mat result = picture.clone();
+    for (auto value = result.begin<float>(); value != result.end<float>(); ++value)
+      *value += 0.1F * std::sqrt(0.02F * *value) * static_cast<float>(random.normal());
+    return result;
+  };
+  const cv::Mat before = noisy(white);
+  const LitView view = lit_view(before, cv::Mat(white.size(), CV_32FC1, cv::Scalar(0)));
+  EXPECT_EQ(white_again_trouble(before, noisy(white), view), "");
+  cv::Mat moved(white.size(), CV_32FC1, cv::Scalar(0));
+  const cv::Size rest(white.cols - 3, white.rows);
+  white(cv::Rect({0, 0}, rest)).copyTo(moved(cv::Rect({3, 0}, rest)));
+  EXPECT_THAT(white_again_trouble(before, noisy(moved), view), HasSubstr("moved"));
 }
 
 }  // namespace

@@ -24,10 +24,18 @@ constexpr float kStillBright = 0.6F;
 constexpr double kWrongShare = 0.03;
 /// Blocks below which nothing can be said.
 constexpr int kLeastBlocks = 60;
-/// Change of white light of a block that noise (blocks of 16 px) and lamps do not explain.
+/// Change of white light of a block that lamps do not explain, and deviations of noise that noise
+/// does not: of a million blocks one.
 constexpr float kMoved = 0.15F;
+constexpr float kBeyondNoise = 5;
 constexpr double kMovedShare = 0.02;
 constexpr double kLampChange = 0.1;
+/// A quarter of what is normally distributed is smaller than so many standard deviations.
+constexpr float kQuarterOfNormal = 0.3186F;
+
+/// A change of light in units in which noise is alike in all blocks: it grows with the light's
+/// root.
+float in_noise(float change, float light) { return std::abs(change) / std::sqrt(light); }
 
 }  // namespace
 
@@ -97,21 +105,36 @@ std::string pair_trouble(const cv::Mat& pattern, const cv::Mat& inverse, const L
 }
 
 std::string white_again_trouble(const cv::Mat& white, const cv::Mat& again, const LitView& view) {
+  struct Block {
+    float light;
+    float change;
+  };
+  std::vector<Block> blocks;
   std::vector<float> ratios;
-  for (int y = 0; y < view.lit.rows; ++y)
-    for (int x = 0; x < view.lit.cols; ++x)
-      if (view.lit.at<std::uint8_t>(y, x) != 0)
-        ratios.push_back((again.at<float>(y, x) - white.at<float>(y, x)) /
-                         view.light.at<float>(y, x));
-  if (static_cast<int>(ratios.size()) < kLeastBlocks) return {};
-  const double change = upper_median(ratios);
-  if (std::abs(change) > kLampChange)
-    return "the projector's white changed by " + formatted(100 * change, "%.2g %%") +
+  for (int y = 0; y < view.lit.rows; ++y) {
+    for (int x = 0; x < view.lit.cols; ++x) {
+      if (view.lit.at<std::uint8_t>(y, x) == 0) continue;
+      blocks.push_back({view.light.at<float>(y, x), again.at<float>(y, x) - white.at<float>(y, x)});
+      ratios.push_back(blocks.back().change / blocks.back().light);
+    }
+  }
+  if (static_cast<int>(blocks.size()) < kLeastBlocks) return {};
+  const float lamp = upper_median(ratios);
+  if (std::abs(lamp) > kLampChange)
+    return "the projector's white changed by " + formatted(100 * lamp, "%.2g %%") +
            " during the capture: its lamp warms up, or an automatic exposure is on";
-  const auto moved = std::count_if(ratios.begin(), ratios.end(), [&](float ratio) {
-    return std::abs(ratio - static_cast<float>(change)) > kMoved;
+  std::vector<float> changes;
+  for (Block& block : blocks) {
+    block.change -= lamp * block.light;
+    changes.push_back(in_noise(block.change, block.light));
+  }
+  // However much moved: noise alone is what the quarter of the blocks shows that changed least.
+  const float noise = lower_quantile(changes, 0.25) / kQuarterOfNormal;
+  const auto moved = std::count_if(blocks.begin(), blocks.end(), [&](const Block& block) {
+    return std::abs(block.change) > kMoved * block.light &&
+           in_noise(block.change, block.light) > kBeyondNoise * noise;
   });
-  const double share = static_cast<double>(moved) / static_cast<double>(ratios.size());
+  const double share = static_cast<double>(moved) / static_cast<double>(blocks.size());
   if (share <= kMovedShare) return {};
   return formatted(100 * share, "%.2g %%") +
          " of what is lit changed from the first to the last picture: the object or the camera "
