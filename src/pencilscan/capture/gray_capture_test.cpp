@@ -242,6 +242,15 @@ TEST(PictureCheck, TellsAMovedSceneFromAWarmLamp) {
   EXPECT_THAT(white_again_trouble(white, moved, view), HasSubstr("moved"));
 }
 
+TEST(PictureCheck, MeansOfBlocksAreFinerThanTheLevelsOfThePicture) {
+  cv::Mat image(4, 8, CV_8UC3, cv::Scalar::all(6));
+  image.at<cv::Vec3b>(0, 0) = {7, 7, 10};
+  const cv::Mat coarse = coarse_picture(image);
+  ASSERT_EQ(coarse.size(), cv::Size(2, 1));
+  EXPECT_NEAR(coarse.at<float>(0, 0), (6 + 6.0 / 48) / 255, 1e-4);
+  EXPECT_NEAR(coarse.at<float>(0, 1), 6.0 / 255, 1e-4);
+}
+
 TEST(PictureCheck, NoiseOfDimLightIsNoMotion) {
   // A projector that lights the rim of what a camera sees: blocks of .02 to .1 of the full scale,
   // the dimmest uncertain by a tenth.

@@ -40,13 +40,16 @@ float in_noise(float change, float light) { return std::abs(change) / std::sqrt(
 }  // namespace
 
 cv::Mat coarse_picture(const cv::Mat& image) {
+  // OpenCV rounds means to the depth of the picture: a level of 8 bits is a sixth of dim light.
+  cv::Mat fine;
+  image.convertTo(fine, CV_16U, image.depth() == CV_8U ? 257 : 1);
   cv::Mat small;
-  cv::resize(image, small,
+  cv::resize(fine, small,
              cv::Size(std::max(1, image.cols / kBlock), std::max(1, image.rows / kBlock)), 0, 0,
              cv::INTER_AREA);
   if (small.channels() == 3) cv::transform(small, small, cv::Matx13f(1.F / 3, 1.F / 3, 1.F / 3));
   cv::Mat result;
-  small.convertTo(result, CV_32F, small.depth() == CV_16U ? 1.0 / 65535 : 1.0 / 255);
+  small.convertTo(result, CV_32F, 1.0 / 65535);
   return result;
 }
 
