@@ -44,6 +44,39 @@ class SurfaceCheck {
     return is_seen && verdict != RayVerdict::kKept;
   }
 
+  /// Standard deviation of the surface where a ray meets it, along the ray.
+  [[nodiscard]] double sigma_along(const Ray& ray, const RayScene::Hit& hit) const {
+    constexpr double kLeastCosine = 0.2;
+    const TriangleMesh& mesh = surface_.mesh();
+    double across = 0;
+    for (std::size_t k = 0; k < 3; ++k)
+      across += hit.barycentric[static_cast<Eigen::Index>(k)] *
+                static_cast<double>(mesh.sigma[static_cast<std::size_t>(mesh.faces[hit.face][k])]);
+    return across / std::max(-face_normal(mesh, hit.face).dot(ray.direction), kLeastCosine);
+  }
+
+  /// True where another camera sees measured surface within the point's deviation, and that surface
+  /// is known so much better that the point would add less than a tenth to what is known of it.
+  [[nodiscard]] bool is_better_known(const MeasuredPoint& point) const {
+    constexpr double kWithin = 3;  // deviations
+    constexpr double kBetter = 3;  // times in sigma: a ninth of the weight
+    const auto sigma = static_cast<double>(point.sigma);
+    for (std::size_t c = 0; c < rig_.cameras.size(); ++c) {
+      const Camera& camera = rig_.cameras[c];
+      const auto pixel = camera.project(position_of(point));
+      if (c == static_cast<std::size_t>(point.camera) || !pixel || !camera.contains(*pixel))
+        continue;
+      const Vec3 center = camera.center();
+      const Vec3 way = position_of(point) - center;
+      const Ray ray{center, way.normalized()};
+      const auto hit = look(ray);
+      if (hit && std::abs(hit->distance - way.norm()) < kWithin * sigma &&
+          kBetter * sigma_along(ray, *hit) < sigma)
+        return true;
+    }
+    return false;
+  }
+
  private:
   [[nodiscard]] RayVerdict verdict_of(const Hit& hit, PatternRef ref, int line) const {
     constexpr double kSameLine = 0.5;
@@ -156,7 +189,6 @@ SettledPoints settle_on_surface(const Rig& rig, const RayScene& surface,
   // Beyond, one of both is wrong, and the surface rests on the light of all pixels and cameras
   // around; as many as settle_points() allows.
   constexpr double kLeftOut = 6;
-  constexpr double kLeastCosine = 0.2;
   const TriangleMesh& mesh = surface.mesh();
   PENCILSCAN_CHECK(mesh.sigma.size() == mesh.vertices.size() &&
                    mesh.confidence.size() == mesh.vertices.size() &&
@@ -177,13 +209,9 @@ SettledPoints settle_on_surface(const Rig& rig, const RayScene& surface,
     PointEvidence& evidence = settled.evidence[i];
     evidence.own = points[i].sigma;
     p.sigma = static_cast<float>(point_sigma(evidence));
-    if (!hit) return;
-    double across = 0;
-    for (std::size_t k = 0; k < 3; ++k)
-      across += hit->barycentric[static_cast<Eigen::Index>(k)] *
-                static_cast<double>(mesh.sigma[static_cast<std::size_t>(mesh.faces[hit->face][k])]);
-    const double cosine = -face_normal(mesh, hit->face).dot(ray.direction);
-    const double of_surface = across / std::max(cosine, kLeastCosine);
+    const auto stay = [&] { keep[i] = check.is_better_known(p) ? 0 : keep[i]; };
+    if (!hit) return stay();
+    const double of_surface = check.sigma_along(ray, *hit);
     const double of_point = static_cast<double>(points[i].sigma);
     const double difference = hit->distance - (position_of(p) - ray.origin).dot(ray.direction);
     const double deviations = std::abs(difference) / std::hypot(of_surface, of_point);
@@ -192,7 +220,7 @@ SettledPoints settle_on_surface(const Rig& rig, const RayScene& surface,
     evidence.difference = static_cast<float>(std::abs(difference));
     evidence.settled = deviations <= kFarthest;
     p.sigma = static_cast<float>(point_sigma(evidence));
-    if (!evidence.settled) return;
+    if (!evidence.settled) return stay();
     p.x = static_cast<float>(hit->point.x());
     p.y = static_cast<float>(hit->point.y());
     p.z = static_cast<float>(hit->point.z());

@@ -49,6 +49,7 @@ struct Surroundings {
   double pull_length = 0;
   std::array<bool, 256> seen{};  ///< by which cameras
   int cameras = 0;
+  double faced = -1;  ///< greatest cosine of the vertex's normal to a camera that sees it
 };
 
 SurfaceEvidence evidence_of(const Surroundings& a) {
@@ -79,6 +80,9 @@ std::vector<SurfaceEvidence> attribute_vertices(std::span<const SurfaceSample> s
                                                 std::span<const std::array<int, 2>> middles) {
   constexpr double kMaxStretch = 2.5;    // of the spacing on a grazed surface
   constexpr double kOutsideReach = 0.4;  // of the reach, beyond the last line
+  // Cosine below which depth is not measured (DepthOptions::min_cosine): what turns away farther
+  // from all cameras around was only continued from beside it.
+  constexpr double kLeastFaced = 0.2;
   const double radius = reach_spacings * kMaxStretch * spacing;
   std::vector<Vec3> positions;
   positions.reserve(samples.size());
@@ -108,6 +112,7 @@ std::vector<SurfaceEvidence> attribute_vertices(std::span<const SurfaceSample> s
       const Vec3 d = s.position - mesh.vertices[v];
       const double cosine = s.normal.dot(normals[v]);
       if (cosine < 0.5 || std::abs(d.dot(normals[v])) > 0.5 * spacing) return;
+      a.faced = std::max(a.faced, s.to_camera.dot(normals[v]));
       const double distance = std::sqrt(d2);
       a.nearest = std::min(a.nearest, distance);
       if (distance > reach[i]) return;
@@ -136,7 +141,7 @@ std::vector<SurfaceEvidence> attribute_vertices(std::span<const SurfaceSample> s
     // Samples that fill a half plane pull with 2 / pi of their summed distance.
     fringe[v] = a.pull.norm() > 0.55 * a.pull_length && a.best > kOutsideReach;
     double sigma = a.nearest;  // a guess where no sample reaches: at least so far off
-    if (a.weight > 0) {
+    if (a.weight > 0 && a.faced >= kLeastFaced) {
       evidence[v] = evidence_of(a);
       sigma = surface_sigma(evidence[v]);
       const double certainty = a.confidence / a.weight * (1 - 0.5 * a.best * a.best);

@@ -11,7 +11,8 @@
 namespace pencilscan {
 
 /// Sets sigma and confidence of every vertex from the samples near it. A vertex is measured if a
-/// sample of its own side lies within the reach and if samples surround it. The reach grows where
+/// sample of its own side lies within the reach, if samples surround it, and if it faces a camera
+/// that took one of them. The reach grows where
 /// the light sheets graze the surface. Beyond the last line only a part of it counts. Returns what
 /// each sigma rests on. The last vertices may be the `middles` of edges between others: between two
 /// that are measured and surrounded, they take the mean of what is known of both.
