@@ -11,8 +11,9 @@ namespace pencilscan {
 namespace {
 
 constexpr double kCellSpacings = 2;
-constexpr float kLeastLight = 1.F / 50;  ///< of a line's amplitude, in a cell's mean
-constexpr double kDarkestShare = 0.1;    ///< so many cells are dark, if any are
+constexpr float kFaintLight = 1.F / 50;  ///< of a line's amplitude, in a cell's mean
+constexpr float kLight = 1.F / 10;
+constexpr double kDarkestShare = 0.1;  ///< so many cells are dark, if any are
 
 /// The median amplitude of a family's lines; 0: it has none.
 float line_amplitude(std::span<const Curve> curves, int family) {
@@ -23,15 +24,16 @@ float line_amplitude(std::span<const Curve> curves, int family) {
   return upper_median(std::move(amplitudes));
 }
 
+cv::Point cell_of(const LitCells& cells, cv::Size size, const Eigen::Vector2f& pixel) {
+  return {std::clamp(static_cast<int>(pixel.x() / cells.cell_px.width), 0, size.width - 1),
+          std::clamp(static_cast<int>(pixel.y() / cells.cell_px.height), 0, size.height - 1)};
+}
+
 }  // namespace
 
-bool LitCells::is_dark(const Vec2& pixel) const {
-  if (is_lit.empty()) return false;
-  const int x = std::clamp(static_cast<int>(static_cast<float>(pixel.x()) / cell_px.width), 0,
-                           is_lit.cols - 1);
-  const int y = std::clamp(static_cast<int>(static_cast<float>(pixel.y()) / cell_px.height), 0,
-                           is_lit.rows - 1);
-  return is_lit.at<std::uint8_t>(y, x) == 0;
+Sight LitCells::at(const Vec2& pixel) const {
+  const cv::Point cell = cell_of(*this, seen.size(), pixel.cast<float>());
+  return static_cast<Sight>(seen.at<std::uint8_t>(cell));
 }
 
 LitCells lit_cells(const Rig& rig, int camera, std::span<const Curve> curves,
@@ -47,7 +49,7 @@ LitCells lit_cells(const Rig& rig, int camera, std::span<const Curve> curves,
                       std::max(1, static_cast<int>(std::lround(image.height / cell_px))));
   cells.cell_px = cv::Size2f(static_cast<float>(image.width) / static_cast<float>(size.width),
                              static_cast<float>(image.height) / static_cast<float>(size.height));
-  cv::Mat lit = cv::Mat::zeros(size, CV_8UC1);
+  cv::Mat own = cv::Mat::zeros(size, CV_8UC1);
   cv::Mat mean;
   for (std::size_t f = 0; f < presence.size(); ++f) {
     const float amplitude = line_amplitude(curves, static_cast<int>(f));
@@ -55,9 +57,15 @@ LitCells lit_cells(const Rig& rig, int camera, std::span<const Curve> curves,
     cv::resize(presence[f], mean, size, 0, 0, cv::INTER_AREA);
     const float dark =
         lower_quantile<float>({mean.begin<float>(), mean.end<float>()}, kDarkestShare);
-    lit |= (mean > dark + kLeastLight * amplitude) / 255;
+    own = cv::max(own,
+                  (mean > dark + kFaintLight * amplitude) / 255 * static_cast<int>(Sight::kFaint));
+    own.setTo(static_cast<int>(Sight::kLit), mean > dark + kLight * amplitude);
   }
-  cv::dilate(lit, cells.is_lit, cv::Mat::ones(3, 3, CV_8UC1));
+  for (const Curve& curve : curves)
+    for (const CurvePoint& point : curve.points)
+      own.at<std::uint8_t>(cell_of(cells, size, point.position)) =
+          static_cast<std::uint8_t>(Sight::kLit);
+  cv::dilate(own, cells.seen, cv::Mat::ones(3, 3, CV_8UC1));
   return cells;
 }
 

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
 #include <opencv2/core.hpp>
 #include <span>
 #include <vector>
@@ -8,19 +10,28 @@
 
 namespace pencilscan {
 
-/// Where one camera sees light of any projector, in coarse cells.
+/// What a camera sees at and around a place.
+enum class Sight : std::uint8_t {
+  kDark,   ///< no light of any projector
+  kFaint,  ///< little light, and no line
+  kLit,    ///< lines, or light enough for lines that are too close to be found
+};
+inline constexpr std::size_t kSights = 3;
+
+/// What one camera sees of any projector, in coarse cells.
 struct LitCells {
   cv::Size2f cell_px;
-  cv::Mat is_lit;  ///< CV_8UC1, 1: this cell or one beside it is lit; empty: nothing is known
+  cv::Mat seen;  ///< CV_8UC1, the best Sight of a cell and those beside it; empty: nothing is known
 
-  [[nodiscard]] bool is_dark(const Vec2& pixel) const;
+  [[nodiscard]] Sight at(const Vec2& pixel) const;
 };
 
 /// Cells of two line spacings, since lines lie farther apart only where a surface turns away from
-/// its camera or projector. One is lit where the mean presence of a family exceeds that of
-/// the picture's darkest tenth by a fiftieth of what the family's lines have: lines cover a third
-/// of what they light, so that a surface is dark from 87 degrees on. Without curves nothing is
-/// known.
+/// its camera or projector. A cell's light is the mean presence of a family above that of the
+/// picture's darkest tenth, over what the family's lines have; lines cover a third of what they
+/// light. Below a fiftieth it is dark: a surface lit at 87 degrees. Below a tenth (73 degrees:
+/// lines lie three times as close) lines would be found, and where none is found it is faint: light
+/// that scatters in the scene or in a lens. Without curves nothing is known.
 [[nodiscard]] LitCells lit_cells(const Rig& rig, int camera, std::span<const Curve> curves,
                                  std::span<const cv::Mat> presence);
 

@@ -1,6 +1,7 @@
 #include "pencilscan/joint/darkness.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "pencilscan/core/parallel.h"
@@ -12,22 +13,21 @@ namespace {
 /// at least, 2 x -log(0.05) (JointOptions::crossing_outliers).
 constexpr float kClearLead = 6;
 
-constexpr char kOut = 0;  ///< not in that picture
-constexpr char kLit = 1;
-constexpr char kDark = 2;
-
-/// Labels that have their place in a camera's picture.
+/// Labels that have their place in a camera's picture, and what it sees there.
 struct Sightings {
   double all = 0;
-  double dark = 0;
+  std::array<double, kSights> of{};
 
-  void add(char seen) {
-    all += seen != kOut ? 1 : 0;
-    dark += seen == kDark ? 1 : 0;
+  void add(std::uint8_t seen) {
+    if (seen >= kSights) return;
+    ++all;
+    ++of[seen];
   }
   /// Laplace's rule: what was never seen may be.
-  [[nodiscard]] double dark_share() const { return (dark + 1) / (all + 2); }
+  [[nodiscard]] double share(std::size_t sight) const { return (of[sight] + 1) / (all + 2); }
 };
+
+constexpr std::uint8_t kOut = 255;  ///< not in that picture
 
 /// The label that leads all others clearly; -1: none does.
 std::ptrdiff_t clear_winner(std::span<const float> scores) {
@@ -41,30 +41,26 @@ std::ptrdiff_t clear_winner(std::span<const float> scores) {
 
 Darkness::Darkness(const Rig& rig, std::span<const GridGraph> graphs,
                    std::span<const LabelledPieces> pieces)
-    : rig_(rig),
-      graphs_(graphs),
-      pieces_(pieces),
-      weights_(graphs.size(), 0.F),
-      seen_(graphs.size()) {
+    : rig_(rig), graphs_(graphs), pieces_(pieces), weights_(graphs.size()), seen_(graphs.size()) {
   parallel_for(graphs.size(), [&](std::size_t g) { seen_[g] = look_from_others(g); });
   weigh_views();
 }
 
-std::vector<char> Darkness::look_from_others(std::size_t g) const {
+std::vector<std::uint8_t> Darkness::look_from_others(std::size_t g) const {
   const LabelledPieces& own = pieces_[g];
   const RigidTransform world_from_camera =
       rig_.camera(graphs_[g].camera).device_from_world.inverse();
-  std::vector<char> seen;
+  std::vector<std::uint8_t> seen;
   for (std::size_t p = 0; p < own.labels.size(); ++p) {
     for (const PieceLabel& label : own.labels[p]) {
       const Vec3 place = world_from_camera * label.place(own.graph.pieces[p].middle);
       for (std::size_t o = 0; o < graphs_.size(); ++o) {
-        char& is = seen.emplace_back(kOut);
-        if (o == g || graphs_[o].lit.is_lit.empty()) continue;
+        std::uint8_t& is = seen.emplace_back(kOut);
+        if (o == g || graphs_[o].lit.seen.empty()) continue;
         const Camera& other = rig_.camera(graphs_[o].camera);
         const auto pixel = other.project(place);
         if (!pixel || !other.contains(*pixel)) continue;
-        is = graphs_[o].lit.is_dark(*pixel) ? kDark : kLit;
+        is = static_cast<std::uint8_t>(graphs_[o].lit.at(*pixel));
       }
     }
   }
@@ -76,7 +72,7 @@ void Darkness::weigh_views() {
   std::vector<Sightings> all(graphs_.size());
   for (std::size_t g = 0; g < pieces_.size(); ++g) {
     const std::vector<char> is_crossed = crossed_pieces(pieces_[g].graph);
-    const char* seen = seen_[g].data();
+    const std::uint8_t* seen = seen_[g].data();
     for (std::size_t p = 0; p < is_crossed.size(); ++p) {
       const std::vector<float>& scores = pieces_[g].scores[p];
       const std::ptrdiff_t winner = clear_winner(scores);
@@ -90,17 +86,18 @@ void Darkness::weigh_views() {
     }
   }
   for (std::size_t o = 0; o < graphs_.size(); ++o)
-    weights_[o] =
-        static_cast<float>(std::max(0.0, std::log(all[o].dark_share() / best[o].dark_share())));
+    for (std::size_t sight = 0; sight < kSights; ++sight)
+      weights_[o][sight] =
+          static_cast<float>(std::max(0.0, std::log(all[o].share(sight) / best[o].share(sight))));
 }
 
 std::vector<std::vector<float>> Darkness::costs(std::size_t g) const {
   std::vector<std::vector<float>> result;
-  const char* seen = seen_[g].data();
+  const std::uint8_t* seen = seen_[g].data();
   for (const auto& labels : pieces_[g].labels) {
     for (float& cost : result.emplace_back(labels.size(), 0.F)) {
       for (std::size_t o = 0; o < graphs_.size(); ++o)
-        if (seen[o] == kDark) cost = std::max(cost, weights_[o]);
+        if (seen[o] < kSights) cost = std::max(cost, weights_[o][seen[o]]);
       seen += graphs_.size();
     }
   }

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -24,15 +26,16 @@ class Darkness {
   [[nodiscard]] std::vector<std::vector<float>> costs(std::size_t g) const;
 
  private:
-  /// Per label of graphs[g], per piece one after the other, and per view: kOut, kLit or kDark.
-  [[nodiscard]] std::vector<char> look_from_others(std::size_t g) const;
+  /// Per label of graphs[g], per piece one after the other, and per view: its Sight, or kOut.
+  [[nodiscard]] std::vector<std::uint8_t> look_from_others(std::size_t g) const;
   void weigh_views();
 
   const Rig& rig_;
   std::span<const GridGraph> graphs_;
   std::span<const LabelledPieces> pieces_;
-  std::vector<float> weights_;           ///< per graph: cost of a label in its dark
-  std::vector<std::vector<char>> seen_;  ///< per graph: what look_from_others() gives
+  /// Per graph: cost of a label where it sees that.
+  std::vector<std::array<float, kSights>> weights_;
+  std::vector<std::vector<std::uint8_t>> seen_;  ///< per graph: what look_from_others() gives
 };
 
 }  // namespace pencilscan

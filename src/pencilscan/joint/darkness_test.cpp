@@ -94,12 +94,16 @@ TEST(LitCells, GrazingLightIsLightAndNoiseIsNot) {
   cv::Mat presence(200, 240, CV_32FC1);
   cv::theRNG().state = 1;
   cv::randn(presence, 0.1, 0.02);
-  presence(cv::Rect(160, 100, 40, 40)) += 0.05;  // no line is found in it
+  presence(cv::Rect(160, 100, 40, 40)) += 0.05;  // no line is found in them
+  presence(cv::Rect(20, 100, 40, 40)) += 0.3;
   const LitCells cells = lit_cells(scene.rig, 0, scene.graphs[0].curves, {&presence, 1});
-  EXPECT_FALSE(cells.is_dark({180, 120}));
-  for (const Vec2& pixel : {Vec2(30, 30), Vec2(30, 170), Vec2(0, 0), Vec2(239, 10)})
-    EXPECT_TRUE(cells.is_dark(pixel)) << pixel.transpose();
-  EXPECT_FALSE(lit_cells(scene.rig, 0, {}, {&presence, 1}).is_dark({30, 30}));
+  EXPECT_EQ(cells.at({180, 120}), Sight::kFaint);
+  EXPECT_EQ(cells.at({40, 120}), Sight::kLit);
+  const Vec2 on_line = scene.graphs[0].curves[0].points[0].position.cast<double>();
+  EXPECT_EQ(cells.at(on_line), Sight::kLit);
+  for (const Vec2& pixel : {Vec2(30, 30), Vec2(30, 180), Vec2(0, 0), Vec2(239, 10)})
+    EXPECT_EQ(cells.at(pixel), Sight::kDark) << pixel.transpose();
+  EXPECT_TRUE(lit_cells(scene.rig, 0, {}, {&presence, 1}).seen.empty());
 }
 
 TEST(Darkness, WhatLiesBeforeNothingCostsAndWhatLiesOnLinesDoesNot) {
@@ -131,7 +135,7 @@ TEST(Darkness, ACameraThatMissesLightHasLittleToSay) {
   LitCells& cells = half.graphs[2].lit;
   const Vec2 middle = *half.rig.cameras[2].project(Vec3::Zero());
   const int column = static_cast<int>(static_cast<float>(middle.x()) / cells.cell_px.width);
-  cells.is_lit.colRange(column, cells.is_lit.cols) = 0;
+  cells.seen.colRange(column, cells.seen.cols) = static_cast<int>(Sight::kDark);
   const auto greatest = [](const LitSquare& scene) {
     // What camera 2 alone says of camera 0's labels.
     std::vector<GridGraph> graphs = scene.graphs;
@@ -144,6 +148,16 @@ TEST(Darkness, ACameraThatMissesLightHasLittleToSay) {
   EXPECT_GT(greatest(whole), 3);
   EXPECT_LT(greatest(half), 1.5);
   EXPECT_GT(greatest(half), 0);
+}
+
+TEST(Darkness, FaintLightIsAsGoodAsDarkWhereTrueLabelsLieOnLines) {
+  LitSquare lit;  // all of the pictures is lit a little
+  for (GridGraph& graph : lit.graphs)
+    graph.lit.seen = cv::max(graph.lit.seen, static_cast<int>(Sight::kFaint));
+  const LitSquare black;
+  for (std::size_t g = 0; g < 3; ++g)
+    EXPECT_EQ(Darkness(lit.rig, lit.graphs, lit.pieces).costs(g),
+              Darkness(black.rig, black.graphs, black.pieces).costs(g));
 }
 
 TEST(Darkness, ACameraWhoseLightIsUnknownSaysNothing) {
