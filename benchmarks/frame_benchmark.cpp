@@ -6,7 +6,6 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
-#include <ctime>
 #include <exception>
 #include <filesystem>
 #include <map>
@@ -15,6 +14,7 @@
 #include <string>
 #include <vector>
 
+#include "cpu_seconds.h"
 #include "pencilscan/core/median.h"
 #include "pencilscan/core/memory.h"
 #include "pencilscan/core/parallel.h"
@@ -30,13 +30,6 @@
 
 namespace pencilscan {
 namespace {
-
-/// Of all threads of the process, s.
-double cpu_seconds() {
-  timespec now{};
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
 
 /// Largest memory of the process so far, GB.
 double peak_memory_gb() {

@@ -4,7 +4,6 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
-#include <ctime>
 #include <exception>
 #include <filesystem>
 #include <memory>
@@ -13,6 +12,7 @@
 #include <thread>
 #include <vector>
 
+#include "cpu_seconds.h"
 #include "pencilscan/capture/aravis_cameras.h"
 #include "pencilscan/capture/fake_cameras.h"
 #include "pencilscan/capture/record.h"
@@ -76,12 +76,6 @@ std::unique_ptr<LiveCameras> open_cameras(const Setting& setting) {
   auto live = std::make_unique<LiveCameras>(std::move(named));
   for (std::size_t c = 0; c < live->group().size(); ++c) live->group().configure(c, settings);
   return live;
-}
-
-double cpu_seconds() {
-  timespec now{};
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
 void run(const Setting& setting) {

@@ -85,8 +85,6 @@ class ProjectorRun {
  private:
   [[nodiscard]] double delay_ms() const;
   /// Shows and takes shot i; `again` >= 1: a retake. Index shots_.size() is white once more.
-  /// Of all cameras, taken at that time or later.
-  [[nodiscard]] std::vector<TimedFrame> pictures_since(std::int64_t since);
   void take(std::size_t i, int again = 0);
   [[nodiscard]] std::string name_of(std::size_t camera) const {
     return cameras_.group().name(camera);
@@ -132,22 +130,12 @@ double ProjectorRun::delay_ms() const {
          kGuessedTransferMs;
 }
 
-std::vector<TimedFrame> ProjectorRun::pictures_since(std::int64_t since) {
-  const bool software =
-      cameras_.group().size() > 0 && cameras_.group().settings(0).trigger == Trigger::kSoftware;
-  if (!software)
-    return cameras_.first_since(since,
-                                since + static_cast<std::int64_t>(1e9 * options_.patience_s));
-  std::this_thread::sleep_for(
-      std::chrono::nanoseconds(std::max<std::int64_t>(0, since - host_now_ns())));
-  return cameras_.trigger(options_.patience_s);
-}
-
 void ProjectorRun::take(std::size_t i, int again) {
   const Stopwatch watch;
   const std::int64_t shown = screen_.show(projector_, shot(i).picture);
-  const std::vector<TimedFrame> frames =
-      pictures_since(shown + static_cast<std::int64_t>(1e6 * (delay_ms() + kRetakeMs * again)));
+  const std::vector<TimedFrame> frames = cameras_.taken_since(
+      shown + static_cast<std::int64_t>(1e6 * (delay_ms() + kRetakeMs * again)),
+      options_.patience_s);
   report_.waiting_seconds += static_cast<double>(host_now_ns() - shown) / 1e9;
   ++report_.pictures;
   work_.wait(kWaitingPictures);

@@ -1,6 +1,8 @@
 #include "pencilscan/capture/live_cameras.h"
 
 #include <algorithm>
+#include <chrono>
+#include <thread>
 
 #include "pencilscan/core/host_clock.h"
 
@@ -101,6 +103,14 @@ std::vector<TimedFrame> LiveCameras::trigger(double patience_s) {
   group_.trigger();
   return first_that([&](const TimedFrame& timed) { return timed.frame->arrival_ns >= since; },
                     since + static_cast<std::int64_t>(1e9 * patience_s));
+}
+
+std::vector<TimedFrame> LiveCameras::taken_since(std::int64_t since_ns, double patience_s) {
+  if (group_.size() == 0 || group_.settings(0).trigger != Trigger::kSoftware)
+    return first_since(since_ns, since_ns + static_cast<std::int64_t>(1e9 * patience_s));
+  std::this_thread::sleep_for(
+      std::chrono::nanoseconds(std::max<std::int64_t>(0, since_ns - host_now_ns())));
+  return trigger(patience_s);
 }
 
 LiveCameras::Listener::Listener(LiveCameras& cameras, CameraGroup::Sink sink) : cameras_(cameras) {

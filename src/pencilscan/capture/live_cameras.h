@@ -51,6 +51,10 @@ class LiveCameras {
   [[nodiscard]] Count count(std::size_t camera) const;
   [[nodiscard]] std::vector<ClockFit> clocks() const;
 
+  /// Pictures of all cameras taken at that time or later, waited for so long from then on: as they
+  /// come, or triggered then where the cameras are set to software triggers.
+  [[nodiscard]] std::vector<TimedFrame> taken_since(std::int64_t since_ns, double patience_s);
+
   /// While it lives, `sink` gets every picture, from the cameras' threads.
   class Listener {
    public:

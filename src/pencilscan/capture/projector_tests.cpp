@@ -111,12 +111,7 @@ class Tester {
 };
 
 std::vector<TimedFrame> Tester::pictures_after(double ms) {
-  if (!software_) {
-    const std::int64_t since = host_now_ns() + ns(ms);
-    return cameras_.first_since(since, since + ns(1000 * options_.patience_s));
-  }
-  std::this_thread::sleep_for(std::chrono::nanoseconds(ns(ms)));
-  return cameras_.trigger(options_.patience_s);
+  return cameras_.taken_since(host_now_ns() + ns(ms), options_.patience_s);
 }
 
 std::vector<cv::Mat> Tester::settled_pictures() {

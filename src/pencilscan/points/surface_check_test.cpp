@@ -52,6 +52,11 @@ class SurfaceCheckTest : public testing::Test, protected TwoProjectorScene {
     const Vec3 x = position_of(p);
     set_position(x + mm * (x - rig.cameras[0].center()).normalized(), p);
   }
+  /// Turns camera 1, which knows the surface as well, away from it.
+  void look_elsewhere() {
+    Mat3& turn = rig.cameras[1].device_from_world.rotation;
+    turn = Eigen::AngleAxisd(2, Vec3::UnitY()) * turn;
+  }
   /// Gives a curve its neighbour's line.
   void name_wrongly(std::size_t curve) {
     CurveLabel& label = labeling_.runs[0][curve].label;
@@ -120,6 +125,7 @@ TEST_F(SurfaceCheckTest, PointsSettleOnTheSurfaceAndTheirSigmaTellsOfTheWayThere
 TEST_F(SurfaceCheckTest, PointsTooFarOffTheSurfaceAreLeftOutThoughTheirLineFits) {
   // A tenth of the points is off by 1 mm along the ray: less than half a line, 20 deviations.
   std::vector<MeasuredPoint> moved = points();
+  look_elsewhere();
   std::size_t off = 0;
   for (std::size_t i = 0; i < moved.size(); ++i) {
     moved[i].sigma = 0.04F;
@@ -129,7 +135,7 @@ TEST_F(SurfaceCheckTest, PointsTooFarOffTheSurfaceAreLeftOutThoughTheirLineFits)
   }
   const SettledPoints settled = settle_on_surface(rig, RayScene(mesh_), moved);
   EXPECT_GE(settled.contradicted, off);
-  EXPECT_LT(settled.contradicted, off + moved.size() / 12);
+  EXPECT_LT(settled.contradicted, off + moved.size() / 20);
   EXPECT_EQ(std::count_if(settled.points.begin(), settled.points.end(),
                           [](const MeasuredPoint& p) { return error(p) > 0.5; }),
             0);
@@ -149,9 +155,7 @@ TEST_F(SurfaceCheckTest, OddPointsAreLeftOutWhereAnotherCameraKnowsTheSurfaceBet
     return 10 * static_cast<double>(odd) / static_cast<double>(moved.size());
   };
   const double kept = tenths_kept_odd();
-  // The other camera looks elsewhere.
-  Mat3& turn = rig.cameras[1].device_from_world.rotation;
-  turn = Eigen::AngleAxisd(2, Vec3::UnitY()) * turn;
+  look_elsewhere();
   EXPECT_GT(tenths_kept_odd(), 0.2) << "the others lie too far off their line or the surface";
   EXPECT_LT(kept, 0.02);
 }

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "pencilscan/core/chunks.h"
+#include "pencilscan/depth/dense_depth.h"
 #include "pencilscan/surface/mesh_parts.h"
 #include "pencilscan/surface/point_grid.h"
 
@@ -80,9 +81,8 @@ std::vector<SurfaceEvidence> attribute_vertices(std::span<const SurfaceSample> s
                                                 std::span<const std::array<int, 2>> middles) {
   constexpr double kMaxStretch = 2.5;    // of the spacing on a grazed surface
   constexpr double kOutsideReach = 0.4;  // of the reach, beyond the last line
-  // Cosine below which depth is not measured (DepthOptions::min_cosine): what turns away farther
-  // from all cameras around was only continued from beside it.
-  constexpr double kLeastFaced = 0.2;
+  // What turns away farther from all cameras around was only continued from beside it.
+  const double least_faced = DepthOptions{}.min_cosine;
   const double radius = reach_spacings * kMaxStretch * spacing;
   std::vector<Vec3> positions;
   positions.reserve(samples.size());
@@ -141,7 +141,7 @@ std::vector<SurfaceEvidence> attribute_vertices(std::span<const SurfaceSample> s
     // Samples that fill a half plane pull with 2 / pi of their summed distance.
     fringe[v] = a.pull.norm() > 0.55 * a.pull_length && a.best > kOutsideReach;
     double sigma = a.nearest;  // a guess where no sample reaches: at least so far off
-    if (a.weight > 0 && a.faced >= kLeastFaced) {
+    if (a.weight > 0 && a.faced >= least_faced) {
       evidence[v] = evidence_of(a);
       sigma = surface_sigma(evidence[v]);
       const double certainty = a.confidence / a.weight * (1 - 0.5 * a.best * a.best);
