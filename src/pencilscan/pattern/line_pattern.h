@@ -24,6 +24,8 @@ struct LinePattern {
   bool has_own_sequence = false;                         ///< the file states the sequence itself
   std::optional<int> max_lines;                          ///< "lines" of the file
 
+  friend bool operator==(const LinePattern&, const LinePattern&) = default;
+
   [[nodiscard]] int period() const { return static_cast<int>(sequence.size()); }
   [[nodiscard]] int local_id(int line) const { return line % period(); }
   [[nodiscard]] int symbol(int line) const {

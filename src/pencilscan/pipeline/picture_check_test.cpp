@@ -114,15 +114,28 @@ TEST_F(PictureCheck, CamerasThatAreExchangedWhereTheRingRepeatsItselfAreNamed) {
                       "camera cam4: its picture is that of camera cam2"});
 }
 
-TEST_F(PictureCheck, ExchangedProjectorsAreNamed) {
-  Rig wrong = *rig_;
-  std::swap(wrong.projectors[0].patterns, wrong.projectors[1].patterns);
+/// What is said where projectors a and b show each other's patterns.
+std::string refusal_of(Rig rig, const Frame& frame, std::size_t a, std::size_t b) {
+  std::swap(rig.projectors[a].patterns, rig.projectors[b].patterns);
   try {
-    (void)measure_points(wrong, *frame_);
-    FAIL();
+    (void)measure_points(rig, frame);
   } catch (const StageError& error) {
-    EXPECT_THAT(error.what(), HasSubstr("projectors proj0 and proj1"));
+    return error.what();
   }
+  return "nothing";
+}
+
+TEST_F(PictureCheck, ExchangedProjectorsAreNamed) {
+  EXPECT_THAT(refusal_of(*rig_, *frame_, 0, 1), HasSubstr("projectors proj0 and proj1 show"));
+  EXPECT_THAT(refusal_of(*rig_, *frame_, 2, 3), HasSubstr("projectors proj2 and proj3 show"));
+}
+
+TEST_F(PictureCheck, ExchangedProjectorsThatStandOppositeAreNamed) {
+  EXPECT_THAT(refusal_of(*rig_, *frame_, 1, 4), HasSubstr("projectors proj1 and proj4 show"));
+}
+
+TEST_F(PictureCheck, ProjectorsOfOnePatternCannotBeExchanged) {
+  EXPECT_EQ(refusal_of(*rig_, *frame_, 0, 2), "nothing");
 }
 
 TEST_F(PictureCheck, TurnedAndMirroredPicturesAreNamed) {
