@@ -37,6 +37,7 @@ double share(double part, double whole) { return whole > 0 ? part / whole : kUnk
 
 CameraRow camera_row(const json& entry) {
   CameraRow row;
+  row.labelled_points = figure(entry, "labelled_curve_points");
   row.labelled_share = share(figure(entry, "labelled_curve_points"), figure(entry, "curve_points"));
   row.line_width_px = figure(entry, "curve_width_median_px");
   row.line_height = figure(entry, "curve_height_median");
@@ -73,6 +74,11 @@ void read_report(const json& report, const SequenceDevices& devices, FrameRow& r
   for (const std::string& name : devices.cameras) {
     const json& entry = named_entry(report, "cameras", name);
     row.cameras.push_back(camera_row(entry));
+    const json shift = named_entry(crossings, "devices", name).value("shift_px", json());
+    if (shift.is_array() && shift.size() == 2 && shift[0].is_number() && shift[1].is_number()) {
+      row.cameras.back().shift_x_px = shift[0].get<double>();
+      row.cameras.back().shift_y_px = shift[1].get<double>();
+    }
     const double pixels = figure(entry, "saturated_pixels");
     if (std::isfinite(pixels)) saturated += pixels;
     row.device_crossing_px.push_back(figure(named_entry(crossings, "devices", name), "median_px"));

@@ -15,6 +15,9 @@ inline constexpr double kUnknownFigure = std::numeric_limits<double>::quiet_NaN(
 /// What one frame's report says of a camera. Figures may be kUnknownFigure.
 struct CameraRow {
   double labelled_share = kUnknownFigure;  ///< of its curve points
+  double labelled_points = kUnknownFigure;
+  double shift_x_px = kUnknownFigure;  ///< with which its crossings meet best: it was turned
+  double shift_y_px = kUnknownFigure;
   double line_width_px = kUnknownFigure;   ///< standard deviation of the lines' profiles
   double line_height = kUnknownFigure;     ///< of the lines above their surroundings, linear light
   double image_level = kUnknownFigure;     ///< mean of its picture, in [0, 1]

@@ -56,6 +56,8 @@ Columns columns_of(const FrameRow& row, const SequenceDevices& devices) {
     const std::string prefix = devices.cameras[c] + ".";
     columns.insert(columns.end(), {{prefix + "labelled_share", camera.labelled_share},
                                    {prefix + "crossing_px", row.device_crossing_px[c]},
+                                   {prefix + "shift_x_px", camera.shift_x_px},
+                                   {prefix + "shift_y_px", camera.shift_y_px},
                                    {prefix + "line_width_px", camera.line_width_px},
                                    {prefix + "line_height", camera.line_height},
                                    {prefix + "image_level", camera.image_level},

@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <map>
+#include <iterator>
+#include <set>
 #include <tuple>
 
 #include "pencilscan/core/formatted.h"
+#include "pencilscan/core/median.h"
 #include "pencilscan/jobs/changes.h"
 #include "pencilscan/pipeline/repeated_pictures.h"
 
@@ -22,6 +24,7 @@ struct Series {
   bool is_ratio = false;   ///< its logarithm is watched: what counts is the factor
   double smallest = 0;     ///< change that counts, of the logarithm where is_ratio
   Reading value;
+  Reading beside = {};  ///< a change counts where this one's logarithm changes as much, too
 };
 
 struct Found {
@@ -37,8 +40,13 @@ const double kLevel = std::log(1.25);   // as much more light without lines
 const double kPoints = std::log(4.0);   // a projector that lost three quarters of its points
 /// Half of what the rule of disagreeing crossings (crossing_tracks.h) allows beyond noise.
 constexpr double kCrossingsPx = 0.05;
+/// As rig check (moved_devices.h): a camera that is off by less is as calibrated.
+constexpr double kShiftPx = 0.2;
 
 constexpr const char* kDigits = "%.3g";
+
+/// Of crossings, as the kind "crossings"; its direction says nothing.
+constexpr const char* kShift = "shift";
 
 double finite_log(double value) { return value > 0 ? std::log(value) : kUnknownFigure; }
 
@@ -51,9 +59,13 @@ std::vector<Series> all_series(const SequenceDevices& devices) {
                      [c, member](const FrameRow& row) { return row.cameras[c].*member; }});
     };
     of_camera("labelled", false, kLabelled, &CameraRow::labelled_share);
+    // A share also falls where more is seen that is no line.
+    all.back().beside = [c](const FrameRow& row) { return row.cameras[c].labelled_points; };
     of_camera("width", true, kWidth, &CameraRow::line_width_px);
     of_camera("height", true, kHeight, &CameraRow::line_height);
     of_camera("level", true, kLevel, &CameraRow::image_level);
+    of_camera(kShift, false, kShiftPx, &CameraRow::shift_x_px);
+    of_camera(kShift, false, kShiftPx, &CameraRow::shift_y_px);
   }
   for (std::size_t d = 0; d < devices.cameras.size() + devices.projectors.size(); ++d) {
     all.push_back({"crossings", d, false, kCrossingsPx,
@@ -87,6 +99,7 @@ std::string quantity(const std::string& kind) {
   if (kind == "height") return "the height of its lines above their surroundings is ";
   if (kind == "level") return "the mean light of its picture is ";
   if (kind == "projector") return "the number of points on its lines is ";
+  if (kind == kShift) return "the shift with which its crossings meet (px) is ";
   return "its crossing lines miss each other by (px) ";
 }
 
@@ -131,40 +144,80 @@ SequenceEvent event_of_all(std::span<const FrameRow> rows, const std::vector<Fou
               usual_cause(kind, change.after > change.before, true) + ")"};
 }
 
-/// Which device made crossings miss each other. One camera alone: that one, since a crossing's
-/// disagreement is that of one camera with two projectors. Several: the projector whose crossings
-/// suffer most, if there is one; of two projectors every crossing is of both.
+bool is_shift(const Found& found) { return found.series->kind == kShift; }
+
+bool rises(const Found& found) { return found.change.after > found.change.before; }
+
+bool of_crossings(const Found& found) {
+  return is_shift(found) || found.series->kind == "crossings";
+}
+
+double size_of(const Found& found) { return std::abs(found.change.after - found.change.before); }
+
+/// Which device made crossings miss each other. One camera alone, be it that its crossings miss or
+/// that its picture is shifted: that one, since a crossing's disagreement is that of one camera
+/// with two projectors. Several: the projector whose crossings suffer most, if there is one; of two
+/// projectors every crossing is of both.
 SequenceEvent bump(std::span<const FrameRow> rows, const SequenceDevices& devices,
                    std::vector<Found> together) {
   constexpr double kClearly = 1.3;  // a projector over the next one
-  const auto rise = [](const Found& f) { return f.change.after - f.change.before; };
   std::stable_sort(together.begin(), together.end(),
-                   [&](const Found& a, const Found& b) { return rise(a) > rise(b); });
-  std::vector<const Found*> cameras;
+                   [](const Found& a, const Found& b) { return size_of(a) > size_of(b); });
+  std::set<std::size_t> cameras;
   std::vector<const Found*> projectors;
+  const Found* of_camera = nullptr;
   std::size_t first = together.front().change.at;
   for (const Found& f : together) {
     first = std::min(first, f.change.at);
-    (f.series->device < devices.cameras.size() ? cameras : projectors).push_back(&f);
+    if (f.series->device >= devices.cameras.size()) {
+      projectors.push_back(&f);
+      continue;
+    }
+    cameras.insert(f.series->device);
+    // What crossings miss is told where it is known.
+    if (of_camera == nullptr || (is_shift(*of_camera) && !is_shift(f))) of_camera = &f;
   }
   const bool one_camera = cameras.size() == 1 && devices.cameras.size() > 1;
   const bool one_projector =
-      !projectors.empty() &&
+      !one_camera && cameras.size() != 1 && !projectors.empty() &&
       (projectors.size() == 1 ? devices.projectors.size() > 1
-                              : rise(*projectors[0]) > kClearly * rise(*projectors[1]));
-  const Found& most = one_camera                             ? *cameras.front()
-                      : one_projector && cameras.size() != 1 ? *projectors.front()
-                                                             : together.front();
+                              : size_of(*projectors[0]) > kClearly * size_of(*projectors[1]));
+  const Found& most = one_camera      ? *of_camera
+                      : one_projector ? *projectors.front()
+                                      : together.front();
   SequenceEvent event{rows[first].name, "crossings", "", most.change.before, most.change.after, ""};
-  if (one_camera || (one_projector && cameras.size() != 1)) {
+  if (one_camera || one_projector) {
     event.device = bare_name(devices, most.series->device);
     event.text = name_of(devices, most.series->device) + " moved";
   } else {
     event.text = "devices moved, which one these figures do not tell";
   }
-  event.text += ": crossing lines miss each other by " + from_to(most.change) +
+  event.text += is_shift(most) ? ": crossing lines meet when its picture is shifted by "
+                               : ": crossing lines miss each other by ";
+  event.text += from_to(most.change) +
                 " (px); rig check --frames says more, --refine-rig corrects the frames from here";
   return event;
+}
+
+/// Whether what is watched beside a figure changed with it, from the frames before to those after.
+bool is_confirmed(std::span<const FrameRow> rows, const Series& series, const Change& change) {
+  if (!series.beside) return true;
+  constexpr std::size_t kFrames = 3;  // as find_changes() asks for
+  const auto median_of = [&](auto first, auto last) {
+    std::vector<double> values;
+    for (auto row = first; row != last && values.size() < kFrames; ++row) {
+      const double value =
+          row->status.state == FrameState::kDone ? finite_log(series.beside(*row)) : kUnknownFigure;
+      if (std::isfinite(value)) values.push_back(value);
+    }
+    return values.empty() ? kUnknownFigure : upper_median(std::move(values));
+  };
+  const auto at = rows.begin() + static_cast<std::ptrdiff_t>(change.at);
+  const double before = median_of(std::make_reverse_iterator(at), rows.rend());
+  const double after = median_of(at, rows.end());
+  if (!std::isfinite(before) || !std::isfinite(after)) return true;
+  return (after > before) == (change.after > change.before) &&
+         std::abs(after - before) > series.smallest;
 }
 
 std::vector<Found> find_all(std::span<const FrameRow> rows, const SequenceDevices& devices,
@@ -179,6 +232,7 @@ std::vector<Found> find_all(std::span<const FrameRow> rows, const SequenceDevice
     }
     ChangeReport changes = find_changes(values, {series.smallest, all.size() * rows.size()});
     for (Change& change : changes.changes) {
+      if (!is_confirmed(rows, series, change)) continue;
       if (series.is_ratio) {
         change.before = std::exp(change.before);
         change.after = std::exp(change.after);
@@ -202,9 +256,9 @@ std::vector<Found> take_together(std::vector<Found>& found) {
   std::vector<Found> together;
   std::vector<Found> rest;
   for (const Found& f : found) {
+    const bool is_kind = f.series->kind == first.series->kind && rises(f) == rises(first);
     const bool same =
-        f.series->kind == first.series->kind &&
-        (f.change.after > f.change.before) == (first.change.after > first.change.before) &&
+        (is_kind || (of_crossings(f) && of_crossings(first) && (is_shift(f) || is_shift(first)))) &&
         f.change.at <= first.change.at + kFramesApart;
     (same ? together : rest).push_back(f);
   }
@@ -242,8 +296,9 @@ WatchReport watch_sequence(std::span<const FrameRow> rows, const SequenceDevices
   while (!found.empty()) {
     const std::vector<Found> together = take_together(found);
     const Found& first = together.front();
-    const bool rises = first.change.after > first.change.before;
-    if (first.series->kind == "crossings" && rises) {
+    const bool moved = of_crossings(first) &&
+                       (rises(first) || std::any_of(together.begin(), together.end(), is_shift));
+    if (moved) {
       report.events.push_back(bump(rows, devices, together));
     } else if (first.series->kind != "projector" && together.size() > 1 &&
                2 * together.size() > devices.cameras.size()) {

@@ -120,6 +120,45 @@ TEST_F(Watch, ABumpedCameraIsNamed) {
   EXPECT_THAT(found[0].text, HasSubstr("camera cam1 moved"));
 }
 
+TEST_F(Watch, ABumpThatNoiseOfCrossingsHidesShowsAsAShift) {
+  Random random(3);
+  for (FrameRow& row : rows_) {
+    for (double& px : row.device_crossing_px) px = 0.17 + random.normal(0, 0.02);
+    for (CameraRow& camera : row.cameras) {
+      camera.shift_x_px = random.normal(0.03, 0.02);
+      camera.shift_y_px = random.normal(0, 0.02);
+    }
+  }
+  EXPECT_THAT(events(), IsEmpty());
+  from(150, [](FrameRow& row) {
+    row.cameras[2].shift_x_px += 0.5;
+    row.device_crossing_px[2] += 0.09;
+  });
+  const auto found = events();
+  ASSERT_THAT(found, SizeIs(1));
+  EXPECT_EQ(found[0].frame, "150");
+  EXPECT_EQ(found[0].device, "cam2");
+  EXPECT_THAT(found[0].text, HasSubstr("camera cam2 moved"));
+}
+
+TEST_F(Watch, ASmallerShareOfAsManyLabelsIsNoLoss) {
+  const auto lines_of_cam0_go = [&](double labels_left) {
+    Random random(5);
+    for (std::size_t k = 0; k < kFrames; ++k) {
+      CameraRow& camera = rows_[k].cameras[0];
+      camera.labelled_share = (k < 150 ? 0.79 : 0.67) + random.normal(0, 0.01);
+      camera.labelled_points = (k < 150 ? 5000 : 5000 * labels_left) + random.normal(0, 50);
+    }
+  };
+  lines_of_cam0_go(1);
+  EXPECT_THAT(events(), IsEmpty());
+  lines_of_cam0_go(0.85);
+  const auto found = events();
+  ASSERT_THAT(found, SizeIs(1));
+  EXPECT_EQ(found[0].device, "cam0");
+  EXPECT_EQ(found[0].kind, "labelled");
+}
+
 TEST_F(Watch, ABumpedProjectorIsNamedAndOneOfTwoIsNot) {
   const std::vector<FrameRow> steady = rows_;
   from(120, [](FrameRow& row) {

@@ -42,6 +42,8 @@ ordered_json device_reports(const Rig& rig, const std::vector<CrossingDisagreeme
                        {"crossings", devices[d].crossings},
                        {"median_px", number(devices[d].median_px)},
                        {"expected_px", number(devices[d].expected_px)}});
+    if (const auto& shift = devices[d].shift_px)
+      reports.back()["shift_px"] = {number(shift->x()), number(shift->y())};
   }
   return reports;
 }

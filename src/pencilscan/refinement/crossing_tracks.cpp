@@ -141,7 +141,8 @@ void join(const Rig& rig, std::span<const Sighting> sightings, const TrackOption
 
 /// How far the planes of one crossing miss each other in one camera.
 struct Miss {
-  double px = 0;
+  double px = 0;              ///< signed
+  Vec2 slope = Vec2::Zero();  ///< of px, for a shift of the crossing by one camera px
   double noise_px = 0;
   int camera = 0;
   std::array<int, 2> projectors{};
@@ -164,7 +165,8 @@ std::vector<Miss> misses_of(const Rig& rig, std::span<const CrossingTrack> track
       const auto below = miss_at(s.pixel + Vec2(0, 1));
       if (!miss || !right || !below) continue;
       const Eigen::RowVector2d slope(*right - *miss, *below - *miss);
-      per_track[t].push_back({std::abs(*miss),
+      per_track[t].push_back({*miss,
+                              slope.transpose(),
                               (slope * s.whitening.inverse()).norm(),
                               s.camera,
                               {lines[0].projector, lines[1].projector}});
@@ -181,12 +183,40 @@ CrossingDisagreement median_of(const std::vector<Miss>& misses, const Choice& co
   std::vector<double> noises;
   for (const Miss& m : misses) {
     if (!counts(m)) continue;
-    px.push_back(m.px);
+    px.push_back(std::abs(m.px));
     noises.push_back(m.noise_px);
   }
   const std::size_t crossings = px.size();
-  return {crossings, upper_median(std::move(px)),
-          upper_median(std::move(noises)) / kDeviationPerMedian};
+  return {crossings,
+          upper_median(std::move(px)),
+          upper_median(std::move(noises)) / kDeviationPerMedian,
+          {}};
+}
+
+/// The shift of a camera's picture with which its crossings miss each other least. Cauchy's loss,
+/// as in refine_rig.h: some names are wrong.
+std::optional<Vec2> shift_of(const std::vector<Miss>& misses, int camera, double median_px) {
+  constexpr int kRounds = 10;
+  constexpr double kLeastDeterminant = 1e-3;  // of a system whose weights sum to one
+  const double scale = 2 * median_px / kDeviationPerMedian;
+  if (!(scale > 0)) return std::nullopt;
+  Vec2 shift = Vec2::Zero();
+  for (int round = 0; round < kRounds; ++round) {
+    Eigen::Matrix2d matrix = Eigen::Matrix2d::Zero();
+    Vec2 right = Vec2::Zero();
+    double weights = 0;
+    for (const Miss& m : misses) {
+      if (m.camera != camera) continue;
+      const double left = (m.px + m.slope.dot(shift)) / scale;
+      const double weight = 1 / (1 + left * left);
+      matrix += weight * m.slope * m.slope.transpose();
+      right -= weight * m.px * m.slope;
+      weights += weight;
+    }
+    if (!((matrix / weights).determinant() > kLeastDeterminant)) return std::nullopt;
+    shift = matrix.ldlt().solve(right);
+  }
+  return shift;
 }
 
 }  // namespace
@@ -225,6 +255,8 @@ std::vector<CrossingDisagreement> device_disagreements(const Rig& rig,
   for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
     result.push_back(
         median_of(misses, [&](const Miss& m) { return m.camera == static_cast<int>(c); }));
+    if (are_enough(result.back()))
+      result.back().shift_px = shift_of(misses, static_cast<int>(c), result.back().median_px);
   }
   for (std::size_t p = 0; p < rig.projectors.size(); ++p) {
     const auto is_of = [p](int projector) { return projector == static_cast<int>(p); };

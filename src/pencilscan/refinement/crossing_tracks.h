@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -59,6 +60,9 @@ struct CrossingDisagreement {
   std::size_t crossings = 0;
   double median_px = 0;
   double expected_px = 0;  ///< median that the noise of the curves alone gives
+  /// Of a camera: how far its picture would have to be shifted for its crossings to meet best,
+  /// camera px. What a turned camera does, seen through the noise of single crossings.
+  std::optional<Vec2> shift_px;
 };
 [[nodiscard]] CrossingDisagreement crossing_disagreement(const Rig& rig,
                                                          std::span<const CrossingTrack> tracks);
