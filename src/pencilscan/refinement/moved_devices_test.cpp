@@ -3,6 +3,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <vector>
+
+#include "pencilscan/refinement/crossing_tracks.h"
 #include "pencilscan/refinement/ring_scene.h"
 
 namespace pencilscan {
@@ -65,6 +69,30 @@ TEST(MovedDevices, TooFewCrossingsAccuseNobody) {
   const MovedDevices found = find_moved_devices(stated, tracks);
   EXPECT_THAT(found.moved, IsEmpty());
   EXPECT_LE(found.alone[0].tracks, 20U);
+}
+
+TEST(DeviceDisagreements, ATurnedCameraHasAShiftAndNoOtherHas) {
+  RingScene scene;
+  const auto tracks = scene.tracks(3, 0.3, 1);
+  for (std::size_t turned = 0; turned < 4; ++turned) {
+    const auto found = device_disagreements(stated_rig(scene, turned, 0.5, turned + 1), tracks);
+    for (std::size_t c = 0; c < 4; ++c) {
+      ASSERT_TRUE(found[c].shift_px);
+      EXPECT_NEAR(found[c].shift_px->norm(), c == turned ? 0.5 : 0, 0.1) << turned << " " << c;
+    }
+  }
+}
+
+TEST(DeviceDisagreements, ATurnedProjectorIsNotTheShiftOfOneCamera) {
+  RingScene scene;
+  const auto tracks = scene.tracks(3, 0.3, 1);
+  for (std::size_t p = 4; p < 8; ++p) {
+    std::vector<double> shifts;
+    const auto found = device_disagreements(stated_rig(scene, p, 0.5, 1), tracks);
+    for (std::size_t c = 0; c < 4; ++c) shifts.push_back(found[c].shift_px->norm());
+    std::sort(shifts.begin(), shifts.end());
+    EXPECT_LT(shifts[3], 2 * shifts[2]) << device_at(scene.rig, p).name;
+  }
 }
 
 }  // namespace
