@@ -66,8 +66,27 @@ def scene(args, program, name, pitch, noise):
     return folder
 
 
+def exchanged_projectors(args, program, folder, count):
+    """Frames of projectors that show each other's patterns: name of the pair, what is said, whether rightly."""
+    rig = json.loads((folder / "scene/rig.json").read_text())
+    projectors = rig["projectors"]
+    pairs = [(a, b) for b in range(len(projectors)) for a in range(b)
+             if projectors[a]["pattern"] != projectors[b]["pattern"]]
+    for a, b in pairs[:: max(1, len(pairs) // count)][:count]:
+        shown = json.loads(json.dumps(rig))
+        for one, other in ((a, b), (b, a)):
+            shown["projectors"][one]["pattern"] = projectors[other]["pattern"]
+        path = common.write_rig(args.out / "shown.json", shown)
+        program("simulate", "--rig", path, "--mesh", folder / "mesh.ply", "--noise", "medium", "--fit", "--out",
+                args.out / "shown", "--overwrite")
+        text, _ = warnings_of(program, folder / "scene/rig.json", args.out / "shown/frames", args.out / "result")
+        names = f"{projectors[a]['name']} and {projectors[b]['name']}"
+        yield names, text, f"projectors {names} show each other's patterns" in text
+
+
 def main():
-    args = common.arguments("wrong_pictures", __doc__, only=("bunny,horse,hand", "bunny"), draws=(1, 1))
+    args = common.arguments("wrong_pictures", __doc__, only=("bunny,horse,hand", "bunny"), draws=(1, 1),
+                            pairs=(9, 1))
     program = common.Program(args)
     rows = common.Rows(args.out / "results.csv", ["object", "kind", "draw"], ["is_named", "text"], args.resume)
     for number, name in enumerate(args.only.split(",")):
@@ -91,6 +110,9 @@ def main():
                     (devices == told if devices else all(d in text for d in told))
                 rows.add(object=name, kind=kind, draw=draw, is_named=int(is_named), text=text[:300])
                 common.progress(f"wrong_pictures: {name}, {kind}, {sorted(told)}: {'named' if is_named else text}")
+        for pair, text, is_named in exchanged_projectors(args, program, folder, args.pairs):
+            rows.add(object=name, kind=f"projectors {pair}", draw=0, is_named=int(is_named), text=text[:300])
+            common.progress(f"wrong_pictures: {name}, {pair} exchanged: {'named' if is_named else text}")
         for noise in ["medium"] if args.small else ["low", "medium", "high"]:
             for pitch in [12] if args.small else [12, 8]:
                 if rows.has(object=name, kind=f"right, {noise}, {pitch}", draw=0):

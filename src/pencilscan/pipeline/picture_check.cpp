@@ -34,6 +34,8 @@ constexpr double kPlainContradiction = 0.25;  // agreement (view_agreement.h)
 // named and more; exchanging two that stand right leaves .84 at most.
 constexpr double kPlentyNamed = 0.88;
 constexpr double kClearlyMore = 1.1;
+constexpr double kHardly =
+    0.25;  // of the projector with most names: exchanged ones have .01 to .05
 constexpr std::size_t kTellingCameras = 3;
 
 /// Every eighth row, which tells as much of what a whole picture is; shares the pixels.
@@ -219,6 +221,23 @@ std::optional<std::pair<int, int>> exchanged_pair(
   return std::pair(static_cast<int>(a), static_cast<int>(b));
 }
 
+/// Those whose lines hardly a curve has.
+std::vector<int> projectors_with_few_names(const Rig& rig, const Labeling& labeling) {
+  std::vector<std::size_t> named(rig.projectors.size(), 0);
+  for (const std::vector<LabeledRun>& runs : labeling.runs) {
+    for (const LabeledRun& run : runs)
+      named[static_cast<std::size_t>(run.label.pattern.projector)] +=
+          static_cast<std::size_t>(run.end - run.begin);
+  }
+  const std::size_t most = *std::max_element(named.begin(), named.end());
+  std::vector<int> few;
+  for (std::size_t p = 0; p < named.size(); ++p) {
+    if (static_cast<double>(named[p]) < kHardly * static_cast<double>(most))
+      few.push_back(static_cast<int>(p));
+  }
+  return few;
+}
+
 }  // namespace
 
 std::string describe(const Rig& rig, const PictureFinding& finding) {
@@ -391,19 +410,24 @@ std::optional<std::pair<int, int>> exchanged_projectors(const Rig& rig, const Fr
     return named_share(labeling, a) < named_share(labeling, b);
   });
   poor.resize(std::min(poor.size(), kTellingCameras));
-  std::vector<cv::Mat> light;
-  for (const std::size_t c : poor) light.push_back(linear_light(rig.cameras[c], frame.images[c]));
 
   // Index 0: the rig as it is.
   std::vector<std::pair<int, int>> pairs = {{-1, -1}};
-  for (int a = 0; a < static_cast<int>(rig.projectors.size()); ++a) {
-    for (int b = a + 1; b < static_cast<int>(rig.projectors.size()); ++b) {
+  std::vector<int> doubtful(rig.projectors.size());
+  std::iota(doubtful.begin(), doubtful.end(), 0);
+  if (named >= kFew * points) doubtful = projectors_with_few_names(rig, labeling);
+  for (const int a : doubtful) {
+    for (const int b : doubtful) {
       const Projector& one = rig.projector(a);
       const Projector& other = rig.projector(b);
-      if (one.width == other.width && one.height == other.height && one.patterns != other.patterns)
+      if (a < b && one.width == other.width && one.height == other.height &&
+          one.patterns != other.patterns)
         pairs.emplace_back(a, b);
     }
   }
+  if (pairs.size() == 1) return std::nullopt;
+  std::vector<cv::Mat> light;
+  for (const std::size_t c : poor) light.push_back(linear_light(rig.cameras[c], frame.images[c]));
   std::vector<std::vector<double>> shares(pairs.size());
   parallel_for(pairs.size(), [&](std::size_t i) {
     Rig trial_rig = rig;

@@ -49,8 +49,8 @@ struct PictureFinding {
     const Rig& rig, const Frame& frame, const std::vector<GridGraph>& graphs,
     const Labeling& labeling, const PointOptions& options);
 
-/// Finds two projectors that show each other's patterns: the frame has few names, and each of the
-/// cameras with the fewest gets more once these are exchanged. `labeling` as above. Only projectors
+/// Finds two projectors that show each other's patterns: the frame has few names and their lines
+/// next to none, and each of the cameras with the fewest gets more once these are exchanged. `labeling` as above. Only projectors
 /// with panels of one size and different patterns are tried.
 [[nodiscard]] std::optional<std::pair<int, int>> exchanged_projectors(
     const Rig& rig, const Frame& frame, const std::vector<GridGraph>& graphs,
