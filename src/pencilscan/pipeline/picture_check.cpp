@@ -28,11 +28,9 @@ constexpr std::size_t kLeastPoints = 500;
 constexpr double kFewer = 0.75;  // of the others' usual share: a second sign of a wrong picture
 constexpr double kPlainContradiction = 0.25;  // agreement (view_agreement.h)
 
-// Projectors that show each other's patterns, docs/sensors.md. Of all curve points, .60 to .76 have
-// a name then; of right frames .90 and more, .73 and more where a lit floor or many small parts
-// leave curves without one. With the right patterns the poorest cameras have 1.2 times as many
-// named and more; exchanging two that stand right leaves .84 at most.
-constexpr double kPlentyNamed = 0.88;
+// Projectors that show each other's patterns, docs/sensors.md. With the right patterns the poorest
+// cameras have more names, about 1.2 times as many and more; exchanging two that stand right takes
+// names away.
 constexpr double kClearlyMore = 1.1;
 constexpr double kHardly =
     0.25;  // of the projector with most names: exchanged ones have .01 to .05
@@ -158,6 +156,12 @@ class PictureTrial {
   /// named_share() of `light` where camera c stands.
   [[nodiscard]] double named(std::size_t c, const cv::Mat& light) const {
     return named_share(solved(c, light).labeling, c);
+  }
+
+  /// How many points of `light` have a name where camera c stands, and their named_share().
+  [[nodiscard]] std::pair<double, double> named_points(std::size_t c, const cv::Mat& light) const {
+    const Labeling labeling = solved(c, light).labeling;
+    return {static_cast<double>(labelled_points(labeling.runs[c])), named_share(labeling, c)};
   }
 
   /// What `light` measures where camera c stands.
@@ -405,7 +409,7 @@ std::optional<std::pair<int, int>> exchanged_projectors(const Rig& rig, const Fr
     named += weight * named_share(labeling, c);
     points += weight;
   }
-  if (named >= kPlentyNamed * points || poor.empty()) return std::nullopt;
+  if (poor.empty()) return std::nullopt;
   std::sort(poor.begin(), poor.end(), [&](std::size_t a, std::size_t b) {
     return named_share(labeling, a) < named_share(labeling, b);
   });
@@ -428,7 +432,7 @@ std::optional<std::pair<int, int>> exchanged_projectors(const Rig& rig, const Fr
   if (pairs.size() == 1) return std::nullopt;
   std::vector<cv::Mat> light;
   for (const std::size_t c : poor) light.push_back(linear_light(rig.cameras[c], frame.images[c]));
-  std::vector<std::vector<double>> shares(pairs.size());
+  std::vector<std::vector<double>> counts(pairs.size());
   parallel_for(pairs.size(), [&](std::size_t i) {
     Rig trial_rig = rig;
     const auto of = [&](int p) -> Projector& {
@@ -436,8 +440,10 @@ std::optional<std::pair<int, int>> exchanged_projectors(const Rig& rig, const Fr
     };
     if (i > 0) std::swap(of(pairs[i].first).patterns, of(pairs[i].second).patterns);
     const PictureTrial trial(trial_rig, options);
-    for (std::size_t k = 0; k < poor.size(); ++k)
-      shares[i].push_back(trial.named(poor[k], light[k]));
+    for (std::size_t k = 0; k < poor.size(); ++k) {
+      const auto [count, share] = trial.named_points(poor[k], light[k]);
+      counts[i].push_back(share < kFew && i > 0 ? 0 : count);  // chance names some of anything
+    }
   });
   // Exchanging two projectors that stand right takes names from every camera that sees them.
   std::optional<std::pair<int, int>> best;
@@ -446,10 +452,10 @@ std::optional<std::pair<int, int>> exchanged_projectors(const Rig& rig, const Fr
     double sum = 0;
     bool is_right = true;
     for (std::size_t k = 0; k < poor.size(); ++k) {
-      sum += shares[i][k];
-      is_right = is_right && shares[i][k] >= std::max(kFew, shares[0][k]);
+      sum += counts[i][k];
+      is_right = is_right && counts[i][k] > 0 && counts[i][k] >= counts[0][k];
     }
-    const double before = std::accumulate(shares[0].begin(), shares[0].end(), 0.0);
+    const double before = std::accumulate(counts[0].begin(), counts[0].end(), 0.0);
     if (!is_right || sum <= std::max(best_sum, kClearlyMore * before)) continue;
     best = pairs[i];
     best_sum = sum;

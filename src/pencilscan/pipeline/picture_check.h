@@ -49,9 +49,9 @@ struct PictureFinding {
     const Rig& rig, const Frame& frame, const std::vector<GridGraph>& graphs,
     const Labeling& labeling, const PointOptions& options);
 
-/// Finds two projectors that show each other's patterns: the frame has few names and their lines
-/// next to none, and each of the cameras with the fewest gets more once these are exchanged. `labeling` as above. Only projectors
-/// with panels of one size and different patterns are tried.
+/// Finds two projectors that show each other's patterns: their lines have next to no names, and
+/// each of the cameras with the smallest named share gets more once these are exchanged. `labeling`
+/// as above. Only projectors with panels of one size and different patterns are tried.
 [[nodiscard]] std::optional<std::pair<int, int>> exchanged_projectors(
     const Rig& rig, const Frame& frame, const std::vector<GridGraph>& graphs,
     const Labeling& labeling, const PointOptions& options);
