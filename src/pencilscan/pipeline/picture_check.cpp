@@ -419,7 +419,8 @@ std::optional<std::pair<int, int>> exchanged_projectors(const Rig& rig, const Fr
   std::vector<std::pair<int, int>> pairs = {{-1, -1}};
   std::vector<int> doubtful(rig.projectors.size());
   std::iota(doubtful.begin(), doubtful.end(), 0);
-  if (named >= kFew * points) doubtful = projectors_with_few_names(rig, labeling);
+  const bool is_hopeless = named < kFew * points;
+  if (!is_hopeless) doubtful = projectors_with_few_names(rig, labeling);
   for (const int a : doubtful) {
     for (const int b : doubtful) {
       const Projector& one = rig.projector(a);
@@ -442,7 +443,8 @@ std::optional<std::pair<int, int>> exchanged_projectors(const Rig& rig, const Fr
     const PictureTrial trial(trial_rig, options);
     for (std::size_t k = 0; k < poor.size(); ++k) {
       const auto [count, share] = trial.named_points(poor[k], light[k]);
-      counts[i].push_back(share < kFew && i > 0 ? 0 : count);  // chance names some of anything
+      // Where hardly anything is named, chance names a little more with any exchange.
+      counts[i].push_back(share < kFew && i > 0 && is_hopeless ? 0 : count);
     }
   });
   // Exchanging two projectors that stand right takes names from every camera that sees them.
