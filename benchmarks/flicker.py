@@ -61,11 +61,16 @@ def changes(first, second):
     return np.array(found)
 
 
+def root_mean_square(found):
+    """Of changes in sigmas; what is beyond five counts as five."""
+    return float(np.sqrt(np.mean(np.clip(found, -5, 5) ** 2)))
+
+
 if __name__ == "__main__":
     if len(sys.argv) < 4:
         sys.exit(__doc__)
     result, frames = sys.argv[1], sys.argv[2:]
     for one, next_one in zip(frames, frames[1:]):
         moved = changes(read_mesh(f"{result}/{one}/mesh.ply"), read_mesh(f"{result}/{next_one}/mesh.ply"))
-        print(f"{one} to {next_one}: rms {np.sqrt(np.mean(np.clip(moved, -5, 5) ** 2)):.3f} sigma, "
+        print(f"{one} to {next_one}: rms {root_mean_square(moved):.3f} sigma, "
               f"68 % below {np.percentile(np.abs(moved), 68.3):.3f}")

@@ -12,7 +12,6 @@ import json
 import math
 import os
 import shutil
-import signal
 import subprocess
 import sys
 import time
@@ -101,7 +100,7 @@ def sums(folder):
             if p.is_file() and p.name not in FINISHED and not p.relative_to(folder).parts[0].startswith(".")}
 
 
-def killed(args, command, moments):
+def killed(command, moments):
     """Runs a command to its end; before, as often as there are moments, for so many seconds."""
     for seconds in moments:
         started = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
@@ -111,7 +110,6 @@ def killed(args, command, moments):
             common.progress("film: ended before it was killed")
         except subprocess.TimeoutExpired:
             subprocess.run(["pkill", "-KILL", "-s", str(started.pid)])
-            started.send_signal(signal.SIGKILL)
             started.wait()
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
 
@@ -128,10 +126,10 @@ def evaluated(args, program, rig, frame, result):
 
 
 def events(program, result):
-    """What `sequence finish` says has changed, and the frames that it calls odd."""
-    program("sequence", "finish", "--out", result)
-    said = json.loads((result / "sequence.json").read_text())
-    return {"changes": said["events"], "odd": said.get("odd_frames", [])}
+    """What `sequence finish` says has changed, and how many figures of single frames it calls odd."""
+    figures = program("sequence", "finish", "--out", result)
+    changes = json.loads((result / "sequence.json").read_text())["events"]
+    return {"changes": changes, "odd": figures["odd_frames"]}
 
 
 def run(args):
@@ -158,7 +156,7 @@ def run(args):
     command = [str(program.path), "sequence", "submit", "--local", "2", "--rig", str(rig), "--frames",
                str(args.out / "frames"), "--out", str(again), "--no-pictures"]
     moments = [round(float(m), 2) for m in random.uniform(0.02, 0.12, KILLS) * about["seconds"]]
-    killed(args, command, moments)
+    killed(command, moments)
     one, other = sums(whole), sums(again)
     about["killed"] = {"after_seconds": moments, "files": len(one),
                        "differing": sorted(f for f in {*one, *other} if one.get(f) != other.get(f))[:20]}
@@ -181,7 +179,7 @@ def run(args):
         change = None
         if frame + 1 < args.frames:
             two = [ball_alone(flicker.read_mesh(whole / f"{f:06d}/mesh.ply")) for f in (frame, frame + 1)]
-            change = float(np.sqrt(np.mean(np.clip(flicker.changes(*two), -5, 5) ** 2)))
+            change = flicker.root_mean_square(flicker.changes(*two))
         rows.add(frame=frame, alone_seconds=seconds, flicker=change, **{k: film.get(k) for k in FIGURES},
                  **{"alone_" + k: alone.get(k) for k in FIGURES})
     (args.out / "film.json").write_text(json.dumps(about, indent=1) + "\n")

@@ -38,7 +38,7 @@ double share(double part, double whole) { return whole > 0 ? part / whole : kUnk
 CameraRow camera_row(const json& entry) {
   CameraRow row;
   row.labelled_points = figure(entry, "labelled_curve_points");
-  row.labelled_share = share(figure(entry, "labelled_curve_points"), figure(entry, "curve_points"));
+  row.labelled_share = share(row.labelled_points, figure(entry, "curve_points"));
   row.line_width_px = figure(entry, "curve_width_median_px");
   row.line_height = figure(entry, "curve_height_median");
   row.image_level = figure(entry, "image_level");

@@ -18,9 +18,9 @@ struct CameraRow {
   double labelled_points = kUnknownFigure;
   double shift_x_px = kUnknownFigure;  ///< with which its crossings meet best: it was turned
   double shift_y_px = kUnknownFigure;
-  double line_width_px = kUnknownFigure;   ///< standard deviation of the lines' profiles
-  double line_height = kUnknownFigure;     ///< of the lines above their surroundings, linear light
-  double image_level = kUnknownFigure;     ///< mean of its picture, in [0, 1]
+  double line_width_px = kUnknownFigure;  ///< standard deviation of the lines' profiles
+  double line_height = kUnknownFigure;    ///< of the lines above their surroundings, linear light
+  double image_level = kUnknownFigure;    ///< mean of its picture, in [0, 1]
   double saturated_pixels = kUnknownFigure;
   double time_offset_us = kUnknownFigure;
   bool is_late = false;

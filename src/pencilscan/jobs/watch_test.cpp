@@ -94,6 +94,13 @@ class Watch : public ::testing::Test {
     }
   }
   std::vector<SequenceEvent> events() { return watch_sequence(rows_, devices_).events; }
+  void expect_one_moved(const std::string& frame, const std::string& camera) {
+    const auto found = events();
+    ASSERT_THAT(found, SizeIs(1));
+    EXPECT_EQ(found[0].frame, frame);
+    EXPECT_EQ(found[0].device, camera);
+    EXPECT_THAT(found[0].text, HasSubstr("camera " + camera + " moved"));
+  }
   void from(std::size_t first, const std::function<void(FrameRow&)>& change) {
     for (std::size_t k = first; k < kFrames; ++k) change(rows_[k]);
   }
@@ -113,11 +120,7 @@ TEST_F(Watch, ABumpedCameraIsNamed) {
     row.device_crossing_px[1] += 0.4;
     for (const std::size_t p : {3U, 4U, 5U}) row.device_crossing_px[p] += 0.1;
   });
-  const auto found = events();
-  ASSERT_THAT(found, SizeIs(1));
-  EXPECT_EQ(found[0].frame, "120");
-  EXPECT_EQ(found[0].device, "cam1");
-  EXPECT_THAT(found[0].text, HasSubstr("camera cam1 moved"));
+  expect_one_moved("120", "cam1");
 }
 
 TEST_F(Watch, ABumpThatNoiseOfCrossingsHidesShowsAsAShift) {
@@ -134,11 +137,7 @@ TEST_F(Watch, ABumpThatNoiseOfCrossingsHidesShowsAsAShift) {
     row.cameras[2].shift_x_px += 0.5;
     row.device_crossing_px[2] += 0.09;
   });
-  const auto found = events();
-  ASSERT_THAT(found, SizeIs(1));
-  EXPECT_EQ(found[0].frame, "150");
-  EXPECT_EQ(found[0].device, "cam2");
-  EXPECT_THAT(found[0].text, HasSubstr("camera cam2 moved"));
+  expect_one_moved("150", "cam2");
 }
 
 TEST_F(Watch, ASmallerShareOfAsManyLabelsIsNoLoss) {

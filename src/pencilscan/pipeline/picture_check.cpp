@@ -32,8 +32,7 @@ constexpr double kPlainContradiction = 0.25;  // agreement (view_agreement.h)
 // cameras have more names, about 1.2 times as many and more; exchanging two that stand right takes
 // names away.
 constexpr double kClearlyMore = 1.1;
-constexpr double kHardly =
-    0.25;  // of the projector with most names: exchanged ones have .01 to .05
+constexpr double kHardly = 0.25;  // of the projector with most names; exchanged ones have .05
 constexpr std::size_t kTellingCameras = 3;
 
 /// Every eighth row, which tells as much of what a whole picture is; shares the pixels.
@@ -153,13 +152,12 @@ class PictureTrial {
     }
   }
 
-  /// named_share() of `light` where camera c stands.
-  [[nodiscard]] double named(std::size_t c, const cv::Mat& light) const {
-    return named_share(solved(c, light).labeling, c);
-  }
-
-  /// How many points of `light` have a name where camera c stands, and their named_share().
-  [[nodiscard]] std::pair<double, double> named_points(std::size_t c, const cv::Mat& light) const {
+  /// How many points of `light` have a name where camera c stands, and named_share() there.
+  struct Named {
+    double points = 0;
+    double share = 0;
+  };
+  [[nodiscard]] Named named(std::size_t c, const cv::Mat& light) const {
     const Labeling labeling = solved(c, light).labeling;
     return {static_cast<double>(labelled_points(labeling.runs[c])), named_share(labeling, c)};
   }
@@ -332,7 +330,7 @@ std::vector<PictureFinding> misplaced_pictures(const Rig& rig, const Frame& fram
     Suspect& s = suspects[i];
     const Camera& camera = rig.cameras[s.camera];
     s.light = linear_light(camera, frame.images[s.camera]);
-    s.named = trial.named(s.camera, s.light);
+    s.named = trial.named(s.camera, s.light).share;
   });
   const auto consider = [&](Suspect& s, const PictureFinding& finding, double named) {
     if (named <= s.best_named || named < kFarMore * s.named || named < kFarLess * usual) return;
@@ -342,13 +340,13 @@ std::vector<PictureFinding> misplaced_pictures(const Rig& rig, const Frame& fram
   for (Suspect& s : suspects) {
     for (const Remedy& remedy : remedies()) {
       consider(s, {remedy.fault, static_cast<int>(s.camera), -1},
-               trial.named(s.camera, remedy.undo(s.light)));
+               trial.named(s.camera, remedy.undo(s.light)).share);
     }
     for (const Suspect& other : suspects) {
       if (other.camera == s.camera || other.light.size() != s.light.size()) continue;
       consider(
           s, {PictureFault::kExchanged, static_cast<int>(s.camera), static_cast<int>(other.camera)},
-          trial.named(other.camera, s.light));
+          trial.named(other.camera, s.light).share);
     }
   }
   std::vector<PictureFinding> findings;
@@ -398,7 +396,7 @@ std::optional<std::pair<int, int>> exchanged_projectors(const Rig& rig, const Fr
                                                         const std::vector<GridGraph>& graphs,
                                                         const Labeling& labeling,
                                                         const PointOptions& options) {
-  // The cameras with the fewest names tell most.
+  // The cameras with the smallest named shares tell most.
   std::vector<std::size_t> poor;
   double named = 0;
   double points = 0;
@@ -442,14 +440,14 @@ std::optional<std::pair<int, int>> exchanged_projectors(const Rig& rig, const Fr
     if (i > 0) std::swap(of(pairs[i].first).patterns, of(pairs[i].second).patterns);
     const PictureTrial trial(trial_rig, options);
     for (std::size_t k = 0; k < poor.size(); ++k) {
-      const auto [count, share] = trial.named_points(poor[k], light[k]);
+      const PictureTrial::Named alone = trial.named(poor[k], light[k]);
       // Where hardly anything is named, chance names a little more with any exchange.
-      counts[i].push_back(share < kFew && i > 0 && is_hopeless ? 0 : count);
+      counts[i].push_back(i > 0 && is_hopeless && alone.share < kFew ? 0 : alone.points);
     }
   });
   // Exchanging two projectors that stand right takes names from every camera that sees them.
   std::optional<std::pair<int, int>> best;
-  double best_sum = 0;
+  double best_sum = kClearlyMore * std::accumulate(counts[0].begin(), counts[0].end(), 0.0);
   for (std::size_t i = 1; i < pairs.size(); ++i) {
     double sum = 0;
     bool is_right = true;
@@ -457,8 +455,7 @@ std::optional<std::pair<int, int>> exchanged_projectors(const Rig& rig, const Fr
       sum += counts[i][k];
       is_right = is_right && counts[i][k] > 0 && counts[i][k] >= counts[0][k];
     }
-    const double before = std::accumulate(counts[0].begin(), counts[0].end(), 0.0);
-    if (!is_right || sum <= std::max(best_sum, kClearlyMore * before)) continue;
+    if (!is_right || sum <= best_sum) continue;
     best = pairs[i];
     best_sum = sum;
   }
