@@ -5,6 +5,7 @@
 #include <cerrno>
 #include <cmath>
 #include <new>
+#include <numbers>
 #include <numeric>
 #include <stdexcept>
 #include <string>
@@ -155,6 +156,20 @@ TEST(Lanes, ExponentialIsThatOfTheLibrary) {
     exponential(in, out);
     const double expected = std::exp(static_cast<double>(x));
     EXPECT_NEAR(out[kLanes - 1] / expected, 1, kTolerance) << "x = " << x;
+  }
+}
+
+TEST(Lanes, CosineAndSineOfTurnsAreThoseOfTheLibrary) {
+  constexpr double kTolerance = 5e-7;
+  for (int k = -400; k <= 400; ++k) {
+    const auto x = static_cast<float>(0.017 * k);
+    Lanes in{};
+    in += x;
+    Lanes cosine, sine;
+    cosine_and_sine(in, cosine, sine);
+    const double angle = 2 * std::numbers::pi * static_cast<double>(x);
+    EXPECT_NEAR(cosine[kLanes - 1], std::cos(angle), kTolerance) << "x = " << x;
+    EXPECT_NEAR(sine[kLanes - 1], std::sin(angle), kTolerance) << "x = " << x;
   }
 }
 

@@ -26,12 +26,10 @@ struct NodeLines {
 
 /// Measures the blur of lines that lines_at_nodes() gave, at least of whole windows. The light of a
 /// window is that of window_fit.h on the surface that the node has, but its lines are blurred by a
-/// Gaussian: a box of half-width h, period 1 and deviation s (all in lines) is the series
-///   P(l) = 2 h + sum_j 2 sin(2 pi j h) / (pi j) exp(-2 pi^2 j^2 s^2) cos(2 pi j l),
-/// whose slopes in l and in s^2 are series of the same terms. One step of Gauss-Newton starts from
-/// the variance that the lines have; the blur of each pattern is unknown in it beside surface,
-/// amplitudes, offset and slopes of the light. `half`: radius of a window, px. What cannot be
-/// measured keeps an infinite deviation.
+/// Gaussian (render_gaussian_lines()). One step of Gauss-Newton starts from the variance that the
+/// lines have; the blur of each pattern is unknown in it beside surface, amplitudes, offset and
+/// slopes of the light. `half`: radius of a window, px. What cannot be measured keeps an infinite
+/// deviation.
 void measure_blurs(const CameraLight& light, const DepthMap& map, int half,
                    std::span<NodeLines> lines);
 

@@ -170,5 +170,43 @@ TEST(WindowSums, AreThoseOfLoopsInDouble) {
   }
 }
 
+// The series against the integral of a Gaussian over the boxes, and its slopes against differences.
+TEST(WindowSums, GaussianLinesAreBoxesUnderAGaussian) {
+  const WindowGrid grid(5);
+  const WindowLineShape lines{{0.3F, 0.9F, 0.4F, 0.7F}, {1, 0.02F, -0.01F, 0.03F}, 0.18F, 0};
+  std::vector<float> w(grid.padded);
+  for (std::size_t i = 0; i < w.size(); ++i) w[i] = 1 + 0.1F * grid.monomial(1)[i];
+  const auto coordinate = [&](std::size_t i, double at_w) {
+    const double x = grid.monomial(1)[i], y = grid.monomial(2)[i];
+    return (lines.n[0] + lines.n[1] * x + lines.n[2] * y + lines.n[3] * at_w) /
+           (lines.d[0] + lines.d[1] * x + lines.d[2] * y + lines.d[3] * at_w);
+  };
+  const auto profile_of = [&](double line, double variance) {
+    const double s = std::sqrt(2 * variance);
+    double sum = 0;
+    for (int n = -4; n <= 4; ++n) {
+      const double o = line - std::round(line) - n;
+      sum += 0.5 * (std::erf((o + lines.half_width) / s) - std::erf((o - lines.half_width) / s));
+    }
+    return sum;
+  };
+  for (const double variance : {0.001, 0.01, 0.1}) {
+    std::vector<float> profile(grid.padded), slope(grid.padded), widening(grid.padded);
+    render_gaussian_lines(grid, lines, static_cast<float>(variance), w.data(), profile.data(),
+                          slope.data(), widening.data());
+    for (std::size_t i = 0; i < static_cast<std::size_t>(grid.count); ++i) {
+      const double at = w[i], l = coordinate(i, at), step = 1e-3 * variance, dw = 1e-4;
+      EXPECT_NEAR(profile[i], profile_of(l, variance), 2e-4);
+      const double per_w = (profile_of(coordinate(i, at + dw), variance) -
+                            profile_of(coordinate(i, at - dw), variance)) /
+                           (2 * dw);
+      EXPECT_NEAR(slope[i], per_w, 5e-3 / std::sqrt(variance));
+      const double per_variance =
+          (profile_of(l, variance + step) - profile_of(l, variance - step)) / (2 * step);
+      EXPECT_NEAR(widening[i], per_variance, 5e-3 / variance);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace pencilscan

@@ -33,7 +33,8 @@ constexpr float kLeastAmplitude = 0.003F;
 
 }  // namespace
 
-WindowFitter::WindowFitter(const CameraLight& light, int half) : light_(&light), grid_(half) {
+WindowFitter::WindowFitter(const CameraLight& light, int half)
+    : light_(&light), grid_(half), of_family_(grid_, light.patterns.size()) {
   const std::size_t padded = grid_.padded;
   const float* x = grid_.monomial(1);
   const float* y = grid_.monomial(2);
@@ -60,9 +61,6 @@ WindowFitter::WindowFitter(const CameraLight& light, int half) : light_(&light),
   }
   profile_.assign(patterns, valid_);
   slope_ = profile_;
-  columns_.values.resize((patterns + 6) * padded);
-  surface_sums_.of_amplitudes.resize(8 * patterns);
-  gram_.resize((patterns + 4) * (patterns + 4));
 }
 
 bool WindowFitter::gather(int u, int v) {
@@ -194,10 +192,8 @@ void WindowFitter::solve_amplitudes(std::size_t family) {
   }
   // Without light, the residual is the image.
   collect(family);
-  make_columns(grid_, seen.light, seen.image.data(), seen.root.data(), 1, columns_);
-  const int all = static_cast<int>(mine.size()) + 4;
-  const int image = all - 1;
-  gram(columns_.values.data(), static_cast<int>(grid_.padded), all, gram_.data());
+  of_family_.sum(seen.light, seen.image.data(), seen.root.data(), 1);
+  const int image = FamilyColumns::residual(static_cast<int>(mine.size()));
   for (int k = 0; k <= static_cast<int>(mine.size()); ++k) columns.push_back(k);
   using Dense = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic>;
   thread_local Dense A;
@@ -207,8 +203,7 @@ void WindowFitter::solve_amplitudes(std::size_t family) {
     A.resize(n, n);
     amplitudes.resize(n);
     const auto product = [&](Eigen::Index i, int j) {
-      return static_cast<double>(
-          gram_[static_cast<std::size_t>(columns[static_cast<std::size_t>(i)] * all + j)]);
+      return of_family_.product(columns[static_cast<std::size_t>(i)], j);
     };
     for (Eigen::Index i = 0; i < n; ++i) {
       for (Eigen::Index j = 0; j < n; ++j)
@@ -232,51 +227,15 @@ void WindowFitter::solve_amplitudes(std::size_t family) {
 
 void WindowFitter::add_family(std::size_t family, float unit) {
   Seen& seen = seen_[family];
-  const int patterns = seen.light.patterns;
-  const int residual = FamilyColumns::residual(patterns);
-  const int all = residual + 1;
-  make_columns(grid_, seen.light, seen.image.data(), seen.root.data(), unit, columns_);
-  gram(columns_.values.data(), static_cast<int>(grid_.padded), all, gram_.data());
-  const auto iv = static_cast<double>(seen.inverse_variance);
-  const auto product = [&](int i, int j) {
-    return static_cast<double>(gram_[static_cast<std::size_t>(i * all + j)]);
-  };
-  const double rss = product(residual, residual);
+  of_family_.sum(seen.light, seen.image.data(), seen.root.data(), unit);
+  const int residual = FamilyColumns::residual(seen.light.patterns);
+  const double rss = of_family_.product(residual, residual);
+  const auto certainty = static_cast<double>(seen.inverse_variance);
   seen.variance = static_cast<float>(rss) / std::max(seen.weight_sum, 1e-6F);
-  chi2_ += rss * iv;
+  chi2_ += rss * certainty;
   degrees_ += static_cast<double>(seen.weight_sum);
-  if (patterns == 0) return;  // no line of this family: it says nothing of depth
-  sum_surface(grid_, patterns, columns_, surface_sums_);
-  const SurfaceSums& sums = surface_sums_;
-  // Of the products of two of the monomials 1, x, y, xx, xy, yy: their place among all.
-  constexpr int kProduct[6][6] = {{0, 1, 2, 3, 4, 5},    {1, 3, 4, 6, 7, 8},
-                                  {2, 4, 5, 7, 8, 9},    {3, 6, 7, 10, 11, 12},
-                                  {4, 7, 8, 11, 12, 13}, {5, 8, 9, 12, 13, 14}};
-  WindowEquations::Family& equations = equations_.family(family);
-  WindowEquations::resize(patterns + 3, equations);
-  for (int i = 0; i < 6; ++i) {
-    for (int j = 0; j < 6; ++j)
-      equations_.surface[i][j] += iv * static_cast<double>(sums.of_depth[kProduct[i][j]]);
-    equations_.surface[i][6] += iv * static_cast<double>(sums.of_residual[i]);
-  }
-  for (int i = 0; i < patterns + 3; ++i) {
-    for (int j = 0; j <= i; ++j) equations.a(i, j) = iv * product(i, j);
-    WindowEquations::Row& row = equations.B[static_cast<std::size_t>(i)];
-    row = WindowEquations::Row{};
-    for (int c = 0; c < 6; ++c) {
-      // e_x and e_y: the products with x and y times the summed light.
-      const float value = i < patterns    ? sums.of_amplitudes[static_cast<std::size_t>(i * 8 + c)]
-                          : i == patterns ? sums.of_offset[c]
-                                          : sums.of_slopes[kProduct[i - patterns][c] - 1];
-      row[c] = iv * static_cast<double>(value);
-    }
-    row[6] = iv * product(i, residual);
-  }
-  for (int i = patterns + 1; i < patterns + 3; ++i) {
-    const float e = i == patterns + 1 ? seen.light.ex : seen.light.ey;
-    equations.a(i, i) += kTiltPrecision;
-    equations.B[static_cast<std::size_t>(i)][6] -= kTiltPrecision * static_cast<double>(e);
-  }
+  // Without lines of a family, it says nothing of depth.
+  if (seen.light.patterns > 0) of_family_.add(seen.light, certainty, family, equations_);
 }
 
 bool WindowFitter::evaluate(const Quadric& q) {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "pencilscan/depth/depth_map.h"
+#include "pencilscan/depth/family_equations.h"
 #include "pencilscan/depth/pattern_view.h"
 #include "pencilscan/depth/window_equations.h"
 #include "pencilscan/depth/window_sums.h"
@@ -49,9 +50,6 @@ struct WindowFit {
   float lines_per_w = 0;        ///< largest |dl / dw| of a lit pattern
 };
 
-/// Of the prior on the slope of albedo over a window, e_f below: 0.3, as 1 / variance.
-constexpr double kTiltPrecision = 11;
-
 /// Fits inverse depth to the image of a circular window by Gauss-Newton. The image of family f is
 ///   I_f = o_f + (1 + e_f . (x, y)) * sum over its lit patterns k of A_k P(l_k(dx, dy, w)),
 /// P: box of the line's width blurred by a bell of standard deviation s_k (lines), to which camera
@@ -63,6 +61,8 @@ class WindowFitter {
  public:
   /// half: radius, px, in [2, 10].
   WindowFitter(const CameraLight& light, int half);
+  WindowFitter(const WindowFitter&) = delete;  // its equations point to its grid
+  WindowFitter& operator=(const WindowFitter&) = delete;
 
   /// Nothing where the window leaves the image, is saturated or shows no line that fits. It rests
   /// as soon as the middle's depth does: slopes may be a hundredth of a line over the window off
@@ -124,9 +124,7 @@ class WindowFitter {
   std::vector<Seen> seen_;  ///< per family
   std::vector<Lit> lit_;
   std::vector<std::vector<float>> profile_, slope_;  ///< per lit: P, dP/dw
-  FamilyColumns columns_;
-  SurfaceSums surface_sums_;
-  std::vector<float> gram_;
+  FamilyEquations of_family_;
   WindowEquations equations_;
   double chi2_ = 0, degrees_ = 0;                                   ///< of the last equations
   std::array<float, kSides + 1> light_seen_{}, light_predicted_{};  ///< per part

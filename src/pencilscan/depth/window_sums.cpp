@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "pencilscan/core/lanes.h"
 
@@ -195,6 +196,69 @@ PENCILSCAN_CLONES void render_lines(const WindowGrid& grid, const WindowLineShap
     density = a < 0 ? -density : density;
     store(density * (lines.n[3] - line * lines.d[3]) * inverse, slope + i);
   }
+}
+
+namespace {
+
+/// Terms of the series of a blurred box: their heights, times 1, j and j^2.
+struct BoxSeries {
+  static constexpr int kMostTerms = 256;
+  int terms = 0;
+  float height[kMostTerms], of_slope[kMostTerms], of_widening[kMostTerms];
+
+  BoxSeries(double half_width, double variance) {
+    constexpr double kLeastHarmonic = 1e-3;  // of attenuation
+    constexpr double kTurn = 2 * std::numbers::pi;
+    const double rate = 0.5 * kTurn * kTurn;
+    for (int j = 1; j <= kMostTerms; ++j) {
+      const double attenuation = std::exp(-rate * j * j * variance);
+      if (attenuation < kLeastHarmonic) break;
+      const double h = 2 * std::sin(kTurn * j * half_width) / (std::numbers::pi * j) * attenuation;
+      height[terms] = static_cast<float>(h);
+      of_slope[terms] = static_cast<float>(-h * kTurn * j);
+      of_widening[terms] = static_cast<float>(-h * rate * j * j);
+      ++terms;
+    }
+  }
+};
+
+/// Sums of the series at each pixel.
+PENCILSCAN_CLONES void sum_series(const WindowGrid& grid, const WindowLineShape& lines,
+                                  const BoxSeries& series, const float* w, float* profile,
+                                  float* slope, float* widening) {
+  const float* x = grid.monomial(1);
+  const float* y = grid.monomial(2);
+  for (std::size_t i = 0; i < grid.padded; i += kLanes) {
+    Lanes px, py, pw;
+    load(x + i, px);
+    load(y + i, py);
+    load(w + i, pw);
+    const Lanes inverse = 1.F / (lines.d[0] + lines.d[1] * px + lines.d[2] * py + lines.d[3] * pw);
+    const Lanes line = (lines.n[0] + lines.n[1] * px + lines.n[2] * py + lines.n[3] * pw) * inverse;
+    Lanes c1, s1, sum, per_line = {}, per_variance = {};
+    cosine_and_sine(line, c1, s1);
+    fill(2 * lines.half_width, sum);
+    Lanes c = c1, s = s1;
+    for (int j = 0; j < series.terms; ++j) {
+      sum += series.height[j] * c;
+      per_line += series.of_slope[j] * s;
+      per_variance += series.of_widening[j] * c;
+      const Lanes next = c * c1 - s * s1;
+      s = s * c1 + c * s1;
+      c = next;
+    }
+    store(sum, profile + i);
+    store(per_line * (lines.n[3] - line * lines.d[3]) * inverse, slope + i);
+    store(per_variance, widening + i);
+  }
+}
+
+}  // namespace
+
+void render_gaussian_lines(const WindowGrid& grid, const WindowLineShape& lines, float variance,
+                           const float* w, float* profile, float* slope, float* widening) {
+  const BoxSeries series(static_cast<double>(lines.half_width), static_cast<double>(variance));
+  sum_series(grid, lines, series, w, profile, slope, widening);
 }
 
 PENCILSCAN_CLONES void make_columns(const WindowGrid& grid, const FamilyLight& light,

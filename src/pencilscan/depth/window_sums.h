@@ -41,6 +41,13 @@ struct WindowLineShape {
 void render_lines(const WindowGrid& grid, const WindowLineShape& lines, const float* w,
                   float* profile, float* slope);
 
+/// The same lines blurred by a Gaussian instead: a box of half-width h, period 1 and deviation s is
+///   P(l) = 2 h + sum_j 2 sin(2 pi j h) / (pi j) exp(-2 pi^2 j^2 s^2) cos(2 pi j l),
+/// whose slopes in l and in s^2 are series of the same terms. `variance`: s^2, lines^2, more than
+/// 0. Profile P, its slope dP / dw and dP / d(s^2) at each pixel. `inverse_reach` is not used.
+void render_gaussian_lines(const WindowGrid& grid, const WindowLineShape& lines, float variance,
+                           const float* w, float* profile, float* slope, float* widening);
+
 /// The light of one family over a window as window_fit.h defines it.
 struct FamilyLight {
   int patterns = 0;
