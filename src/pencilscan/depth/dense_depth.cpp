@@ -165,23 +165,24 @@ void measure_light(const Rig& rig, int camera, const std::vector<ColorFamily>& f
   // Pilot windows at evenly picked curve points.
   constexpr std::size_t kPilots = 100;
   const CurveSeeds seeds(*light.camera, camera, points);
-  std::vector<Vec2> pixels;
+  std::vector<std::pair<Vec2, Quadric>> pilots;  // with their starts
   std::size_t own = 0;
   for (const MeasuredPoint& p : points) own += p.camera == camera ? 1 : 0;
   const std::size_t step = std::max<std::size_t>(1, own / kPilots);
   std::size_t i = 0;
   for (const MeasuredPoint& p : points) {
     if (p.camera != camera) continue;
-    if (i++ % step == 0) pixels.emplace_back(std::round(p.u), std::round(p.v));
+    if (i++ % step != 0) continue;
+    const Vec2 pixel(std::round(p.u), std::round(p.v));
+    const auto planes = seeds.planes(pixel, options.seed_radius_px, options.half);
+    if (!planes.empty()) pilots.emplace_back(pixel, planes[0]);
   }
   /// take(fit, fitter) for each pilot window that fits.
   const auto run = [&](float blur, auto take) {
     light.blur_px = blur;
     WindowFitter fitter(light, options.half);
-    for (const Vec2& pixel : pixels) {
-      const auto planes = seeds.planes(pixel, options.seed_radius_px, options.half);
-      if (planes.empty()) continue;
-      if (const auto fit = fitter.fit(pixel, planes[0], 5)) take(*fit, fitter);
+    for (const auto& [pixel, start] : pilots) {
+      if (const auto fit = fitter.fit(pixel, start, 5)) take(*fit, fitter);
     }
   };
   const auto median_misfit = [&](float blur) {
