@@ -17,6 +17,9 @@ struct ColorDisplacement {
   [[nodiscard]] bool none() const { return shift_px.isZero(0) && scale == 1; }
 };
 
+/// Of the colours in files, in order.
+constexpr std::array<const char*, 3> kColorNames{"red", "green", "blue"};
+
 /// Of one device: red, green, blue light of the projectors ("color_registration" of rig.json).
 struct ColorRegistration {
   std::array<ColorDisplacement, 3> colors;

@@ -12,7 +12,7 @@
 namespace pencilscan {
 namespace {
 
-using LitProjectors = std::bitset<256>;  // a rig has no more: rig_json.cpp
+using LitProjectors = std::bitset<256>;  // a rig has no more: rig_reading.cpp
 
 /// What a camera could have measured at a place of the closed mesh.
 class Visibility {

@@ -1,0 +1,102 @@
+#include <gtest/gtest.h>
+
+#include "pencilscan/surface/node_surface.h"
+#include "pencilscan/surface/sample_ball.h"
+#include "pencilscan/surface/untangle.h"
+
+namespace pencilscan {
+namespace {
+
+using sample::ball_maps;
+using sample::ball_points;
+using sample::ball_rig;
+using sample::expect_watertight;
+using sample::hit_ball;
+using sample::kRadius;
+using sample::share_beyond;
+using sample::worst_deviation;
+
+/// Closed and followed, without guided depth in between.
+SurfaceResult surface_of(const Rig& rig, std::span<const MeasuredPoint> points,
+                         std::span<const DepthMap> maps, const FusionOptions& options = {}) {
+  SurfaceResult result = close_depth(rig, maps, options);
+  follow_depth(rig, maps, options, result);
+  finish_surface(rig, points, maps, options, result);
+  return result;
+}
+
+TEST(FuseDepth, BallIsClosedAndAccurate) {
+  const Rig rig = ball_rig();
+  const std::vector<MeasuredPoint> points = ball_points(rig);
+  FusionOptions options;
+  options.cell_spacings = 2;  // the ball needs no finer cells
+  const SurfaceResult result = surface_of(rig, points, ball_maps(rig), options);
+  expect_watertight(result);
+  EXPECT_LT(worst_deviation(result.mesh), 0.3);  // three sigma of the noise
+  EXPECT_LT(share_beyond(result.mesh, 0.1), 0.1);
+  EXPECT_GT(result.report.measured_share, 0.97);
+  EXPECT_TRUE(self_intersections(result.mesh).empty());
+  EXPECT_GT(result.report.points_used, points.size() * 9 / 10);
+}
+
+TEST(FollowNodes, VerticesReachACurvedSurface) {
+  const Rig rig = ball_rig();
+  TriangleMesh mesh = make_sphere(kRadius + 0.5, 24);
+  follow_nodes(rig, ball_maps(rig, 0), {}, mesh);
+  // What is left is the third order of a ball over two nodes; a mean of positions would leave 0.04.
+  for (const Vec3& v : mesh.vertices) EXPECT_NEAR(v.norm(), kRadius, 0.02);
+}
+
+TEST(FollowNodes, SlippedNodesDoNotPull) {
+  const Rig rig = ball_rig();
+  std::vector<DepthMap> maps = ball_maps(rig, 0);
+  Random random(7);
+  for (DepthMap& map : maps) {
+    for (DepthNode& node : map.nodes) {
+      if (node.measured() && random.uniform() < 0.1) node.w = 1 / (1 / node.w - 0.9F);
+    }
+  }
+  TriangleMesh mesh = make_sphere(kRadius + 0.2, 24);
+  follow_nodes(rig, maps, {}, mesh);
+  double sum = 0;
+  for (const Vec3& v : mesh.vertices) sum += std::abs(v.norm() - kRadius);
+  // A plain mean would be off by a tenth of the slip.
+  EXPECT_LT(sum / static_cast<double>(mesh.vertices.size()), 0.03);
+}
+
+TEST(FollowNodes, NoStepWhereDepthEnds) {
+  const Rig rig = ball_rig();
+  std::vector<DepthMap> maps = ball_maps(rig, 0);
+  for (DepthMap& map : maps) {
+    const Camera& camera = rig.cameras[static_cast<std::size_t>(map.camera)];
+    for (std::size_t i = 0; i < map.nodes.size(); ++i) {
+      const auto x = hit_ball(camera.ray(map.pixel(i)));
+      if (x && x->x() < 0) map.nodes[i] = DepthNode{};
+    }
+  }
+  constexpr double kOff = 0.4;
+  TriangleMesh mesh = make_sphere(kRadius + kOff, 48);
+  follow_nodes(rig, maps, {}, mesh);
+  for (const auto& face : mesh.faces) {
+    const double a = mesh.vertices[static_cast<std::size_t>(face[0])].norm();
+    const double b = mesh.vertices[static_cast<std::size_t>(face[1])].norm();
+    EXPECT_LT(std::abs(a - b), 0.5 * kOff);
+  }
+  // It did follow where depth is, and stayed where none is near.
+  const auto [nearest, farthest] =
+      std::minmax_element(mesh.vertices.begin(), mesh.vertices.end(),
+                          [](const Vec3& a, const Vec3& b) { return a.norm() < b.norm(); });
+  EXPECT_NEAR(nearest->norm(), kRadius, 0.1 * kOff);
+  EXPECT_GT(farthest->norm(), kRadius + 0.5 * kOff);
+}
+
+TEST(FuseDepth, TooFewDepthsIsAStatus) {
+  const Rig rig = ball_rig();
+  std::vector<DepthMap> maps = ball_maps(rig);
+  for (DepthMap& map : maps) map.nodes.assign(map.nodes.size(), DepthNode{});
+  const SurfaceResult result = surface_of(rig, ball_points(rig), maps);
+  EXPECT_EQ(result.report.status, SurfaceStatus::kTooFewPoints);
+}
+
+}  // namespace
+}  // namespace pencilscan
