@@ -84,8 +84,4 @@ struct CalibrationResult {
                                           const CalibrateOptions& options = {},
                                           const Progress& progress = {});
 
-/// Errors of all views of a track but the hub at the point that fits them best.
-[[nodiscard]] std::vector<double> track_errors(const BundleProblem& problem, const Track& track,
-                                               const Vec3& point);
-
 }  // namespace pencilscan

@@ -1,7 +1,5 @@
 #include "pencilscan/capture/aravis_cameras.h"
 
-#include <arv.h>
-
 #include <algorithm>
 #include <array>
 #include <atomic>
@@ -11,6 +9,7 @@
 #include <mutex>
 #include <utility>
 
+#include "pencilscan/capture/aravis_features.h"
 #include "pencilscan/capture/sensor_pixels.h"
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/host_clock.h"
@@ -22,136 +21,6 @@ bool has_aravis() { return true; }
 namespace {
 
 constexpr int kBuffers = 16;  ///< pictures that may wait for us: 1.6 s at 10 a second
-
-struct Unref {
-  void operator()(void* object) const { g_object_unref(object); }
-};
-
-/// Collects an error of Aravis.
-class Failure {
- public:
-  Failure() = default;
-  ~Failure() { g_clear_error(&error_); }
-  Failure(const Failure&) = delete;
-  Failure& operator=(const Failure&) = delete;
-  GError** out() {
-    g_clear_error(&error_);
-    return &error_;
-  }
-  [[nodiscard]] bool failed() const { return error_ != nullptr; }
-  [[nodiscard]] std::string text() const { return failed() ? error_->message : ""; }
-  /// The camera did not answer at all.
-  [[nodiscard]] bool silent() const {
-    return g_error_matches(error_, ARV_DEVICE_ERROR, ARV_DEVICE_ERROR_TIMEOUT) != 0 ||
-           g_error_matches(error_, ARV_DEVICE_ERROR, ARV_DEVICE_ERROR_NOT_CONNECTED) != 0;
-  }
-
- private:
-  GError* error_ = nullptr;
-};
-
-std::string text_of(const char* text) { return text == nullptr ? "" : text; }
-
-/// Whatever we may set, in the order in which it may be set back: switches before values, what
-/// limits others before these. Names of the standard (SFNC) and older ones.
-constexpr std::array kFeatures{"PixelFormat",
-                               "OffsetX",
-                               "OffsetY",
-                               "Width",
-                               "Height",
-                               "OffsetX",
-                               "OffsetY",
-                               "ExposureAuto",
-                               "ExposureMode",
-                               "GainAuto",
-                               "BalanceWhiteAuto",
-                               "GammaEnable",
-                               "Gamma",
-                               "AcquisitionMode",
-                               "AcquisitionFrameRateEnable",
-                               "AcquisitionFrameRate",
-                               "AcquisitionFrameRateAbs",
-                               "ExposureTime",
-                               "ExposureTimeAbs",
-                               "ExposureTimeRaw",
-                               "Gain",
-                               "GainRaw",
-                               "PtpEnable",
-                               "GevIEEE1588",
-                               "GevSCPSPacketSize"};
-
-/// A camera's features as they were found, put back at the end.
-class FeatureKeeper {
- public:
-  explicit FeatureKeeper(ArvDevice* device) : device_(device) {
-    for (const char* name : kFeatures)
-      if (const auto value = read(name)) found_.emplace_back(name, *value);
-    selector_ = read("TriggerSelector");
-    for (const std::string& trigger : triggers()) {
-      write("TriggerSelector", trigger);
-      for (const char* name : {"TriggerMode", "TriggerSource", "TriggerActivation"})
-        if (const auto value = read(name)) triggers_.push_back({trigger, name, *value});
-    }
-    if (selector_) write("TriggerSelector", *selector_);
-  }
-  ~FeatureKeeper() {
-    for (const auto& [name, value] : found_)
-      if (read(name) != value) write(name, value);
-    for (const TriggerValue& entry : triggers_) {
-      write("TriggerSelector", entry.trigger);
-      if (read(entry.name) != entry.value) write(entry.name, entry.value);
-    }
-    if (selector_) write("TriggerSelector", *selector_);
-  }
-  FeatureKeeper(const FeatureKeeper&) = delete;
-  FeatureKeeper& operator=(const FeatureKeeper&) = delete;
-
- private:
-  struct TriggerValue {
-    std::string trigger;
-    std::string name;
-    std::string value;
-  };
-
-  [[nodiscard]] ArvGcFeatureNode* node(const std::string& name) const {
-    ArvGcNode* found = arv_device_get_feature(device_, name.c_str());
-    return ARV_IS_GC_FEATURE_NODE(found) ? ARV_GC_FEATURE_NODE(found) : nullptr;
-  }
-  [[nodiscard]] std::optional<std::string> read(const std::string& name) const {
-    ArvGcFeatureNode* feature = gone_ ? nullptr : node(name);
-    Failure failure;
-    if (feature == nullptr || arv_gc_feature_node_is_available(feature, failure.out()) == 0 ||
-        failure.failed())
-      return std::nullopt;
-    const char* value = arv_gc_feature_node_get_value_as_string(feature, failure.out());
-    gone_ = failure.silent();
-    if (failure.failed() || value == nullptr) return std::nullopt;
-    return value;
-  }
-  void write(const std::string& name, const std::string& value) const {
-    ArvGcFeatureNode* feature = gone_ ? nullptr : node(name);
-    Failure failure;
-    if (feature == nullptr) return;
-    arv_gc_feature_node_set_value_from_string(feature, value.c_str(), failure.out());
-    gone_ = failure.silent();
-  }
-  [[nodiscard]] std::vector<std::string> triggers() const {
-    guint count = 0;
-    Failure failure;
-    const char** names = arv_device_dup_available_enumeration_feature_values_as_strings(
-        device_, "TriggerSelector", &count, failure.out());
-    std::vector<std::string> result;
-    for (guint i = 0; names != nullptr && i < count; ++i) result.emplace_back(names[i]);
-    g_free(names);
-    return result;
-  }
-
-  ArvDevice* device_;
-  mutable bool gone_ = false;  ///< asking for every feature in turn would take minutes
-  std::vector<std::pair<std::string, std::string>> found_;
-  std::vector<TriggerValue> triggers_;
-  std::optional<std::string> selector_;
-};
 
 class AravisCamera final : public CameraDevice {
  public:

@@ -19,6 +19,8 @@ struct Device {
   RigidTransform device_from_world;
 
   [[nodiscard]] bool has_distortion() const { return !distortion.is_none(); }
+  /// Focal length, the mean of both directions: at depth z a pixel covers z / focal_px().
+  [[nodiscard]] double focal_px() const { return 0.5 * (K(0, 0) + K(1, 1)); }
   [[nodiscard]] Vec3 center() const;  ///< in world, mm
   [[nodiscard]] Vec3 forward() const { return device_from_world.rotation.row(2).transpose(); }
   /// Pixel of a world point; nothing when the point is not in front of the device.

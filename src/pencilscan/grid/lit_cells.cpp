@@ -42,8 +42,8 @@ LitCells lit_cells(const Rig& rig, int camera, std::span<const Curve> curves,
   if (curves.empty() || presence.empty()) return cells;
   const Camera& device = rig.camera(camera);
   const double distance = (device.center() - working_volume(rig).center).norm();
-  const double cell_px = std::max(1.0, kCellSpacings * line_spacing(rig) *
-                                           std::sqrt(device.K(0, 0) * device.K(1, 1)) / distance);
+  const double cell_px =
+      std::max(1.0, kCellSpacings * line_spacing(rig) * device.focal_px() / distance);
   const cv::Size image = presence.front().size();
   const cv::Size size(std::max(1, static_cast<int>(std::lround(image.width / cell_px))),
                       std::max(1, static_cast<int>(std::lround(image.height / cell_px))));

@@ -199,25 +199,36 @@ SequenceEvent bump(std::span<const FrameRow> rows, const SequenceDevices& device
   return event;
 }
 
-/// Whether what is watched beside a figure changed with it, from the frames before to those after.
-bool is_confirmed(std::span<const FrameRow> rows, const Series& series, const Change& change) {
+constexpr std::size_t kFramesOfChange = 3;  // as find_changes() asks for
+
+/// Median over the known ones of `count` frames, from `first` on.
+template <class Row>
+double median_of_done(Row first, Row last, std::size_t count, const Reading& reading) {
+  std::vector<double> values;
+  for (; first != last && values.size() < count; ++first) {
+    const double value =
+        first->status.state == FrameState::kDone ? reading(*first) : kUnknownFigure;
+    if (std::isfinite(value)) values.push_back(value);
+  }
+  return values.empty() ? kUnknownFigure : upper_median(std::move(values));
+}
+
+/// Whether what is watched beside a figure rose or fell with it at row `at`: from the frames before
+/// to so many from there on.
+bool is_confirmed(std::span<const FrameRow> rows, const Series& series, std::size_t at,
+                  std::size_t frames_after) {
   if (!series.beside) return true;
-  constexpr std::size_t kFrames = 3;  // as find_changes() asks for
-  const auto median_of = [&](auto first, auto last) {
-    std::vector<double> values;
-    for (auto row = first; row != last && values.size() < kFrames; ++row) {
-      const double value =
-          row->status.state == FrameState::kDone ? finite_log(series.beside(*row)) : kUnknownFigure;
-      if (std::isfinite(value)) values.push_back(value);
-    }
-    return values.empty() ? kUnknownFigure : upper_median(std::move(values));
+  const auto here = rows.begin() + static_cast<std::ptrdiff_t>(at);
+  const auto from_to = [&](const Reading& reading) {
+    return std::pair(
+        median_of_done(std::make_reverse_iterator(here), rows.rend(), kFramesOfChange, reading),
+        median_of_done(here, rows.end(), frames_after, reading));
   };
-  const auto at = rows.begin() + static_cast<std::ptrdiff_t>(change.at);
-  const double before = median_of(std::make_reverse_iterator(at), rows.rend());
-  const double after = median_of(at, rows.end());
+  const auto [before, after] =
+      from_to([&](const FrameRow& row) { return finite_log(series.beside(row)); });
   if (!std::isfinite(before) || !std::isfinite(after)) return true;
-  return (after > before) == (change.after > change.before) &&
-         std::abs(after - before) > series.smallest;
+  const auto [own_before, own_after] = from_to(series.value);
+  return (after > before) == (own_after > own_before) && std::abs(after - before) > series.smallest;
 }
 
 std::vector<Found> find_all(std::span<const FrameRow> rows, const SequenceDevices& devices,
@@ -232,7 +243,7 @@ std::vector<Found> find_all(std::span<const FrameRow> rows, const SequenceDevice
     }
     ChangeReport changes = find_changes(values, {series.smallest, all.size() * rows.size()});
     for (Change& change : changes.changes) {
-      if (!is_confirmed(rows, series, change)) continue;
+      if (!is_confirmed(rows, series, change.at, kFramesOfChange)) continue;
       if (series.is_ratio) {
         change.before = std::exp(change.before);
         change.after = std::exp(change.after);
@@ -241,6 +252,7 @@ std::vector<Found> find_all(std::span<const FrameRow> rows, const SequenceDevice
     }
     for (const std::size_t at : changes.outliers) {
       const double value = series.value(rows[at]);
+      if (!is_confirmed(rows, series, at, 1)) continue;
       report.odd.push_back({at, name_of(devices, series.device) + ": " + quantity(series.kind) +
                                     formatted(value, kDigits) + " in this frame alone"});
     }

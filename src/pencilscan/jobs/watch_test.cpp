@@ -218,5 +218,17 @@ TEST_F(Watch, OneBadFrameIsOddAndNoEvent) {
   EXPECT_THAT(report.odd[0].text, HasSubstr("camera cam0"));
 }
 
+// More is seen that is no line: the share falls, the labels stay.
+TEST_F(Watch, AFrameWithAsManyLabelsIsNotOdd) {
+  Random random(6);
+  for (FrameRow& row : rows_) row.cameras[0].labelled_points = 5000 + random.normal(0, 50);
+  rows_[50].cameras[0].labelled_share = 0.7;
+  EXPECT_THAT(watch_sequence(rows_, devices_).odd, IsEmpty());
+  rows_[50].cameras[0].labelled_points = 3900;
+  const WatchReport report = watch_sequence(rows_, devices_);
+  ASSERT_THAT(report.odd, SizeIs(1));
+  EXPECT_EQ(report.odd[0].row, 50U);
+}
+
 }  // namespace
 }  // namespace pencilscan

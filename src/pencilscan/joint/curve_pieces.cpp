@@ -29,7 +29,7 @@ CurveDirection direction(const Camera& camera, std::span<const CurvePoint> point
 
 PieceGraph cut_into_pieces(const Camera& camera, const GridGraph& graph, int length) {
   PieceGraph result;
-  const auto pixel_size = static_cast<float>(2 / (camera.K(0, 0) + camera.K(1, 1)));
+  const auto pixel_size = static_cast<float>(1 / camera.focal_px());
   std::vector<int> first_piece;
   for (std::size_t c = 0; c < graph.curves.size(); ++c) {
     const auto& points = graph.curves[c].points;

@@ -78,7 +78,7 @@ std::vector<OtherViews::Sighting> OtherViews::look_from_others(std::size_t g,
     }
   }
   constexpr float kPixels = 3;
-  const float ahead = kPixels / static_cast<float>(camera.K(0, 0));
+  const float ahead = kPixels / static_cast<float>(camera.focal_px());
   std::vector<Sighting> sightings;
   for (std::size_t p = 0; p < pieces_[g].labels.size(); ++p) {
     const CurvePiece& piece = pieces_[g].graph.pieces[p];

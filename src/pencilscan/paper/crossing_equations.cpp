@@ -61,7 +61,7 @@ std::vector<CrossingEquation> CrossingEquations::peel_leaves() {
 }
 
 void CrossingEquations::weigh(const Eigen::VectorXd* x) {
-  const double focal = 0.5 * (camera_.K(0, 0) + camera_.K(1, 1));
+  const double focal = camera_.focal_px();
   for (CrossingEquation& e : equations) {
     const double mu = x != nullptr ? (*x)[e.i] : 0;
     const double rho = x != nullptr ? (*x)[e.j] : 0;

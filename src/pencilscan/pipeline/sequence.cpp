@@ -8,7 +8,6 @@
 
 #include "pencilscan/core/counted_progress.h"
 #include "pencilscan/core/error.h"
-#include "pencilscan/core/fields.h"
 #include "pencilscan/core/memory.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/core/stopwatch.h"
@@ -20,9 +19,9 @@
 #include "pencilscan/pipeline/depth_output.h"
 #include "pencilscan/pipeline/frame_output.h"
 #include "pencilscan/pipeline/frame_source.h"
-#include "pencilscan/pipeline/repeated_pictures.h"
 #include "pencilscan/pipeline/rig_refinement.h"
 #include "pencilscan/pipeline/run_folder.h"
+#include "pencilscan/pipeline/sequence_inputs.h"
 #include "pencilscan/pipeline/surface_chain.h"
 
 namespace pencilscan {
@@ -34,141 +33,6 @@ using nlohmann::ordered_json;
 constexpr const char* kDevicesFile = "devices.json";
 constexpr const char* kRigFile = "rig.json";
 constexpr const char* kRefinementFile = "refinement.json";
-
-/// The frames that a rig is refined from: evenly picked.
-std::vector<std::size_t> refinement_frames(std::size_t frames) {
-  constexpr std::size_t kMaxFrames = 24;  // more add little but time
-  std::vector<std::size_t> picked;
-  const std::size_t count = std::min(frames, kMaxFrames);
-  for (std::size_t i = 0; i < count; ++i) picked.push_back(i * frames / count);
-  return picked;
-}
-
-/// The options in words that tell most of them apart, and a hash of all of their values.
-std::string options_text(const SequenceOptions& options) {
-  const OutputOptions& output = options.output;
-  const std::string_view method = solution_method(output.frame.points.method).name;
-  return "method=" + std::string(method) + (output.frame.meshes ? "" : " mesh=no") +
-         (output.frame.shape.depth.enabled ? "" : " depth=no") +
-         (output.refine_rig ? " refine-rig=yes" : "") + (output.tracks ? "" : " independent=yes") +
-         (options.plain_frames.empty() ? "" : " plain=yes") +
-         " all=" + hex(hash_bytes(fields_text(output)));
-}
-
-/// What decides the output: the program, rig bytes, options, the frames that refine the rig.
-RunInputs describe_inputs(const fs::path& rig_path, const FrameSource& frames,
-                          const SequenceOptions& options) {
-  RunInputs inputs;
-  inputs.program = options.program;
-  inputs.rig = hex(hash_bytes(read_file(rig_path)));
-  inputs.options = options_text(options);
-  inputs.frames = frames.names();
-  if (!options.output.refine_rig) return inputs;
-  std::string hashes;
-  for (const std::size_t i : refinement_frames(frames.size())) hashes += hex(frames.hash(i));
-  inputs.refined_from = hex(hash_bytes(hashes));
-  return inputs;
-}
-
-/// What tells whether a frame's pictures are the same.
-struct PictureHashes {
-  std::vector<std::uint64_t> of_cameras;  ///< 0: no picture
-  std::string all;
-};
-
-bool tracks(const SequenceOptions& options) {
-  const OutputOptions& output = options.output;
-  return output.tracks && output.frame.meshes && output.frame.shape.depth.enabled;
-}
-
-PictureHashes hashes_of(const FrameSource& frames, std::size_t frame) {
-  PictureHashes hashes{frames.picture_hashes(frame), {}};
-  hashes.all = hex(frames.hash(frame, hashes.of_cameras));
-  return hashes;
-}
-
-/// Of the frames `own` and, where frames start from those before, of these; of the others nothing.
-std::vector<PictureHashes> picture_hashes(const FrameSource& frames,
-                                          const std::vector<std::size_t>& own,
-                                          const SequenceOptions& options) {
-  std::vector<char> is_asked(frames.size(), 0);
-  for (const std::size_t i : own) {
-    const std::size_t first = tracks(options) ? first_of_chain(i) : i;
-    for (std::size_t k = first; k <= i; ++k) is_asked[k] = 1;
-  }
-  std::vector<PictureHashes> hashes(frames.size());
-  parallel_for(frames.size(), [&](std::size_t i) {
-    if (is_asked[i] != 0) hashes[i] = hashes_of(frames, i);
-  });
-  return hashes;
-}
-
-/// What each frame's result depends on.
-std::vector<std::string> frame_keys(const std::vector<PictureHashes>& images,
-                                    const SequenceOptions& options) {
-  std::vector<std::string> keys;
-  for (const PictureHashes& of_frame : images) keys.push_back(of_frame.all);
-  return tracks(options) ? chain_keys(keys) : keys;
-}
-
-/// Warns of cameras that hung; of a shard's frames, within its chunks.
-std::vector<std::string> repetitions(const Rig& rig, const FrameSource& frames,
-                                     const std::vector<std::size_t>& own,
-                                     const std::vector<PictureHashes>& images) {
-  std::vector<std::vector<std::uint64_t>> of_frames(frames.size());
-  for (const std::size_t i : own) of_frames[i] = images[i].of_cameras;
-  std::vector<std::string> warnings;
-  for (const RepeatedPicture& r : repeated_pictures(of_frames))
-    warnings.push_back(
-        describe_repeated(rig.cameras[r.camera].name, frames.name(r.first), frames.name(r.last)));
-  return warnings;
-}
-
-/// Decides which of the frames `own` are there already; refuses the output of other inputs.
-std::vector<char> resumable(const fs::path& out, const RunInputs& inputs,
-                            const std::vector<std::size_t>& own,
-                            const std::vector<std::string>& keys, const SequenceOptions& options) {
-  std::vector<char> done(own.size(), 0);
-  if (is_new_run(out)) return done;
-  const auto refuse = [&](const std::string& what) {
-    if (!options.overwrite)
-      throw InputError("--out", "", out.string(), what + " (or give --overwrite)");
-  };
-  if (!fs::is_directory(out)) throw InputError("--out", "", out.string(), "must be a folder");
-  if (!has_run_inputs(out)) {
-    refuse("must be new, empty or the output of the same inputs");
-    return done;
-  }
-  const RunInputs earlier = read_run_inputs(out);
-  if (earlier.settings() != inputs.settings()) {
-    RunInputs of_other_frames = earlier;
-    of_other_frames.refined_from = inputs.refined_from;
-    refuse(of_other_frames.settings() == inputs.settings()
-               ? "holds a rig refined from other frames"
-               : "holds the output of another rig, other options or another build of the program");
-    return done;
-  }
-  for (std::size_t i = 0; i < own.size(); ++i) {
-    const std::string& name = inputs.frames[own[i]];
-    const FrameState state = frame_status(out, name, inputs.settings(), keys[own[i]]).state;
-    if (state == FrameState::kOther) refuse("holds the output of other images in frame " + name);
-    done[i] = state == FrameState::kDone ? 1 : 0;
-  }
-  return done;
-}
-
-void check_images(const Rig& rig, const FrameSource& frames, const Progress& progress) {
-  // In chunks, so that only a few decoded frames are in memory.
-  const auto chunk = static_cast<std::size_t>(thread_count());
-  for (std::size_t first = 0; first < frames.size(); first += chunk) {
-    const std::size_t count = std::min(chunk, frames.size() - first);
-    parallel_for(count, [&](std::size_t i) {
-      const Frame frame = frames.read(rig, first + i);
-      static_cast<void>(frame);
-    });
-    tell_steps(progress, "checking: frame", first + count, frames.size());
-  }
-}
 
 /// A frame that is there, or of the chunk before: its surface goes on, nothing is written.
 void pass_frame(const Rig& rig, const FrameSource& frames, std::size_t index,

@@ -206,7 +206,7 @@ LocalSurface::LocalSurface(const Camera& camera, const LocalSurfaceOptions& opti
     : options_(options),
       center_(camera.center()),
       forward_(camera.forward()),
-      floor_(static_cast<float>(options.floor_px / camera.K(0, 0))),
+      floor_(static_cast<float>(options.floor_px / camera.focal_px())),
       columns_((camera.width + options.step_px - 1) / options.step_px),
       rows_((camera.height + options.step_px - 1) / options.step_px),
       cell_columns_(camera.width / kCell + 1),

@@ -19,8 +19,8 @@ struct Opinion {
 Opinion opinion_of(const SurfacePatch& patch, const Camera& camera, const Eigen::Vector2f& pixel,
                    double ray_length, const SettleOptions& options) {
   const double w = patch.inverse_depth(pixel);
-  const double footprint = 1 / (w * camera.K(0, 0));
-  const double depth_per_footprint = patch.gradient(pixel).norm() / w * camera.K(0, 0);
+  const double footprint = 1 / (w * camera.focal_px());
+  const double depth_per_footprint = patch.gradient(pixel).norm() / w * camera.focal_px();
   const double model = options.model_px * footprint * (1 + depth_per_footprint) *
                        std::max(1.0, static_cast<double>(patch.spread));
   return {1 / w, std::hypot(patch.sigma / w, model) * ray_length};
@@ -37,7 +37,7 @@ double settled_sigma(double propagated, double deviations, const Camera& camera,
   constexpr double kScale = 0.43;
   constexpr double kLeastSpread = 0.3;
   constexpr double kUsualBend = 0.6;  // footprints over the patch's scale
-  const double bend = static_cast<double>(patch.coefficients.tail<3>().norm()) * camera.K(0, 0);
+  const double bend = static_cast<double>(patch.coefficients.tail<3>().norm()) * camera.focal_px();
   // Single precision: the fit of these exponents is far coarser.
   const auto power = [](double x, float exponent) {
     return static_cast<double>(std::pow(static_cast<float>(x), exponent));
@@ -76,7 +76,7 @@ std::optional<MeasuredPoint> settled(const MeasuredPoint& point, const LocalSurf
   MeasuredPoint result = point;
   set_position(center + way / (depth * w), result);
   result.sigma = static_cast<float>(settled_sigma(std::sqrt(own_share * own2), deviations, camera,
-                                                  others.depth / camera.K(0, 0), *patch));
+                                                  others.depth / camera.focal_px(), *patch));
   if (options.errors_are_shared) result.sigma = std::max(result.sigma, point.sigma);
   return result;
 }

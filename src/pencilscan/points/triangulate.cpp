@@ -63,7 +63,7 @@ void add_run(const Rig& rig, const GridGraph& graph, const LabeledRun& run,
                                              p.normal, x_in_camera);
     const double position = position_sigma(curve, i, options);
     const double sigma_px = root_of_squares(gain * position, options.projection_sigma_px);
-    const double footprint = options.footprint_sigma_px * *depth / camera.K(0, 0);
+    const double footprint = options.footprint_sigma_px * *depth / camera.focal_px();
     const double ray_length = direction.norm();
     MeasuredPoint point;
     set_position(x, point);

@@ -17,10 +17,8 @@ Mat3 rotation_of(const Vec3& vector) {
 
 }  // namespace
 
-double focal_px(const Device& device) { return 0.5 * (device.K(0, 0) + device.K(1, 1)); }
-
 RigidTransform corrected_pose(const Device& device, const PoseCorrection& correction) {
-  const Mat3 turn = rotation_of(correction.rotation_px / focal_px(device));
+  const Mat3 turn = rotation_of(correction.rotation_px / device.focal_px());
   return {turn * device.device_from_world.rotation,
           turn * device.device_from_world.translation + correction.translation_mm};
 }
@@ -49,10 +47,10 @@ Eigen::Matrix<double, 3, 6> pose_jacobian(const Device& device, const PoseCorrec
                                           const Vec3& x_in_device) {
   // d exp(w) y / dw = -[exp(w) y]_x J(w) with the left Jacobian J(w) = I + [w]_x / 2 + O(w^2).
   const Vec3 turned = x_in_device - correction.translation_mm;
-  const Vec3 w = correction.rotation_px / focal_px(device);
+  const Vec3 w = correction.rotation_px / device.focal_px();
   Eigen::Matrix<double, 3, 6> jacobian;
   jacobian.leftCols<3>() =
-      -cross_matrix(turned) * (Mat3::Identity() + 0.5 * cross_matrix(w)) / focal_px(device);
+      -cross_matrix(turned) * (Mat3::Identity() + 0.5 * cross_matrix(w)) / device.focal_px();
   jacobian.rightCols<3>().setIdentity();
   return jacobian;
 }

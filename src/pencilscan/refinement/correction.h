@@ -17,8 +17,6 @@ struct PoseCorrection {
 /// One per device (device_list.h).
 using RigCorrection = std::vector<PoseCorrection>;
 
-[[nodiscard]] double focal_px(const Device& device);
-
 /// The calibrated pose with its correction.
 [[nodiscard]] RigidTransform corrected_pose(const Device& device, const PoseCorrection& correction);
 /// The rig with all poses corrected; correction is empty or has one entry per device.

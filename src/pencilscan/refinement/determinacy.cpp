@@ -17,7 +17,7 @@ Eigen::MatrixXd gauge_directions(const Rig& rig, const Vec3& center) {
     const auto row = 6 * static_cast<Eigen::Index>(d);
     for (Eigen::Index k = 0; k < 3; ++k) {
       const Vec3 w = -R.col(k);
-      directions.block<3, 1>(row, k) = focal_px(device) * w;
+      directions.block<3, 1>(row, k) = device.focal_px() * w;
       directions.block<3, 1>(row + 3, k) = -w.cross(center_in_device);
     }
     directions.block<3, 3>(row + 3, 3) = -R;

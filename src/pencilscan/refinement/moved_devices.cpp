@@ -130,7 +130,7 @@ class Mover {
   [[nodiscard]] Normal prior(std::size_t device, const PoseCorrection& at) const {
     constexpr double kWidth = 10;
     const Device& d = device_at(rig_, device);
-    const double per_px = (d.center() - working_volume(rig_).center).norm() / focal_px(d);
+    const double per_px = (d.center() - working_volume(rig_).center).norm() / d.focal_px();
     Vec6 precision;
     precision.head<3>().setConstant(1 / std::pow(kWidth * options_.refine.rotation_sigma_px, 2));
     precision.tail<3>().setConstant(

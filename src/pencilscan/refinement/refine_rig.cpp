@@ -30,7 +30,7 @@ struct Scales {
     for (std::size_t d = 0; d < device_count(rig); ++d) {
       const Device& device = device_at(rig, d);
       translation_mm.push_back(options.translation_sigma_px * (device.center() - center).norm() /
-                               focal_px(device));
+                               device.focal_px());
     }
   }
   [[nodiscard]] PoseCorrection correction(std::size_t device, const double* p) const {

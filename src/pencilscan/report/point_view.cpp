@@ -19,7 +19,7 @@ void splat(std::span<const Vec3> points, std::span<const Color> colors, const De
     const auto pixel = view.project(points[i]);
     if (!pixel || pixel->cwiseAbs().maxCoeff() > 1e6) continue;
     const Vec2 at = kSupersampling * *pixel + Vec2::Constant(0.5 * (kSupersampling - 1));
-    const double r = std::max(radius_mm * kSupersampling * view.K(0, 0) / z, 0.71);
+    const double r = std::max(radius_mm * kSupersampling * view.focal_px() / z, 0.71);
     for (int y = static_cast<int>(std::ceil(at[1] - r)); y <= at[1] + r; ++y) {
       for (int x = static_cast<int>(std::ceil(at[0] - r)); x <= at[0] + r; ++x) {
         if (x < 0 || y < 0 || x >= depth.cols || y >= depth.rows) continue;

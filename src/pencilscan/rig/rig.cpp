@@ -122,7 +122,7 @@ double footprint(const Rig& rig) {
   std::vector<double> footprints;
   for (const Camera& camera : rig.cameras) {
     if (camera.sees_texture_only) continue;
-    const double focal = std::sqrt(camera.K(0, 0) * camera.K(1, 1));
+    const double focal = camera.focal_px();
     footprints.push_back((camera.center() - center).norm() / focal);
   }
   return footprints.empty() ? 1 : upper_median(std::move(footprints));

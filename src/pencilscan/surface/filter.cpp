@@ -138,7 +138,7 @@ std::vector<ViewBuffer> make_views(const Rig& rig, std::span<const SurfaceSample
   std::vector<ViewBuffer> views;
   for (const Device* device : devices) {
     const double z = std::max((device->device_from_world * center).z(), spacing);
-    views.emplace_back(*device, std::max(kTubeRadius * spacing * device->K(0, 0) / z, 0.5));
+    views.emplace_back(*device, std::max(kTubeRadius * spacing * device->focal_px() / z, 0.5));
   }
   for (std::size_t i = 0; i < samples.size(); ++i) {
     const auto id = static_cast<std::uint32_t>(i);

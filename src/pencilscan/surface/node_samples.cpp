@@ -28,7 +28,7 @@ SurfaceSample sample_of(const Rig& rig, const DepthMap& map, std::size_t i) {
   s.count = 1;
   const double depth = 1 / static_cast<double>(node.w);
   s.spacing =
-      map.stride * depth / camera.K(0, 0) / std::max(s.normal.dot(s.to_camera), kLeastCosine);
+      map.stride * depth / camera.focal_px() / std::max(s.normal.dot(s.to_camera), kLeastCosine);
   return s;
 }
 

@@ -191,10 +191,10 @@ Vec3 normal_of(const TriangleMesh& mesh, std::span<const std::uint32_t> faces) {
 
 double line_reach_px(const Rig& rig, const Camera& camera) {
   const Sphere volume = working_volume(rig);
-  const double camera_px_per_mm = camera.K(0, 0) / (camera.center() - volume.center).norm();
+  const double camera_px_per_mm = camera.focal_px() / (camera.center() - volume.center).norm();
   double spacing_mm = 0;
   for (const Projector& projector : rig.projectors) {
-    const double mm_per_px = (projector.center() - volume.center).norm() / projector.K(0, 0);
+    const double mm_per_px = (projector.center() - volume.center).norm() / projector.focal_px();
     for (const LinePattern& pattern : projector.patterns)
       spacing_mm = std::max(spacing_mm, pattern.pitch_px * mm_per_px);
   }

@@ -31,7 +31,7 @@ std::vector<char> explained_nodes(const Rig& rig, const RayScene& scene, const D
     const Vec3 x = node_point(rig, map, i);
     const double distance = (x - eye).norm();
     const Ray ray{eye, (x - eye) / distance};
-    const double spacing = map.stride / static_cast<double>(map.nodes[i].w) / camera.K(0, 0);
+    const double spacing = map.stride / static_cast<double>(map.nodes[i].w) / camera.focal_px();
     const auto hit = scene.first_hit(ray);
     // Across the surface: a slanted one is met far from the node with little between them.
     const double cosine = std::abs(node_normal(rig, map, i).dot(ray.direction));

@@ -1,0 +1,25 @@
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "pencilscan/bundle/bundle.h"
+
+namespace pencilscan {
+
+/// Errors of all views of a track but the hub at the point that fits them best.
+[[nodiscard]] std::vector<double> track_errors(const BundleProblem& problem, const Track& track,
+                                               const Vec3& point);
+
+/// Robust standard deviation of one coordinate's error, px. A track of n measured views has 2 n - 1
+/// degrees of freedom left, since they choose the depth on the hub's ray.
+[[nodiscard]] double error_scale(const BundleProblem& problem);
+
+/// Of what the views say of themselves, px.
+[[nodiscard]] double median_sigma(const BundleProblem& problem);
+
+/// Drops views beyond `limit` pixels, and tracks that are left with one view. Returns how many
+/// views.
+std::size_t drop_outliers(BundleProblem& problem, double limit);
+
+}  // namespace pencilscan
