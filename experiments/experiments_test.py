@@ -1,6 +1,7 @@
 #!/usr/bin/python3
 """What the experiments compute themselves, against what is known exactly."""
 
+import os
 import tempfile
 import unittest
 from pathlib import Path
@@ -15,6 +16,13 @@ import shapes
 import solids
 import statues
 import table1_cube
+
+
+class CommandTest(unittest.TestCase):
+    def test_what_documents_call_as_a_command_is_one(self):
+        scripts = [p for p in common.ROOT.glob("experiments/*.py") if "__main__" in p.read_text()]
+        self.assertGreater(len(scripts), 10)
+        self.assertEqual([p.name for p in scripts if not os.access(p, os.X_OK)], [])
 
 
 class CubeTest(unittest.TestCase):
