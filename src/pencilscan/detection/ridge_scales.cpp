@@ -13,8 +13,8 @@ namespace pencilscan {
 namespace {
 
 // Lengths in pixels of the next finer image, in which the line is 4 to 9 wide.
-constexpr float kSameLine = 1.3F;  ///< a finer ridgel this near to the middle is the line itself
-constexpr float kReach = 5.5F;     ///< half the width of the widest line, and its edges' ridgels
+constexpr float kSameLine = 1.3F;   ///< a finer ridgel this near to the middle is the line itself
+constexpr float kLineReach = 5.5F;  ///< half the width of the widest line, and its edges' ridgels
 constexpr float kAlong = 2;
 /// Beyond the end of a line the filter's answer falls like the Gaussian that smooths along it: to
 /// 5 % after 1.64 of its scale of 3, which are 5 px of the coarser image.
@@ -114,11 +114,11 @@ class FinerLook {
   /// visit(finer ridgel, its index, distance across, along) until it gives false.
   template <class Visit>
   void around(const Ridgel& w, float reach_along, Visit visit) const {
-    index_.around(w.x, w.y, unit_ * std::hypot(kReach, reach_along), [&](int item) {
+    index_.around(w.x, w.y, unit_ * std::hypot(kLineReach, reach_along), [&](int item) {
       const auto i = static_cast<std::size_t>(item);
       const Ridgel& f = finer_[i];
       const auto [across, along] = distance(f, w);
-      if (across > kReach * unit_ || along > reach_along * unit_) return true;
+      if (across > kLineReach * unit_ || along > reach_along * unit_) return true;
       return visit(f, i, across, along);
     });
   }
@@ -197,7 +197,7 @@ std::vector<Ridgel> merged_scales(const cv::Mat& presence, const std::vector<Rid
     look(std::hypot(kSameLine, kAlong), kSameLine);  // mostly, this is a fine line too
     if (!is_middle) continue;
     beside.clear();
-    look(kReach, kReach);
+    look(kLineReach, kLineReach);
     const float middle = value_at(presence, 1, w);
     for (const std::size_t i : beside) {
       is_middle = is_middle && middle >= kFlatTop * value_at(presence, 1, fine[i]);

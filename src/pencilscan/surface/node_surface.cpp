@@ -17,10 +17,10 @@ constexpr double kGrazing = 0.2;       // keeps grazing views from looking exact
 /// What the quadric misses within its window, footprints at a right angle: relief that no sigma
 /// knows.
 constexpr double kRelief = 0.08;
-constexpr double kReach = 2.5;  // of a node's say, widths
+constexpr double kNodeReach = 2.5;  // of a node's say, widths
 
-/// A row of nodes holds what a vertex may ask: kReach widths to both sides.
-constexpr double kMostWidth = (kLanes - 2) / (2 * kReach);
+/// A row of nodes holds what a vertex may ask: kNodeReach widths to both sides.
+constexpr double kMostWidth = (kLanes - 2) / (2 * kNodeReach);
 
 /// What the nodes of rows of one view say of a vertex, eight at once.
 struct Prediction {
@@ -132,7 +132,7 @@ class NodeView {
         rows_(map.rows),
         width_(map.columns + 2 * kLanes),
         farthest_(options.farthest),
-        reach_(kReach * options.width_nodes),
+        reach_(kNodeReach * options.width_nodes),
         inverse_width2_(0.5 / (options.width_nodes * options.width_nodes)) {
     for (std::vector<float>& plane : planes_)
       plane.assign(static_cast<std::size_t>(width_) * static_cast<std::size_t>(rows_), 0);
