@@ -225,8 +225,9 @@ PlateFigures measure_plate(const ArtefactPoints& given, const Rig* rig,
   plate.points = of_region(given, options);
   if (options.plate_thickness_mm) {
     const std::size_t whole = plate.points.points.size();
-    plate.points = points_of_face(plate.points,
-                                  {*options.plate_thickness_mm, options.border_mm, options.seed});
+    plate.points = points_of_face(
+        plate.points, {*options.plate_thickness_mm, options.border_mm, options.plate_length_mm,
+                       options.plate_width_mm, options.seed});
     plate.left_out = whole - plate.points.points.size();
   }
   const std::span<const Vec3> all(plate.points.points);

@@ -232,6 +232,36 @@ TEST(ArtefactPlate, OneOfTwoFacesIsMeasuredAndErrorsBeforeItStay) {
   EXPECT_NEAR(measure_plate(as_points(points), nullptr, options).flatness_mm.all, 45, 0.1);
 }
 
+TEST(ArtefactPlate, StrayPointsBeyondTheRimDoNotMoveAKnownPlate) {
+  const RigidTransform pose = look_at({-300, 100, 400}, Vec3(5, 5, 5)).inverse();
+  std::vector<Vec3> points = plate_points(10, pose, 11);
+  ArtefactOptions options;
+  options.plate_thickness_mm = 10;
+  options.border_mm = 2;
+  // Of the side, but before the border of the rectangle that holds the strays too.
+  for (int i = 0; i < 20; ++i) points.push_back(pose * Vec3(99.5, 5.0 * i - 50, -2));
+  for (const double x : {104.0, 108.0, 115.0}) points.push_back(pose * Vec3(x, 0.3 * x, 0.5));
+  EXPECT_GT(measure_plate(as_points(points), nullptr, options).flatness_mm.all, 1.5);
+  options.plate_length_mm = 200;
+  options.plate_width_mm = 120;
+  EXPECT_NEAR(measure_plate(as_points(points), nullptr, options).flatness_mm.all, 0.04, 0.001);
+}
+
+TEST(ArtefactPlate, AKnownRectangleIsPlacedWherePointsStandOutLeast) {
+  Random random(12);
+  const Plane plane = fit_plane(std::vector<Vec3>{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}).value();
+  std::vector<Vec3> points;
+  const Vec3 along(std::cos(0.3), std::sin(0.3), 0), across(-along.y(), along.x(), 0);
+  for (int i = 0; i < 20000; ++i)
+    points.push_back(Vec3(3, 2, 0) + random.uniform(-40.2, 40.2) * along +
+                     random.uniform(-25.1, 25.1) * across);
+  points.push_back({90, 0, 0});
+  const PlateRectangle placed = placed_rectangle(points, plane, 50, 80, 2);
+  EXPECT_LT((placed.center - Vec3(3, 2, 0)).norm(), 0.02);
+  EXPECT_GT(std::abs(placed.along.dot(along)), std::cos(0.001));
+  EXPECT_EQ(placed.length, 80);
+}
+
 TEST(ArtefactPlate, CoverageIsTheShareOfTheStatedPlate) {
   std::vector<Vec3> points;
   for (int x = 0; x <= 200; ++x)

@@ -1,9 +1,12 @@
 #include "pencilscan/artefact/coverage.h"
 
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <optional>
 #include <vector>
 
 #include "pencilscan/surface/point_grid.h"
@@ -96,6 +99,96 @@ PlateRectangle smallest_rectangle(std::span<const Vec3> points, const Plane& pla
     best.width = size.minCoeff();
   }
   return best;
+}
+
+namespace {
+
+/// How far coordinates within a rectangle's plane lie beyond its sides, signed.
+Vec2 overhang(const PlateRectangle& rectangle, const Vec2& at) {
+  const Vec2 half(0.5 * rectangle.length, 0.5 * rectangle.width);
+  return at - at.cwiseMax(-half).cwiseMin(half);
+}
+
+Vec2 within(const PlateRectangle& rectangle, const Vec3& point) {
+  const Vec3 offset = point - rectangle.center;
+  return {rectangle.along.dot(offset), rectangle.plane.normal.cross(rectangle.along).dot(offset)};
+}
+
+double cost_of(const PlateRectangle& rectangle, std::span<const Vec3> points, double tolerance) {
+  double cost = 0;
+  for (const Vec3& point : points)
+    cost += std::min(overhang(rectangle, within(rectangle, point)).squaredNorm(),
+                     tolerance * tolerance);
+  return cost;
+}
+
+/// The points' middle and main direction.
+PlateRectangle from_moments(std::span<const Vec3> points, const Plane& plane) {
+  PlateRectangle rectangle;
+  rectangle.plane = plane;
+  const Vec3 e1 = plane.normal.unitOrthogonal();
+  const Vec3 e2 = plane.normal.cross(e1);
+  Vec2 mean = Vec2::Zero();
+  Eigen::Matrix2d square = Eigen::Matrix2d::Zero();
+  for (const Vec3& point : points) {
+    const Vec2 at(e1.dot(point - plane.point), e2.dot(point - plane.point));
+    mean += at;
+    square += at * at.transpose();
+  }
+  mean /= static_cast<double>(points.size());
+  square = square / static_cast<double>(points.size()) - mean * mean.transpose();
+  const Vec2 main = Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(square).eigenvectors().col(1);
+  rectangle.along = main.x() * e1 + main.y() * e2;
+  rectangle.center = plane.point + mean.x() * e1 + mean.y() * e2;
+  return rectangle;
+}
+
+}  // namespace
+
+PlateRectangle placed_rectangle(std::span<const Vec3> points, const Plane& plane, double length,
+                                double width, double tolerance) {
+  constexpr int kRounds = 50;
+  constexpr double kSettled = 1e-4;  // of the tolerance
+  std::optional<PlateRectangle> best;
+  double least = std::numeric_limits<double>::infinity();
+  for (PlateRectangle now : {smallest_rectangle(points, plane), from_moments(points, plane)}) {
+    now.length = std::max(length, width);
+    now.width = std::min(length, width);
+    const double lever = 0.5 * std::hypot(length, width);
+    for (int round = 0; round < kRounds; ++round) {
+      // Gauss and Newton: shifts along and across, and the turn by its lever.
+      Eigen::Matrix3d squares = Eigen::Matrix3d::Zero();
+      Vec3 rest = Vec3::Zero();
+      for (const Vec3& point : points) {
+        const Vec2 at = within(now, point);
+        const Vec2 over = overhang(now, at);
+        const double far2 = over.squaredNorm();
+        if (far2 == 0 || far2 >= tolerance * tolerance) continue;
+        for (int axis = 0; axis < 2; ++axis) {
+          if (over[axis] == 0) continue;
+          Vec3 slope = Vec3::Zero();
+          slope[axis] = -1;
+          slope.z() = (axis == 0 ? at.y() : -at.x()) / lever;
+          squares += slope * slope.transpose();
+          rest += slope * over[axis];
+        }
+      }
+      if (rest.isZero(0)) break;
+      squares.diagonal().array() += 1e-3 * squares.trace();  // where one side alone has points
+      const Vec3 step = -squares.ldlt().solve(rest);
+      const Vec3 across = plane.normal.cross(now.along);
+      now.center += step.x() * now.along + step.y() * across;
+      const double turn = step.z() / lever;
+      now.along = (std::cos(turn) * now.along + std::sin(turn) * across).normalized();
+      if (step.norm() < kSettled * tolerance) break;
+    }
+    const double cost = cost_of(now, points, tolerance);
+    if (!best || cost < least) {
+      best = now;
+      least = cost;
+    }
+  }
+  return *best;
 }
 
 double plate_coverage(std::span<const Vec3> points, const PlateRectangle& plate) {

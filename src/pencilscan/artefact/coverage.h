@@ -23,6 +23,13 @@ struct PlateRectangle {
 /// sides lies on a side of their convex hull: Freeman, Shapira, CACM 18 (7), 1975.)
 [[nodiscard]] PlateRectangle smallest_rectangle(std::span<const Vec3> points, const Plane& plane);
 
+/// A rectangle of known sides, placed in the plane so that the points stand out of it least: the
+/// sum of their squared overhangs, none counted farther than `tolerance` (> 0, mm). Points far
+/// beyond the rim, which are errors, do not move it. Where the points fill less than the rectangle
+/// and none stands out, it stays in their middle.
+[[nodiscard]] PlateRectangle placed_rectangle(std::span<const Vec3> points, const Plane& plane,
+                                              double length, double width, double tolerance);
+
 /// Share of the rectangle within 1 % of its diagonal of a point (measured in the plane).
 [[nodiscard]] double plate_coverage(std::span<const Vec3> points, const PlateRectangle& plate);
 

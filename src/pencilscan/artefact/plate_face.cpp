@@ -25,7 +25,10 @@ ArtefactPoints points_of_face(const ArtefactPoints& points, const PlateFace& fac
   constexpr double kOtherFace = 0.01;  // of the points: fewer are errors rather than a face
   const bool two_faces = static_cast<double>(std::max(before, behind)) >
                          kOtherFace * static_cast<double>(points.points.size());
-  const PlateRectangle rim = smallest_rectangle(near, plane);
+  const PlateRectangle rim =
+      face.length_mm && face.width_mm
+          ? placed_rectangle(near, plane, *face.length_mm, *face.width_mm, thickness / 4)
+          : smallest_rectangle(near, plane);
   const Vec3 across = plane.normal.cross(rim.along);
   std::vector<std::size_t> kept;
   for (std::size_t i = 0; i < points.points.size(); ++i) {
