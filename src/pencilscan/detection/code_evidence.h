@@ -8,8 +8,11 @@
 
 namespace pencilscan {
 
+/// Points of a curve that share one measurement of Curve::code: their evidence counts once.
+inline constexpr int kPointsPerMeasurement = 9;
+
 struct CodeEvidenceOptions {
-  int half_arc = 4;  ///< points on either side that share one colour measurement
+  int half_arc = kPointsPerMeasurement / 2;  ///< points on either side that share a measurement
   double relative_noise =
       0.12;                  ///< model error of a colour amplitude, share of the line's amplitude
   double max_log_ratio = 4;  ///< evidence of one point is limited to this

@@ -5,6 +5,8 @@
 #include <map>
 #include <tuple>
 
+#include "pencilscan/detection/code_evidence.h"
+
 namespace pencilscan {
 namespace {
 
@@ -101,13 +103,12 @@ void normalize(Belief& belief) {
 }
 
 Belief color_belief(const Curve& curve, const ColorFamily& family, const LinePattern& pattern) {
-  constexpr double kPointsPerMeasurement = 9;  // neighbours share one colour measurement
   constexpr double kMaxLogEvidence = 6;
   const std::size_t colors = family.colors.size();
   std::vector<double> evidence(colors, 0.0);
   for (std::size_t i = 0; i < curve.points.size(); ++i) {
     for (std::size_t c = 0; c < colors; ++c)
-      evidence[c] += curve.code[i * colors + c] / kPointsPerMeasurement;
+      evidence[c] += static_cast<double>(curve.code[i * colors + c]) / kPointsPerMeasurement;
   }
   const double best = *std::max_element(evidence.begin(), evidence.end());
   const std::vector<int> color_of = family.color_of_symbol(pattern);
@@ -292,7 +293,6 @@ std::vector<Cut> contradicted_connections(const Rig& rig,
 
 std::vector<Cut> color_flips(const std::vector<ColorFamily>& families,
                              const std::vector<Curve>& curves, double flip_cost) {
-  constexpr double kPointsPerMeasurement = 9;
   std::vector<Cut> cuts;
   for (std::size_t c = 0; c < curves.size(); ++c) {
     const std::size_t colors = families[static_cast<std::size_t>(curves[c].family)].colors.size();
@@ -308,8 +308,8 @@ std::vector<Cut> color_flips(const std::vector<ColorFamily>& families,
       for (std::size_t k = 0; k < colors; ++k) {
         const bool stays = score[k] >= switched;
         from[i * colors + k] = stays ? k : best;
-        score[k] =
-            std::max(score[k], switched) + curves[c].code[i * colors + k] / kPointsPerMeasurement;
+        score[k] = std::max(score[k], switched) +
+                   static_cast<double>(curves[c].code[i * colors + k]) / kPointsPerMeasurement;
       }
     }
     auto state =

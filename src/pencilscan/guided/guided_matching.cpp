@@ -8,6 +8,7 @@
 
 #include "pencilscan/core/median.h"
 #include "pencilscan/core/parallel.h"
+#include "pencilscan/detection/code_evidence.h"
 #include "pencilscan/detection/curve_rendering.h"
 #include "pencilscan/detection/profile_fit.h"
 #include "pencilscan/detection/refine.h"
@@ -86,6 +87,8 @@ class CameraMatching {
     return across_px < options_.max_offset_px &&
            across_px < options_.max_offset_lines * p.spacing_px;
   }
+  [[nodiscard]] bool is_of_other_color(const Curve& curve, int begin, int end,
+                                       const LineName& name) const;
   [[nodiscard]] bool is_long_enough(const std::vector<char>& decided, int begin, int end) const;
   [[nodiscard]] std::vector<std::vector<char>> decided_points() const;
   [[nodiscard]] int family_of(PatternRef ref) const;
@@ -314,6 +317,24 @@ void CameraMatching::confirm_tentative() {
   accept(std::move(confirmed));
 }
 
+/// True where the colour of a stretch [begin, end) says more against a name than a guided name is
+/// certain: a surface that is not there predicts lines too, and only their places fit.
+bool CameraMatching::is_of_other_color(const Curve& curve, int begin, int end,
+                                       const LineName& name) const {
+  const auto family = static_cast<std::size_t>(curve.family);
+  const LinePattern& pattern = rig_.pattern(name.pattern);
+  const std::size_t colors = families_[family].colors.size();
+  const auto own = static_cast<std::size_t>(families_[family].color_of_symbol(
+      pattern)[static_cast<std::size_t>(pattern.symbol(name.line))]);
+  std::vector<float> evidence(colors, 0.F);
+  for (int i = begin; i < end; ++i) {
+    for (std::size_t c = 0; c < colors; ++c)
+      evidence[c] += curve.code[static_cast<std::size_t>(i) * colors + c] / kPointsPerMeasurement;
+  }
+  const float against = *std::max_element(evidence.begin(), evidence.end()) - evidence[own];
+  return against > std::log(options_.confidence / (1 - options_.confidence));
+}
+
 /// A stretch [begin, end) on one line, within what is undecided of its curve.
 bool CameraMatching::is_long_enough(const std::vector<char>& decided, int begin, int end) const {
   constexpr double kMost = 0.8;
@@ -338,6 +359,7 @@ void CameraMatching::adopt_curves() {
     for_each_stretch(names, [&](int begin, int end) {
       const auto& name = names[static_cast<std::size_t>(begin)];
       if (!name || !is_long_enough(decided[c], begin, end)) return;
+      if (is_of_other_color(curve, begin, end, *name)) return;
       const auto first = curve.points.begin() + begin;
       const auto supported = std::count_if(first, first + (end - begin), [&](const CurvePoint& p) {
         return fits(p, *name, curve.family);

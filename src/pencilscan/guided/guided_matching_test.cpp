@@ -151,6 +151,24 @@ TEST_F(LabeledScene, UndecidedCurveBetweenLinesStaysUndecided) {
   EXPECT_EQ(label_of(curve), -1);
 }
 
+TEST_F(LabeledScene, UndecidedCurveOfTheOtherColorStaysUndecided) {
+  const std::size_t curve = middle_curve(0);
+  remove_label(curve);
+  std::vector<float>& code = graph_.curves[curve].code;
+  for (std::size_t i = 0; i < code.size(); i += 2) std::swap(code[i], code[i + 1]);
+  const std::vector<std::vector<cv::Mat>> no_images(1);
+  Labeling other_color = labeling_;
+  GridGraph graph = graph_;
+  match_guided(rig, families, no_images, {&graph, 1}, other_color);
+  std::swap(labeling_, other_color);
+  EXPECT_EQ(label_of(curve), -1);
+  // Weak evidence does not outweigh the place.
+  std::swap(labeling_, other_color);
+  for (float& c : code) c *= 0.1F;
+  match_guided(rig, families, no_images, {&graph_, 1}, labeling_);
+  EXPECT_EQ(label_of(curve), true_lines[0][curve]);
+}
+
 TEST_F(LabeledScene, CurveMuchWiderThanThePredictedLineGetsNoLabel) {
   const std::size_t curve = middle_curve(0);
   remove_label(curve);

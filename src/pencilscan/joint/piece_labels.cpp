@@ -6,6 +6,7 @@
 #include <numbers>
 #include <tuple>
 
+#include "pencilscan/detection/code_evidence.h"
 #include "pencilscan/joint/floor_cost.h"
 #include "pencilscan/joint/next_lines.h"
 
@@ -15,7 +16,6 @@ namespace {
 /// Cost of each colour of the family, the best 0.
 std::vector<float> color_costs(const Curve& curve, const CurvePiece& piece, std::size_t colors,
                                const JointOptions& options) {
-  constexpr float kPointsPerMeasurement = 9;  // neighbours share one colour measurement
   std::vector<float> evidence(colors, 0.F);
   for (int i = piece.begin; i < piece.end; ++i) {
     for (std::size_t c = 0; c < colors; ++c) {
