@@ -85,7 +85,7 @@ FrameResult match_on_surface(const Rig& rig, FrameResult result, const PointOpti
         triangulate(rig, points.graphs, points.labeling, options.triangulation);
     SettledPoints settled = settle_on_surface(
         rig, *shape.scene, settle_points(rig, std::move(triangulated), surfaces, options.settle),
-        shape.surface.mesh.color);
+        static_cast<float>(options.settle.min_alone_confidence), shape.surface.mesh.color);
     points.points = std::move(settled.points);
     points.contradicted += settled.contradicted;
     shape.surface.used.clear();

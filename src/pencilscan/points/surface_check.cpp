@@ -183,7 +183,7 @@ std::size_t drop_contradicted(const Rig& rig, const RayScene& surface,
 }
 
 SettledPoints settle_on_surface(const Rig& rig, const RayScene& surface,
-                                std::span<const MeasuredPoint> points,
+                                std::span<const MeasuredPoint> points, float min_alone_confidence,
                                 std::span<const std::array<float, 3>> colors) {
   constexpr double kFarthest = 4;  // deviations of the difference
   // Beyond, one of both is wrong, and the surface rests on the light of all pixels and cameras
@@ -209,7 +209,9 @@ SettledPoints settle_on_surface(const Rig& rig, const RayScene& surface,
     PointEvidence& evidence = settled.evidence[i];
     evidence.own = points[i].sigma;
     p.sigma = static_cast<float>(point_sigma(evidence));
-    const auto stay = [&] { keep[i] = check.is_better_known(p) ? 0 : keep[i]; };
+    const auto stay = [&] {
+      if (p.confidence < min_alone_confidence || check.is_better_known(p)) keep[i] = 0;
+    };
     if (!hit) return stay();
     const double of_surface = check.sigma_along(ray, *hit);
     const double of_point = static_cast<double>(points[i].sigma);

@@ -35,11 +35,14 @@ struct SettledPoints {
 /// the surface, too, and its colour where `colors` has the albedo of each vertex (linear light, as
 /// TriangleMesh::color). Two kinds of points are left out: those that the surface contradicts (as
 /// above), and those so far off it that one of the two must be wrong. Points that are odd, or whose
-/// rays miss the surface, stay where they were, unless another camera sees measured surface within
-/// their deviation that is known three times as well: at grazing rays they would only be the worst
-/// points of a surface that better ones cover.
+/// rays miss the surface, stay where they were, with two exceptions. Those of less confidence than
+/// `min_alone_confidence` go: nothing but their own label speaks for them (as in settle_points()).
+/// So do those where another camera sees measured surface within their deviation that is known
+/// three times as well: at grazing rays they would only be the worst points of a surface that
+/// better ones cover.
 [[nodiscard]] SettledPoints settle_on_surface(const Rig& rig, const RayScene& surface,
                                               std::span<const MeasuredPoint> points,
+                                              float min_alone_confidence,
                                               std::span<const std::array<float, 3>> colors = {});
 
 }  // namespace pencilscan

@@ -89,16 +89,29 @@ TEST_F(SurfaceCheckTest, WhatWasNotMeasuredContradictsNothing) {
   name_wrongly(graph_.curves.size() / 3);
   mesh_.confidence.assign(mesh_.vertices.size(), 0.F);
   EXPECT_EQ(drop(), 0U);
-  const SettledPoints settled = settle_on_surface(rig, RayScene(mesh_), points());
+  const SettledPoints settled = settle_on_surface(rig, RayScene(mesh_), points(), 0);
   EXPECT_EQ(settled.contradicted, 0U);
   EXPECT_TRUE(std::none_of(settled.evidence.begin(), settled.evidence.end(),
                            [](const PointEvidence& e) { return e.settled; }));
 }
 
+TEST_F(SurfaceCheckTest, PointsOfLittleConfidenceStayOnMeasuredSurfaceOnly) {
+  std::vector<MeasuredPoint> doubtful = points();
+  for (MeasuredPoint& p : doubtful) p.confidence = 0.99F;
+  const auto kept = [&] {
+    return settle_on_surface(rig, RayScene(mesh_), doubtful, 0.995F).points.size();
+  };
+  EXPECT_GT(kept(), 0.9 * static_cast<double>(doubtful.size()));
+  mesh_.confidence.assign(mesh_.vertices.size(), 0.F);
+  EXPECT_EQ(kept(), 0U);
+  for (MeasuredPoint& p : doubtful) p.confidence = 0.999F;
+  EXPECT_EQ(kept(), doubtful.size());
+}
+
 TEST_F(SurfaceCheckTest, PointsSettleOnTheSurfaceAndTheirSigmaTellsOfTheWayThere) {
   name_wrongly(graph_.curves.size() / 3);
   const std::vector<MeasuredPoint> before = points();
-  const SettledPoints settled = settle_on_surface(rig, RayScene(mesh_), before);
+  const SettledPoints settled = settle_on_surface(rig, RayScene(mesh_), before, 0);
   const auto is_far_off = [](const MeasuredPoint& p) { return error(p) > 1; };
   EXPECT_GT(std::count_if(before.begin(), before.end(), is_far_off), 100);
   EXPECT_EQ(std::count_if(settled.points.begin(), settled.points.end(), is_far_off), 0);
@@ -133,7 +146,7 @@ TEST_F(SurfaceCheckTest, PointsTooFarOffTheSurfaceAreLeftOutThoughTheirLineFits)
     move_away(1, moved[i]);
     ++off;
   }
-  const SettledPoints settled = settle_on_surface(rig, RayScene(mesh_), moved);
+  const SettledPoints settled = settle_on_surface(rig, RayScene(mesh_), moved, 0);
   EXPECT_GE(settled.contradicted, off);
   EXPECT_LT(settled.contradicted, off + moved.size() / 20);
   EXPECT_EQ(std::count_if(settled.points.begin(), settled.points.end(),
@@ -149,7 +162,7 @@ TEST_F(SurfaceCheckTest, OddPointsAreLeftOutWhereAnotherCameraKnowsTheSurfaceBet
     if (i % 10 == 0) move_away(5 * std::hypot(0.15, 0.02), moved[i]);
   }
   const auto tenths_kept_odd = [&] {
-    const SettledPoints settled = settle_on_surface(rig, RayScene(mesh_), moved);
+    const SettledPoints settled = settle_on_surface(rig, RayScene(mesh_), moved, 0);
     const auto odd = std::count_if(settled.evidence.begin(), settled.evidence.end(),
                                    [](const PointEvidence& e) { return !e.settled; });
     return 10 * static_cast<double>(odd) / static_cast<double>(moved.size());
@@ -165,7 +178,7 @@ TEST_F(SurfaceCheckTest, PointsHaveTheNormalAndTheColourOfTheSurface) {
   std::vector<std::array<float, 3>> colors;
   for (const Vec3& x : mesh_.vertices)
     colors.push_back({static_cast<float>(0.5 + x.y() / 200), 0.25F, 0.5F});
-  const SettledPoints settled = settle_on_surface(rig, RayScene(mesh_), points(), colors);
+  const SettledPoints settled = settle_on_surface(rig, RayScene(mesh_), points(), 0, colors);
   std::size_t known = 0;
   for (std::size_t i = 0; i < settled.points.size(); ++i) {
     const MeasuredPoint& p = settled.points[i];
@@ -183,7 +196,7 @@ TEST_F(SurfaceCheckTest, PointsHaveTheNormalAndTheColourOfTheSurface) {
     EXPECT_EQ(p.green, to_srgb_byte(0.25));
   }
   EXPECT_GT(known, settled.points.size() / 2);
-  const SettledPoints colorless = settle_on_surface(rig, RayScene(mesh_), points());
+  const SettledPoints colorless = settle_on_surface(rig, RayScene(mesh_), points(), 0);
   EXPECT_EQ(colorless.points.front().green, 0);
 }
 
