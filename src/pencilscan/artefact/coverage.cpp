@@ -143,6 +143,33 @@ PlateRectangle from_moments(std::span<const Vec3> points, const Plane& plane) {
   return rectangle;
 }
 
+/// mm by which a turn of 1 rad moves a corner.
+double lever_of(const PlateRectangle& rectangle) {
+  return 0.5 * std::hypot(rectangle.length, rectangle.width);
+}
+
+/// Step of Gauss and Newton to less overhang: shifts along and across, and the turn by its lever.
+Vec3 step_inwards(const PlateRectangle& now, std::span<const Vec3> points, double tolerance) {
+  Eigen::Matrix3d squares = Eigen::Matrix3d::Zero();
+  Vec3 rest = Vec3::Zero();
+  for (const Vec3& point : points) {
+    const Vec2 at = within(now, point);
+    const Vec2 over = overhang(now, at);
+    if (over.squaredNorm() >= tolerance * tolerance) continue;
+    for (int axis = 0; axis < 2; ++axis) {
+      if (over[axis] == 0) continue;
+      Vec3 slope = Vec3::Zero();
+      slope[axis] = -1;
+      slope.z() = (axis == 0 ? at.y() : -at.x()) / lever_of(now);
+      squares += slope * slope.transpose();
+      rest += slope * over[axis];
+    }
+  }
+  if (rest.isZero(0)) return Vec3::Zero();
+  squares.diagonal().array() += 1e-3 * squares.trace();  // where one side alone has points
+  return -squares.ldlt().solve(rest);
+}
+
 }  // namespace
 
 PlateRectangle placed_rectangle(std::span<const Vec3> points, const Plane& plane, double length,
@@ -154,31 +181,11 @@ PlateRectangle placed_rectangle(std::span<const Vec3> points, const Plane& plane
   for (PlateRectangle now : {smallest_rectangle(points, plane), from_moments(points, plane)}) {
     now.length = std::max(length, width);
     now.width = std::min(length, width);
-    const double lever = 0.5 * std::hypot(length, width);
     for (int round = 0; round < kRounds; ++round) {
-      // Gauss and Newton: shifts along and across, and the turn by its lever.
-      Eigen::Matrix3d squares = Eigen::Matrix3d::Zero();
-      Vec3 rest = Vec3::Zero();
-      for (const Vec3& point : points) {
-        const Vec2 at = within(now, point);
-        const Vec2 over = overhang(now, at);
-        const double far2 = over.squaredNorm();
-        if (far2 == 0 || far2 >= tolerance * tolerance) continue;
-        for (int axis = 0; axis < 2; ++axis) {
-          if (over[axis] == 0) continue;
-          Vec3 slope = Vec3::Zero();
-          slope[axis] = -1;
-          slope.z() = (axis == 0 ? at.y() : -at.x()) / lever;
-          squares += slope * slope.transpose();
-          rest += slope * over[axis];
-        }
-      }
-      if (rest.isZero(0)) break;
-      squares.diagonal().array() += 1e-3 * squares.trace();  // where one side alone has points
-      const Vec3 step = -squares.ldlt().solve(rest);
+      const Vec3 step = step_inwards(now, points, tolerance);
       const Vec3 across = plane.normal.cross(now.along);
       now.center += step.x() * now.along + step.y() * across;
-      const double turn = step.z() / lever;
+      const double turn = step.z() / lever_of(now);
       now.along = (std::cos(turn) * now.along + std::sin(turn) * across).normalized();
       if (step.norm() < kSettled * tolerance) break;
     }

@@ -206,6 +206,15 @@ Eigen::Vector3f channel_gains(const std::vector<std::vector<ColorAmplitude>>& am
 
 }  // namespace
 
+std::vector<float> color_evidence(const Curve& curve, int begin, int end, std::size_t colors) {
+  std::vector<float> evidence(colors, 0.F);
+  for (int i = begin; i < end; ++i) {
+    for (std::size_t c = 0; c < colors; ++c)
+      evidence[c] += curve.code[static_cast<std::size_t>(i) * colors + c] / kPointsPerMeasurement;
+  }
+  return evidence;
+}
+
 void measure_code(const cv::Mat& unmixed_image, const std::vector<ColorFamily>& families,
                   std::vector<Curve>& curves, const CodeEvidenceOptions& options) {
   std::vector<cv::Mat> models;

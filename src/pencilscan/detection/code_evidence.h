@@ -18,6 +18,11 @@ struct CodeEvidenceOptions {
   double max_log_ratio = 4;  ///< evidence of one point is limited to this
 };
 
+/// Log-likelihood of each colour that the code of the points [begin, end) gives together, of a
+/// family of `colors`.
+[[nodiscard]] std::vector<float> color_evidence(const Curve& curve, int begin, int end,
+                                                std::size_t colors);
+
 /// Sets Curve::code of all curves of one camera. At each point the three unmixed channels are
 /// regressed on the curve's own profile, the profiles of the other families' curves there (which
 /// share channels: green codes both blue/cyan and red/yellow) and a sloped background. The colour

@@ -323,14 +323,10 @@ bool CameraMatching::is_of_other_color(const Curve& curve, int begin, int end,
                                        const LineName& name) const {
   const auto family = static_cast<std::size_t>(curve.family);
   const LinePattern& pattern = rig_.pattern(name.pattern);
-  const std::size_t colors = families_[family].colors.size();
   const auto own = static_cast<std::size_t>(families_[family].color_of_symbol(
       pattern)[static_cast<std::size_t>(pattern.symbol(name.line))]);
-  std::vector<float> evidence(colors, 0.F);
-  for (int i = begin; i < end; ++i) {
-    for (std::size_t c = 0; c < colors; ++c)
-      evidence[c] += curve.code[static_cast<std::size_t>(i) * colors + c] / kPointsPerMeasurement;
-  }
+  const std::vector<float> evidence =
+      color_evidence(curve, begin, end, families_[family].colors.size());
   const float against = *std::max_element(evidence.begin(), evidence.end()) - evidence[own];
   return against > std::log(options_.confidence / (1 - options_.confidence));
 }

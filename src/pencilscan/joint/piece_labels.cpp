@@ -16,12 +16,7 @@ namespace {
 /// Cost of each colour of the family, the best 0.
 std::vector<float> color_costs(const Curve& curve, const CurvePiece& piece, std::size_t colors,
                                const JointOptions& options) {
-  std::vector<float> evidence(colors, 0.F);
-  for (int i = piece.begin; i < piece.end; ++i) {
-    for (std::size_t c = 0; c < colors; ++c) {
-      evidence[c] += curve.code[static_cast<std::size_t>(i) * colors + c] / kPointsPerMeasurement;
-    }
-  }
+  std::vector<float> evidence = color_evidence(curve, piece.begin, piece.end, colors);
   const float best = *std::max_element(evidence.begin(), evidence.end());
   for (float& e : evidence) e = std::min(best - e, static_cast<float>(options.max_color_cost));
   return evidence;
