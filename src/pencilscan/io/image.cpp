@@ -1,5 +1,7 @@
 #include "pencilscan/io/image.h"
 
+#include <zlib.h>
+
 #include <algorithm>
 #include <array>
 #include <cstring>
@@ -30,16 +32,26 @@ std::uint32_t big_endian_32(std::string_view bytes, std::size_t at) {
   return value;
 }
 
-/// Walks the chunks (length, type, data, checksum) to IEND. PNG specification, section 5.
-bool png_is_whole(std::string_view bytes) {
-  std::size_t at = 8;
+constexpr std::string_view kPng = "\x89PNG\r\n\x1a\n"sv;
+
+/// Walks the chunks (length, type, data, checksum) to IEND, as long as is_right(type and data,
+/// checksum). PNG specification, section 5.
+template <class IsRight>
+bool reaches_end_of_png(std::string_view bytes, IsRight is_right) {
+  std::size_t at = kPng.size();
   while (at + 12 <= bytes.size()) {
     const std::size_t length = big_endian_32(bytes, at);
     if (length > bytes.size() - at - 12) return false;
+    if (!is_right(bytes.substr(at + 4, 4 + length), big_endian_32(bytes, at + 8 + length)))
+      return false;
     if (bytes.substr(at + 4, 4) == "IEND"sv) return true;
     at += 12 + length;
   }
   return false;
+}
+
+bool png_is_whole(std::string_view bytes) {
+  return reaches_end_of_png(bytes, [](std::string_view, std::uint32_t) { return true; });
 }
 
 /// True when an end-of-image marker follows the last start-of-scan. Cameras append bytes after it.
@@ -61,7 +73,7 @@ bool bmp_is_whole(std::string_view bytes) {
 void check_whole(const std::filesystem::path& path, std::string_view bytes) {
   const auto fail = [&](const char* rule) { throw InputError(path.string(), "", "", rule); };
   if (bytes.empty()) fail("the image file is empty");
-  if (bytes.starts_with("\x89PNG\r\n\x1a\n"sv)) {
+  if (bytes.starts_with(kPng)) {
     if (!png_is_whole(bytes)) fail("truncated PNG: it must end with an IEND chunk");
   } else if (bytes.starts_with("\xff\xd8"sv)) {
     if (!jpeg_is_whole(bytes)) fail("truncated JPEG: it must end with an end-of-image marker");
@@ -128,6 +140,24 @@ cv::Mat read_stored_image(const std::filesystem::path& path) {
                      "must be a finite number");
   }
   return image;
+}
+
+std::optional<ImageShape> sound_png(const std::filesystem::path& path) {
+  const std::string bytes = read_file(path);
+  constexpr std::size_t kHeader = 33;  // signature and IHDR
+  if (!bytes.starts_with(kPng) || bytes.size() < kHeader) return std::nullopt;
+  const bool is_sound =
+      reaches_end_of_png(bytes, [](std::string_view chunk, std::uint32_t checksum) {
+        return crc32_z(0, reinterpret_cast<const Bytef*>(chunk.data()), chunk.size()) == checksum;
+      });
+  const char bits = bytes[24];
+  const char color = bytes[25];
+  constexpr char kGrey = 0;
+  constexpr char kRgb = 2;
+  if (!is_sound || (bits != 8 && bits != 16) || (color != kGrey && color != kRgb))
+    return std::nullopt;
+  return ImageShape{static_cast<int>(big_endian_32(bytes, 16)),
+                    static_cast<int>(big_endian_32(bytes, 20)), color == kGrey ? 1 : 3};
 }
 
 cv::Mat unit_values(const cv::Mat& stored) {

@@ -19,6 +19,15 @@ namespace pencilscan {
 /// CV_32FC3 in [0, 1] of an image as stored; grey is replicated.
 [[nodiscard]] cv::Mat unit_image(const cv::Mat& stored);
 
+struct ImageShape {
+  int width = 0;
+  int height = 0;
+  int channels = 0;
+};
+/// The shape of a PNG of 8 or 16 bits, grey or RGB, whose bytes are those that were written, by the
+/// checksums of its chunks: a tenth of the time that decoding takes. Nothing of any other file.
+[[nodiscard]] std::optional<ImageShape> sound_png(const std::filesystem::path& path);
+
 /// The file of `stem` in `folder` with one of the known endings (.png .tiff .tif .jpg .jpeg .bmp),
 /// in capitals or not. InputError that names both where there are two.
 [[nodiscard]] std::optional<std::filesystem::path> find_image(const std::filesystem::path& folder,

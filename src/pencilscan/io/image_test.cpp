@@ -71,6 +71,28 @@ TEST_F(Io, TruncatedImagesAreRejectedAtEveryLength) {
   }
 }
 
+TEST_F(Io, SoundPngsAreToldByTheirChecksums) {
+  const cv::Mat grey(30, 40, CV_8UC1, cv::Scalar(7));
+  for (const auto& [image, bits, channels] :
+       {std::tuple{test_image(), 8, 3}, std::tuple{test_image(), 16, 3}, std::tuple{grey, 8, 1}}) {
+    write_image(folder_ / "a.png", image, bits);
+    const std::optional<ImageShape> shape = sound_png(folder_ / "a.png");
+    ASSERT_TRUE(shape);
+    EXPECT_EQ(shape->width, 40);
+    EXPECT_EQ(shape->height, 30);
+    EXPECT_EQ(shape->channels, channels);
+  }
+  const std::string sound = read_file(folder_ / "a.png");
+  for (std::size_t at = 12; at < sound.size(); ++at) {  // from the first chunk's type on
+    std::string flipped = sound;
+    flipped[at] = static_cast<char>(flipped[at] ^ 1);
+    EXPECT_FALSE(sound_png(put("b.png", flipped))) << at;
+    EXPECT_FALSE(sound_png(put("b.png", sound.substr(0, at)))) << at;
+  }
+  write_image(folder_ / "a.jpg", test_image());
+  EXPECT_FALSE(sound_png(folder_ / "a.jpg"));
+}
+
 TEST_F(Io, WhatIsNoImageIsRejected) {
   EXPECT_THAT(error_of([&] { return read_image(put("a.png", "hello")); }),
               ::testing::HasSubstr("must be a PNG, TIFF, JPEG or BMP image"));

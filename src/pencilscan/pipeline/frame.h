@@ -76,6 +76,13 @@ struct FrameLinks {
   std::function<void(std::shared_ptr<const TrackedSurface>)> hand_on;
 };
 
+/// Curves and labels as guided matching completes them, and the surface that they show.
+struct GuidedLines {
+  std::vector<GridGraph> graphs;
+  Labeling labeling;
+  std::vector<LocalSurface> surfaces;
+};
+
 /// Labelled points of one frame and everything that led to them. Each stage fills in its part.
 struct PointResult {
   std::vector<ColorFamily> families;
@@ -83,6 +90,8 @@ struct PointResult {
   std::vector<CameraDetection> detections;  ///< per camera; curves have moved into the graphs
   std::vector<GridGraph> graphs;            ///< per camera
   Labeling labeling;
+  /// Of `graphs` and `labeling`, where the solution had to ask for it, until points are placed.
+  std::optional<GuidedLines> guided;
   CrossingDisagreement crossings;  ///< joint only: the paper's two have none by construction
   std::vector<CrossingDisagreement> device_crossings;  ///< the same: cameras, then projectors
   /// The rig as the frame corrects it, which lines were named with, where the one given is off.
@@ -144,6 +153,10 @@ struct NothingFound : StageError {
 [[nodiscard]] PointResult solve_frame(const Rig& rig, const Frame& frame, PointResult curves,
                                       const PointOptions& options = {},
                                       const StageClock& clock = {});
+
+/// Guided matching on the surface that the labels of `lines` show.
+[[nodiscard]] GuidedLines guided_lines(const Rig& rig, const PointResult& lines,
+                                       const PointOptions& options = {});
 
 /// From lines to points: guided matching on the surface that the labels show, then camera rays meet
 /// light sheets. Points are triangulated with the rig as given; where it is off, their sigma grows

@@ -42,6 +42,13 @@ std::vector<MeasuredPoint> dense_points(const Rig& rig, std::span<const DepthMap
 
 }  // namespace
 
+GuidedLines guided_lines(const Rig& rig, const PointResult& lines, const PointOptions& options) {
+  GuidedLines result{lines.graphs, lines.labeling, {}};
+  result.surfaces = match_guided(rig, lines.families, presence_images(lines.detections),
+                                 result.graphs, result.labeling, options.guided);
+  return result;
+}
+
 PointResult place_points(const Rig& rig, PointResult lines, const PointOptions& options,
                          const StageClock& clock) {
   PointResult result = std::move(lines);
@@ -49,9 +56,13 @@ PointResult place_points(const Rig& rig, PointResult lines, const PointOptions& 
   std::vector<LocalSurface> surfaces;
   if (is_guided) {
     clock("guided matching", [&] {
-      surfaces = match_guided(result.corrected ? *result.corrected : rig, result.families,
-                              presence_images(result.detections), result.graphs, result.labeling,
-                              options.guided);
+      if (!result.guided)
+        result.guided =
+            guided_lines(result.corrected ? *result.corrected : rig, result, options);
+      result.graphs = std::move(result.guided->graphs);
+      result.labeling = std::move(result.guided->labeling);
+      surfaces = std::move(result.guided->surfaces);
+      result.guided.reset();
     });
   }
   clock("triangulation", [&] {

@@ -21,6 +21,7 @@ struct FrameSource::Storage {
   virtual ~Storage() = default;
   /// One image per camera of the rig, empty where there is none.
   [[nodiscard]] virtual std::vector<cv::Mat> images(const Rig& rig, std::size_t frame) const = 0;
+  virtual void check(const Rig& rig, std::size_t frame) const = 0;
   [[nodiscard]] virtual std::vector<std::uint64_t> hashes(std::size_t frame) const = 0;
   [[nodiscard]] virtual std::optional<FrameTiming> timing(std::size_t frame) const = 0;
 };
@@ -30,6 +31,11 @@ struct FrameSource::Folders : Storage {
 
   std::vector<cv::Mat> images(const Rig& rig, std::size_t frame) const override {
     return read_images(rig, frames[frame]);
+  }
+  void check(const Rig& rig, std::size_t frame) const override {
+    for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
+      if (const auto& image = frames[frame].images[c]) check_camera_image(rig.cameras[c], *image);
+    }
   }
   std::vector<std::uint64_t> hashes(std::size_t frame) const override {
     return file_hashes(frames[frame]);
@@ -59,6 +65,9 @@ struct FrameSource::Recorded : Storage {
       result[c] = camera_values(rig.cameras[c], stored, recording.picture_file(*at, *camera_of[c]));
     }
     return result;
+  }
+  void check(const Rig& rig, std::size_t frame) const override {
+    static_cast<void>(images(rig, frame));
   }
   std::vector<std::uint64_t> hashes(std::size_t frame) const override {
     std::vector<std::uint64_t> hashes;
@@ -147,6 +156,11 @@ Frame FrameSource::read(const Rig& rig, std::size_t frame) const {
   result.timing = storage_->timing(frame);
   if (plain_) result.plain = plain_->storage_->images(rig, plain_of_[frame]);
   return result;
+}
+
+void FrameSource::check(const Rig& rig, std::size_t frame) const {
+  storage_->check(rig, frame);
+  if (plain_) plain_->storage_->check(rig, plain_of_[frame]);
 }
 
 std::vector<std::uint64_t> FrameSource::picture_hashes(std::size_t frame) const {

@@ -28,6 +28,8 @@ class FrameSource {
   /// The pictures of a frame. InputError for a broken one or, of image folders, one of another size
   /// than its camera. `rig` is the one that it was opened with.
   [[nodiscard]] Frame read(const Rig& rig, std::size_t frame) const;
+  /// InputError where read() would have one.
+  void check(const Rig& rig, std::size_t frame) const;
   /// FNV-1a hashes of the bytes of a frame's pictures, one per camera, 0 where there is none.
   [[nodiscard]] std::vector<std::uint64_t> picture_hashes(std::size_t frame) const;
   /// The hash of a frame's name and of `pictures`, its picture_hashes(), and of its pictures in

@@ -134,10 +134,7 @@ void check_images(const Rig& rig, const FrameSource& frames, const Progress& pro
   const auto chunk = static_cast<std::size_t>(thread_count());
   for (std::size_t first = 0; first < frames.size(); first += chunk) {
     const std::size_t count = std::min(chunk, frames.size() - first);
-    parallel_for(count, [&](std::size_t i) {
-      const Frame frame = frames.read(rig, first + i);
-      static_cast<void>(frame);
-    });
+    parallel_for(count, [&](std::size_t i) { frames.check(rig, first + i); });
     tell_steps(progress, "checking: frame", first + count, frames.size());
   }
 }

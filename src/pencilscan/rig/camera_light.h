@@ -15,6 +15,10 @@ namespace pencilscan {
 /// The same of a file of the camera's size; InputError when it has another one.
 [[nodiscard]] cv::Mat read_camera_image(const Camera& camera, const std::filesystem::path& path);
 
+/// InputError where read_camera_image() would have one, without decoding what is sound by its
+/// checksums.
+void check_camera_image(const Camera& camera, const std::filesystem::path& path);
+
 /// Linear light of camera_values(), CV_32FC3 RGB: black level and gamma taken out, the colours that
 /// a mosaic leaves out interpolated (io/mosaic.h).
 [[nodiscard]] cv::Mat linear_light(const Camera& camera, const cv::Mat& values);
