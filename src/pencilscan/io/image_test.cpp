@@ -5,6 +5,7 @@
 
 #include <opencv2/core.hpp>
 
+#include "pencilscan/io/file.h"
 #include "pencilscan/io/io_fixture.h"
 #include "pencilscan/io/linear_light.h"
 #include "pencilscan/io/mosaic.h"
