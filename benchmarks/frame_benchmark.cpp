@@ -96,12 +96,13 @@ void run(const Rig& stated, const std::filesystem::path& folder, int threads, in
   Times shape;  // depth to mesh
   std::size_t point_count = 0;
   Frame frame;
+  const PointOptions options = with_shape ? before_surface({}) : PointOptions{};
   for (int i = 0; i <= runs; ++i) {  // the first run warms up
     reading.measure([&] { frame = read_frame(rig, folder); });
     FrameResult result;
     std::vector<StageTime> times;
     const StageClock clock({}, times);
-    points.measure([&] { result.points = measure_points(rig, frame, {}, clock); });
+    points.measure([&] { result.points = measure_points(rig, frame, options, clock); });
     shape.measure([&] {
       if (!with_shape) return;
       result.shape = measure_shape(rig, frame, result.points, {}, {}, clock);

@@ -24,7 +24,9 @@ struct GuidedMatchingOptions {
   double support_px = 16;         ///< within which lines around must be known ...
   double support_lines = 1.5;     ///< ... or so many line spacings, if those are more
   int min_support = 3;            ///< points of them
-  int passes = 2;
+  int passes = 2;                 ///< where no dense surface follows; 0: no guided matching
+  int passes_before_surface = 1;  ///< where one does: it shows more, and less that is wrong
+  int passes_on_surface = 3;      ///< on that
   float confidence = 0.99F;
 };
 

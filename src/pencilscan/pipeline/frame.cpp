@@ -55,7 +55,9 @@ FrameResult measure_frame(const Rig& rig, const Frame& frame, PointResult lines,
                           const FrameOptions& options, const FrameLinks& links,
                           const StageClock& clock) {
   FrameResult result;
-  result.points = place_points(rig, std::move(lines), options.points, clock);
+  const bool looks_again = options.meshes && options.shape.depth.enabled && !lines.corrected;
+  result.points = place_points(
+      rig, std::move(lines), looks_again ? before_surface(options.points) : options.points, clock);
   if (result.points.points.empty()) throw NothingFound(why_nothing(result.points));
   if (!options.meshes) return result;
   const Frame right = without(frame, result.points.left_out);

@@ -76,13 +76,6 @@ struct FrameLinks {
   std::function<void(std::shared_ptr<const TrackedSurface>)> hand_on;
 };
 
-/// Curves and labels as guided matching completes them, and the surface that they show.
-struct GuidedLines {
-  std::vector<GridGraph> graphs;
-  Labeling labeling;
-  std::vector<LocalSurface> surfaces;
-};
-
 /// Labelled points of one frame and everything that led to them. Each stage fills in its part.
 struct PointResult {
   std::vector<ColorFamily> families;
@@ -90,8 +83,6 @@ struct PointResult {
   std::vector<CameraDetection> detections;  ///< per camera; curves have moved into the graphs
   std::vector<GridGraph> graphs;            ///< per camera
   Labeling labeling;
-  /// Of `graphs` and `labeling`, where the solution had to ask for it, until points are placed.
-  std::optional<GuidedLines> guided;
   CrossingDisagreement crossings;  ///< joint only: the paper's two have none by construction
   std::vector<CrossingDisagreement> device_crossings;  ///< the same: cameras, then projectors
   /// The rig as the frame corrects it, which lines were named with, where the one given is off.
@@ -154,9 +145,9 @@ struct NothingFound : StageError {
                                       const PointOptions& options = {},
                                       const StageClock& clock = {});
 
-/// Guided matching on the surface that the labels of `lines` show.
-[[nodiscard]] GuidedLines guided_lines(const Rig& rig, const PointResult& lines,
-                                       const PointOptions& options = {});
+/// As `options`, for points on whose dense surface match_on_surface() looks again: the surface that
+/// the labels show need not find all lines.
+[[nodiscard]] PointOptions before_surface(PointOptions options);
 
 /// From lines to points: guided matching on the surface that the labels show, then camera rays meet
 /// light sheets. Points are triangulated with the rig as given; where it is off, their sigma grows

@@ -26,17 +26,13 @@ void leave_out(const Rig& rig, const std::vector<PictureFinding>& findings, Poin
   }
 }
 
-/// The share of a camera's nameable points that have a name after guided matching, of the camera
-/// where it is least: a camera that stands elsewhere has few. A camera without any does not count.
-double guided_share(const GuidedLines& lines) {
-  double least = 1;
-  for (std::size_t c = 0; c < lines.graphs.size(); ++c) {
-    const auto points = static_cast<double>(nameable_points(lines.graphs[c], lines.labeling));
-    if (points > 0)
-      least =
-          std::min(least, static_cast<double>(labelled_points(lines.labeling.runs[c])) / points);
-  }
-  return least;
+/// The share of named points (named_share()) after guided matching.
+double guided_share(const Rig& rig, const PointOptions& options, const PointResult& result) {
+  std::vector<GridGraph> graphs = result.graphs;
+  Labeling labeling = result.labeling;
+  match_guided(rig, result.families, presence_images(result.detections), graphs, labeling,
+               options.guided);
+  return named_share(graphs, labeling);
 }
 
 /// Gives the curves their lines. Methods that correct the rig first leave out pictures that do not
@@ -66,11 +62,7 @@ std::optional<Rig> label_lines(const Rig& rig, const Frame& frame, const PointOp
     result.labeling = solve();
   }
   LineNaming naming = name_lines(rig, result.families, result.graphs, result.labeling, options,
-                                 [&] {
-                                   result.guided = guided_lines(rig, result, options);
-                                   return guided_share(*result.guided);
-                                 });
-  if (naming.corrected) result.guided.reset();
+                                 [&] { return guided_share(rig, options, result); });
   result.labeling = std::move(naming.labeling);
   result.crossings = naming.crossings;
   result.device_crossings = std::move(naming.device_crossings);

@@ -42,11 +42,9 @@ std::vector<MeasuredPoint> dense_points(const Rig& rig, std::span<const DepthMap
 
 }  // namespace
 
-GuidedLines guided_lines(const Rig& rig, const PointResult& lines, const PointOptions& options) {
-  GuidedLines result{lines.graphs, lines.labeling, {}};
-  result.surfaces = match_guided(rig, lines.families, presence_images(lines.detections),
-                                 result.graphs, result.labeling, options.guided);
-  return result;
+PointOptions before_surface(PointOptions options) {
+  options.guided.passes = std::min(options.guided.passes, options.guided.passes_before_surface);
+  return options;
 }
 
 PointResult place_points(const Rig& rig, PointResult lines, const PointOptions& options,
@@ -56,13 +54,9 @@ PointResult place_points(const Rig& rig, PointResult lines, const PointOptions& 
   std::vector<LocalSurface> surfaces;
   if (is_guided) {
     clock("guided matching", [&] {
-      if (!result.guided)
-        result.guided =
-            guided_lines(result.corrected ? *result.corrected : rig, result, options);
-      result.graphs = std::move(result.guided->graphs);
-      result.labeling = std::move(result.guided->labeling);
-      surfaces = std::move(result.guided->surfaces);
-      result.guided.reset();
+      surfaces = match_guided(result.corrected ? *result.corrected : rig, result.families,
+                              presence_images(result.detections), result.graphs, result.labeling,
+                              options.guided);
     });
   }
   clock("triangulation", [&] {
@@ -87,11 +81,13 @@ FrameResult match_on_surface(const Rig& rig, FrameResult result, const PointOpti
       !shape.scene)
     return result;
   points.is_on_surface = true;
+  GuidedMatchingOptions guided = options.guided;
+  if (guided.passes > 0) guided.passes = guided.passes_on_surface;
   clock("guided matching on the surface", [&] {
     points.contradicted = drop_contradicted(rig, *shape.scene, points.graphs, points.labeling);
     const std::vector<LocalSurface> surfaces =
         match_guided(rig, points.families, presence_images(points.detections), points.graphs,
-                     points.labeling, options.guided, dense_points(rig, shape.depth.maps));
+                     points.labeling, guided, dense_points(rig, shape.depth.maps));
     std::vector<MeasuredPoint> triangulated =
         triangulate(rig, points.graphs, points.labeling, options.triangulation);
     SettledPoints settled = settle_on_surface(

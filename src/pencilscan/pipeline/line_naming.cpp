@@ -1,5 +1,6 @@
 #include "pencilscan/pipeline/line_naming.h"
 
+#include <algorithm>
 #include <limits>
 #include <utility>
 
@@ -31,6 +32,16 @@ std::size_t nameable_points(const GridGraph& graph, const Labeling& labeling) {
   return curve_points(graph) - undecided[static_cast<std::size_t>(UndecidedReason::kOutsideVolume)];
 }
 
+double named_share(const std::vector<GridGraph>& graphs, const Labeling& labeling) {
+  double least = 1;
+  for (std::size_t c = 0; c < graphs.size(); ++c) {
+    const auto points = static_cast<double>(nameable_points(graphs[c], labeling));
+    if (points > 0)
+      least = std::min(least, static_cast<double>(labelled_points(labeling.runs[c])) / points);
+  }
+  return least;
+}
+
 LineNaming name_lines(const Rig& rig, const std::vector<ColorFamily>& families,
                       const std::vector<GridGraph>& graphs, Labeling labeling,
                       const PointOptions& options, const std::function<double()>& guided_share) {
@@ -51,6 +62,7 @@ LineNaming name_lines(const Rig& rig, const std::vector<ColorFamily>& families,
     return result;
   const bool meets =
       !is_off && result.crossings.median_px <= kAsClosely * result.crossings.expected_px;
+  if (meets && named_share(graphs, result.labeling) > kMost) return result;
   if (meets && guided_share && guided_share() > kMost) return result;
 
   const FrameCurves curves{families, graphs};

@@ -21,6 +21,10 @@ struct LineNaming {
 /// volume (walls, a floor, people).
 [[nodiscard]] std::size_t nameable_points(const GridGraph& graph, const Labeling& labeling);
 
+/// The share of a camera's nameable points that have a name, of the camera where it is least: one
+/// that stands elsewhere has few. A camera without any does not count.
+[[nodiscard]] double named_share(const std::vector<GridGraph>& graphs, const Labeling& labeling);
+
 /// Decides whether lines keep the names that the solution gave with the rig as given, or get names
 /// with a corrected rig. For methods that may correct the rig (MethodCapabilities).
 ///
@@ -28,8 +32,8 @@ struct LineNaming {
 /// name. It is not doubted where crossings meet about as closely as noise lets expect and most
 /// curves of every camera have a name after guided matching: curves that are close together only
 /// need the surface.
-/// (`guided_share` gives the share of points with a name, of the camera where it is least. It is
-/// asked only then. Without it, the share counts as 0.)
+/// (`guided_share` gives the named_share() after guided matching. It is asked only where it may be
+/// less than enough: guided matching takes no name away. Without it, the share counts as 0.)
 ///
 /// A rig in doubt is corrected from the crossings (refine_rig_on_frames). The names with the
 /// corrected rig are taken if its crossings agree, or agree better, or if clearly more curves have
