@@ -223,7 +223,9 @@ class PackageTest(unittest.TestCase):
 
         whole, ours = names(self.scene.result.points), names(points)
         both = whole.keys() & ours.keys()
-        self.assertGreater(len(both), 0.95 * len(whole))
+        # Labels do not say which names were tentative: lines found without them lie a little elsewhere.
+        self.assertGreater(len(both), 0.9 * len(whole))
+        self.assertGreater(len(ours), 0.99 * len(whole))
         self.assertGreater(sum(whole[k] == ours[k] for k in both), 0.999 * len(both))
 
     def test_stages_are_views_and_fit_each_other(self) -> None:
