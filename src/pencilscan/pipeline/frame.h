@@ -169,6 +169,11 @@ struct NothingFound : StageError {
                                            const PointOptions& options = {},
                                            const StageClock& clock = {});
 
+/// Surface that none of the points lies near was not measured after all (surface/supported.h).
+/// Where lines were not matched on the surface everything stays as it is.
+[[nodiscard]] FrameResult leave_unsupported(const Rig& rig, FrameResult result,
+                                            const FusionOptions& options = {});
+
 /// Where the object moved within the exposure, points and surface are as much less sure as that
 /// makes them.
 [[nodiscard]] FrameResult count_motion(const Rig& rig, FrameResult result);

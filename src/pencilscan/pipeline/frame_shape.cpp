@@ -6,6 +6,8 @@
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/pipeline/frame.h"
 #include "pencilscan/rig/camera_light.h"
+#include "pencilscan/rig/object_space.h"
+#include "pencilscan/surface/supported.h"
 #include "pencilscan/surface/untangle.h"
 #include "pencilscan/surface/vertex_color.h"
 #include "pencilscan/tracking/carried_surface.h"
@@ -196,6 +198,24 @@ ShapeResult measure_shape(const Rig& rig, const Frame& frame, const PointResult&
     warning.code = WarningCode::kCurvesOnly;
     warning.text = "dense depth found too little: the surface rests on the labelled curves alone";
   }
+  return result;
+}
+
+FrameResult leave_unsupported(const Rig& rig, FrameResult result, const FusionOptions& options) {
+  constexpr double kReach = 2;  // line spacings
+  if (!result.points.is_on_surface) return result;
+  ShapeResult& shape = result.shape;
+  TriangleMesh& mesh = shape.surface.mesh;
+  const std::vector<char> unsupported =
+      unsupported_vertices(mesh, result.points.points, kReach * line_spacing(rig));
+  if (std::count(unsupported.begin(), unsupported.end(), 1) == 0) return result;
+  contradict_vertices(mesh, unsupported, shape.holes);
+  for (std::size_t v = 0; v < unsupported.size(); ++v) {
+    if (unsupported[v] == 0) continue;
+    mesh.confidence[v] = 0;
+    mesh.hole[v] = static_cast<std::uint8_t>(HoleReason::kContradicted);
+  }
+  take_measured_part(options, shape.surface);
   return result;
 }
 

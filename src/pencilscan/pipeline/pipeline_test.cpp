@@ -96,6 +96,38 @@ TEST_F(PipelineTest, TheSurfaceTakesWrongLabelsAwayAndFindsTheirLinesAgain) {
   EXPECT_EQ(made.shape.surface.used.size(), result.points.size());
 }
 
+TEST_F(PipelineTest, SurfaceWhosePointsWereTakenBackIsNotMeasured) {
+  const FrameOptions options = quick().output.frame;
+  FrameResult made{measure_points(*rig_, *frame_), {}, {}};
+  made.shape = measure_shape(*rig_, *frame_, made.points, options.shape);
+  made = match_on_surface(*rig_, std::move(made));
+  const double reach = 2 * line_spacing(*rig_);
+  std::erase_if(made.points.points, [](const MeasuredPoint& p) { return p.z > 20; });
+  const auto highest = [](const TriangleMesh& mesh) {
+    double z = -1e9;
+    for (const Vec3& x : mesh.vertices) z = std::max(z, x.z());
+    return z;
+  };
+  const auto whole_area = [&] {
+    const auto& area = made.shape.holes.area_mm2;
+    return std::accumulate(area.begin(), area.end(), 0.0);
+  };
+  const double area = whole_area();
+  const double share = made.shape.surface.report.measured_share;
+  ASSERT_GT(highest(made.shape.surface.measured), 20 + 2 * reach);
+  made = leave_unsupported(*rig_, std::move(made), options.shape.fusion);
+  const SurfaceResult& surface = made.shape.surface;
+  EXPECT_LT(highest(surface.measured), 20 + reach);
+  EXPECT_GT(highest(surface.measured), 20);
+  EXPECT_GT(highest(surface.mesh), 20 + 2 * reach);  // closed as before
+  EXPECT_LT(surface.report.measured_share, 0.9 * share);
+  EXPECT_NEAR(whole_area(), area, 1e-9 * area);
+  const auto contradicted = static_cast<std::uint8_t>(HoleReason::kContradicted);
+  for (std::size_t v = 0; v < surface.mesh.vertices.size(); ++v) {
+    if (surface.mesh.confidence[v] > 0) EXPECT_NE(surface.mesh.hole[v], contradicted);
+  }
+}
+
 TEST_F(PipelineTest, LinesWithoutACodeAreToldApartWhereFourProjectorsShareAColour) {
   Rig rig = *rig_;
   for (const auto& [eye, axis] : {std::pair(Vec3(450, -225, 45), Axis::kColumn),

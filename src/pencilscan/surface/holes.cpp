@@ -134,6 +134,19 @@ HoleReason explain_vertex(const Rig& rig, const Visibility& visibility,
   return best;
 }
 
+/// A face belongs to the reason of its first invented vertex.
+void sum_areas(const TriangleMesh& mesh, HoleReport& report) {
+  report.area_mm2.fill(0);
+  for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
+    HoleReason reason = HoleReason::kMeasured;
+    for (const int v : mesh.faces[f]) {
+      const HoleReason of_vertex = report.vertices[static_cast<std::size_t>(v)];
+      if (reason == HoleReason::kMeasured) reason = of_vertex;
+    }
+    report.area_mm2[static_cast<std::size_t>(reason)] += face_area(mesh, f);
+  }
+}
+
 }  // namespace
 
 HoleReport explain_holes(const Rig& rig, const RayScene& surface, std::span<DepthMap> maps,
@@ -156,16 +169,15 @@ HoleReport explain_holes(const Rig& rig, const RayScene& surface, std::span<Dept
     if (mesh.confidence.empty() || mesh.confidence[v] > 0) return;
     report.vertices[v] = explain_vertex(rig, visibility, maps, mesh.vertices[v], normals[v]);
   });
-  // A face belongs to the reason of its first invented vertex.
-  for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
-    HoleReason reason = HoleReason::kMeasured;
-    for (const int v : mesh.faces[f]) {
-      const HoleReason of_vertex = report.vertices[static_cast<std::size_t>(v)];
-      if (reason == HoleReason::kMeasured) reason = of_vertex;
-    }
-    report.area_mm2[static_cast<std::size_t>(reason)] += face_area(mesh, f);
-  }
+  sum_areas(mesh, report);
   return report;
+}
+
+void contradict_vertices(const TriangleMesh& mesh, std::span<const char> which,
+                         HoleReport& report) {
+  for (std::size_t v = 0; v < which.size(); ++v)
+    if (which[v] != 0) report.vertices[v] = HoleReason::kContradicted;
+  sum_areas(mesh, report);
 }
 
 const char* to_string(HoleReason reason) {

@@ -254,9 +254,17 @@ void finish_surface(const Rig& rig, std::span<const MeasuredPoint> points,
   const double spacing = report.spacing_mm;
   result.used = points_on_maps(rig, points, maps, spacing);
   for (const char used : result.used) report.points_used += static_cast<std::size_t>(used);
-  result.measured = measured_part(result.mesh, options.least_island_spacings2 * spacing * spacing);
+  take_measured_part(options, result);
   note_quality(surface_area(result.mesh), result);
   report.seconds += watch.seconds();
+}
+
+void take_measured_part(const FusionOptions& options, SurfaceResult& result) {
+  const double spacing = result.report.spacing_mm;
+  result.measured = measured_part(result.mesh, options.least_island_spacings2 * spacing * spacing);
+  result.measured.hole.clear();  // it has none
+  const double area = surface_area(result.mesh);
+  result.report.measured_share = area > 0 ? surface_area(result.measured) / area : 0;
 }
 
 std::string to_string(SurfaceStatus status) {

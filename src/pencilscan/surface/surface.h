@@ -117,6 +117,9 @@ void finish_surface(const Rig& rig, std::span<const MeasuredPoint> points,
                     std::span<const DepthMap> maps, const FusionOptions& options,
                     SurfaceResult& result);
 
+/// The measured part anew, as finish_surface() makes it, after confidences were taken back.
+void take_measured_part(const FusionOptions& options, SurfaceResult& result);
+
 [[nodiscard]] std::string to_string(SurfaceStatus status);
 
 }  // namespace pencilscan
