@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <numeric>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 #include <tuple>
@@ -23,6 +24,7 @@
 #include "pencilscan/pipeline/rig_refinement.h"
 #include "pencilscan/pipeline/sequence.h"
 #include "pencilscan/rig/device_list.h"
+#include "pencilscan/rig/object_space.h"
 #include "pencilscan/simulation/render.h"
 
 namespace pencilscan {

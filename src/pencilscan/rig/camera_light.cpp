@@ -21,10 +21,10 @@ void check_channels(const Camera& camera, int channels, const std::filesystem::p
 
 void check_size(const Camera& camera, int width, int height, const std::filesystem::path& path) {
   if (width == camera.width && height == camera.height) return;
-  throw InputError(
-      path.string(), "image size", std::to_string(width) + "x" + std::to_string(height),
-      "must be " + std::to_string(camera.width) + "x" + std::to_string(camera.height) +
-          " as camera " + camera.name + " of the rig");
+  throw InputError(path.string(), "image size",
+                   std::to_string(width) + "x" + std::to_string(height),
+                   "must be " + std::to_string(camera.width) + "x" + std::to_string(camera.height) +
+                       " as camera " + camera.name + " of the rig");
 }
 
 }  // namespace

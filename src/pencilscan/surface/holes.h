@@ -39,8 +39,7 @@ struct HoleReport {
                                        std::span<DepthMap> maps, const HoleOptions& options = {});
 
 /// Vertices (1 in `which`) that were measured are contradicted after all.
-void contradict_vertices(const TriangleMesh& mesh, std::span<const char> which,
-                         HoleReport& report);
+void contradict_vertices(const TriangleMesh& mesh, std::span<const char> which, HoleReport& report);
 
 [[nodiscard]] const char* to_string(HoleReason reason);
 

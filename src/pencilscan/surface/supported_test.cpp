@@ -10,7 +10,7 @@ TEST(Supported, OnlyMeasuredVerticesFarFromEveryPointAreNot) {
   std::vector<MeasuredPoint> points;
   for (int i = 0; i < 100; ++i) {
     mesh.vertices.emplace_back(0.5 * i, 0, 0);
-    mesh.confidence.push_back(i == 99 ? 0.F : 0.9F);  // the last one was invented
+    mesh.confidence.push_back(i == 99 ? 0.F : 0.9F);           // the last one was invented
     set_position(Vec3(0.1 * i, 1, 0), points.emplace_back());  // up to x = 9.9
   }
   constexpr double kReach = 5;
