@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "pencilscan/core/parallel.h"
+#include "pencilscan/detection/ghosts.h"
 #include "pencilscan/detection/mosaic_trace.h"
 #include "pencilscan/rig/camera_light.h"
 
@@ -58,7 +59,8 @@ CameraDetection detect_curves(const Camera& camera, const Rig& rig,
     for (Curve& curve : curves) curve.family = static_cast<int>(f);
     RefineOptions refine = options.refine;
     refine.sizes = std::max(refine.sizes, sizes_of(ridgels));
-    curves_of[f] = refine_curves(presence, std::move(curves), refine);
+    curves = refine_curves(presence, std::move(curves), refine);
+    curves_of[f] = without_ghosts(presence, std::move(curves), refine.min_points);
     // Dark outside the lit area.
     result.presence[f] = cv::Mat(image.size(), CV_32F, cv::Scalar(0));
     presence.copyTo(result.presence[f](area));

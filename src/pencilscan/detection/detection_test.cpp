@@ -7,6 +7,7 @@
 
 #include "pencilscan/core/random.h"
 #include "pencilscan/detection/detect.h"
+#include "pencilscan/detection/ghosts.h"
 #include "pencilscan/detection/mosaic_trace.h"
 
 namespace pencilscan {
@@ -275,6 +276,70 @@ TEST(RegisteredPatterns, LinesMoveWithTheColourThatShowsThem) {
   // Spent: once more changes nothing.
   EXPECT_TRUE(located.projectors[0].color_registration.none());
   EXPECT_EQ(with_registered_patterns(located).projectors[0].patterns[0].offset_px, after.offset_px);
+}
+
+/// A curve of `count` points a pixel apart from `from` on, as a fit would leave it.
+Curve straight_curve(Eigen::Vector2f from, double angle, int count, float amplitude) {
+  Curve curve;
+  const Eigen::Vector2f way(static_cast<float>(std::cos(angle)),
+                            static_cast<float>(std::sin(angle)));
+  for (int i = 0; i < count; ++i) {
+    CurvePoint& p = curve.points.emplace_back();
+    p.position = from + static_cast<float>(i) * way;
+    p.normal = {way.y(), -way.x()};
+    p.amplitude = amplitude;
+    p.width_px = 0.9F;
+  }
+  return curve;
+}
+
+TEST(Ghosts, DiagonalsOfALatticeGoAndItsLinesStay) {
+  constexpr double kPi = 3.14159265358979;
+  std::vector<TestLine> lines;
+  for (int k = 0; k < 16; ++k) {
+    lines.push_back({.x = 0, .y = 10.0 + 8 * k, .angle = 0, .width = 2.5});
+    lines.push_back({.x = 10.0 + 8 * k, .y = 0, .angle = kPi / 2, .width = 2.5});
+  }
+  cv::Mat presence;
+  cv::extractChannel(draw(lines, 140, 140, 0.02), presence, 2);
+  const Curve line = straight_curve({50, 12}, kPi / 2, 60, 0.45F);
+  const Curve faint = straight_curve({12, 66}, 0, 60, 0.6F);  // fitted a third too high
+  const Curve ghost = straight_curve({18, 18}, kPi / 4, 90, 0.3F);
+  Curve turning = straight_curve({50, 14}, kPi / 2, 60, 0.45F);
+  const Curve away = straight_curve({50, 74}, kPi / 4, 60, 0.3F);
+  turning.points.insert(turning.points.end(), away.points.begin(), away.points.end());
+  const std::vector<Curve> kept = without_ghosts(presence, {line, faint, ghost, turning}, 6);
+  ASSERT_EQ(kept.size(), 3U);
+  EXPECT_EQ(kept[0].points.size(), line.points.size());
+  EXPECT_EQ(kept[1].points.size(), faint.points.size());
+  EXPECT_NEAR(static_cast<double>(kept[2].points.size()), 60, 8);
+  EXPECT_NEAR(static_cast<double>(kept[2].points.front().position.y()), 14, 1e-3);
+}
+
+TEST(Ghosts, CurvesOfTwoDirectionsInOneColorAreLines) {
+  Rig rig = two_color_rig(160, 160);
+  std::vector<TestLine> lines;
+  for (int k = 0; k < 18; ++k) {
+    lines.push_back({.x = 0, .y = 8.0 + 7 * k, .angle = 0.1, .width = 2.5});
+    lines.push_back({.x = 8.0 + 7 * k, .y = 0, .angle = 1.4, .width = 2.5});
+  }
+  const auto families = color_families(rig);
+  const CameraDetection found =
+      detect_curves(rig.cameras[0], rig, families, draw(lines, 160, 160, 0.02), {});
+  std::size_t on = 0;
+  std::size_t off = 0;
+  for (const Curve& curve : found.curves) {
+    for (const CurvePoint& p : curve.points) {
+      const auto x = static_cast<double>(p.position.x());
+      const auto y = static_cast<double>(p.position.y());
+      const bool is_on = std::any_of(lines.begin(), lines.end(), [&](const TestLine& line) {
+        return std::abs(line.distance(x, y)) < 1;
+      });
+      ++(is_on ? on : off);
+    }
+  }
+  EXPECT_GT(on, 2000U);
+  EXPECT_LT(static_cast<double>(off), 0.05 * static_cast<double>(on));
 }
 
 }  // namespace

@@ -1,0 +1,96 @@
+#include "pencilscan/detection/ghosts.h"
+
+#include <algorithm>
+#include <span>
+#include <utility>
+
+#include "pencilscan/detection/refine.h"
+#include "pencilscan/view/nearest.h"
+
+namespace pencilscan {
+namespace {
+
+constexpr float kJudgedWidths = 8;    // to either side of a place
+constexpr float kDark = 0.4F;         // of the line's height
+constexpr std::size_t kFifth = 5;     // the lower one
+constexpr std::size_t kTogether = 4;  // places that are judged as one
+
+/// The value of which one of `parts` lies below.
+float quantile(std::vector<float>& values, std::size_t parts) {
+  const auto at = values.begin() + static_cast<std::ptrdiff_t>(values.size() / parts);
+  std::nth_element(values.begin(), at, values.end());
+  return *at;
+}
+
+float median_width(std::span<const CurvePoint> points) {
+  std::vector<float> widths;
+  for (const CurvePoint& p : points) widths.push_back(p.width_px);
+  return quantile(widths, 2);
+}
+
+/// The presence along a curve, each the mean over `half` points to either side.
+std::vector<float> light_along(const cv::Mat& presence, std::span<const CurvePoint> points,
+                               std::size_t half) {
+  std::vector<float> sums{0};
+  for (const CurvePoint& p : points)
+    sums.push_back(sums.back() + sample_bilinear(presence, p.position.x(), p.position.y()));
+  std::vector<float> light;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const std::size_t low = i - std::min(i, half);
+    const std::size_t high = std::min(points.size(), i + half + 1);
+    light.push_back((sums[high] - sums[low]) / static_cast<float>(high - low));
+  }
+  return light;
+}
+
+/// Per point, 1 where it is one of a ghost.
+std::vector<char> ghostly(const cv::Mat& presence, std::span<const CurvePoint> points) {
+  const float width = std::max(1.F, median_width(points));
+  const auto reach = static_cast<std::size_t>(nearest(kJudgedWidths * width));
+  const std::vector<float> light =
+      light_along(presence, points, static_cast<std::size_t>(nearest(width)));
+  const std::size_t n = points.size();
+  const std::size_t window = std::min(n, 2 * reach + 1);
+  std::vector<char> is_ghost(n, 0);
+  std::vector<float> values;
+  for (std::size_t first = 0; first < n; first += kTogether) {
+    const std::size_t middle = std::min(first + kTogether / 2, n - 1);
+    const std::size_t low = std::min(middle - std::min(middle, reach), n - window);
+    values.assign(light.begin() + static_cast<std::ptrdiff_t>(low),
+                  light.begin() + static_cast<std::ptrdiff_t>(low + window));
+    const float dark = quantile(values, kFifth);
+    values.clear();
+    for (std::size_t i = low; i < low + window; ++i) values.push_back(points[i].amplitude);
+    if (dark >= kDark * quantile(values, 2)) continue;
+    for (std::size_t i = first; i < std::min(first + kTogether, n); ++i) is_ghost[i] = 1;
+  }
+  return is_ghost;
+}
+
+}  // namespace
+
+std::vector<Curve> without_ghosts(const cv::Mat& presence, std::vector<Curve> curves,
+                                  int min_points) {
+  std::vector<Curve> kept;
+  for (Curve& curve : curves) {
+    if (curve.points.empty()) continue;
+    const std::vector<char> is_ghost = ghostly(presence, curve.points);
+    if (std::find(is_ghost.begin(), is_ghost.end(), 1) == is_ghost.end()) {
+      kept.push_back(std::move(curve));
+      continue;
+    }
+    for (auto begin = is_ghost.begin(); begin != is_ghost.end();) {
+      const auto end = std::find(begin, is_ghost.end(), *begin == 0 ? 1 : 0);
+      if (*begin == 0 && end - begin >= min_points) {
+        Curve& part = kept.emplace_back();
+        part.family = curve.family;
+        const auto points = curve.points.begin();
+        part.points.assign(points + (begin - is_ghost.begin()), points + (end - is_ghost.begin()));
+      }
+      begin = end;
+    }
+  }
+  return kept;
+}
+
+}  // namespace pencilscan
