@@ -316,31 +316,5 @@ TEST(Ghosts, DiagonalsOfALatticeGoAndItsLinesStay) {
   EXPECT_NEAR(static_cast<double>(kept[2].points.front().position.y()), 14, 1e-3);
 }
 
-TEST(Ghosts, CurvesOfTwoDirectionsInOneColorAreLines) {
-  Rig rig = two_color_rig(160, 160);
-  std::vector<TestLine> lines;
-  for (int k = 0; k < 18; ++k) {
-    lines.push_back({.x = 0, .y = 8.0 + 7 * k, .angle = 0.1, .width = 2.5});
-    lines.push_back({.x = 8.0 + 7 * k, .y = 0, .angle = 1.4, .width = 2.5});
-  }
-  const auto families = color_families(rig);
-  const CameraDetection found =
-      detect_curves(rig.cameras[0], rig, families, draw(lines, 160, 160, 0.02), {});
-  std::size_t on = 0;
-  std::size_t off = 0;
-  for (const Curve& curve : found.curves) {
-    for (const CurvePoint& p : curve.points) {
-      const auto x = static_cast<double>(p.position.x());
-      const auto y = static_cast<double>(p.position.y());
-      const bool is_on = std::any_of(lines.begin(), lines.end(), [&](const TestLine& line) {
-        return std::abs(line.distance(x, y)) < 1;
-      });
-      ++(is_on ? on : off);
-    }
-  }
-  EXPECT_GT(on, 2000U);
-  EXPECT_LT(static_cast<double>(off), 0.05 * static_cast<double>(on));
-}
-
 }  // namespace
 }  // namespace pencilscan

@@ -126,7 +126,9 @@ TEST_F(PipelineTest, SurfaceWhosePointsWereTakenBackIsNotMeasured) {
   EXPECT_NEAR(whole_area(), area, 1e-9 * area);
   const auto contradicted = static_cast<std::uint8_t>(HoleReason::kContradicted);
   for (std::size_t v = 0; v < surface.mesh.vertices.size(); ++v) {
-    if (surface.mesh.confidence[v] > 0) EXPECT_NE(surface.mesh.hole[v], contradicted);
+    if (surface.mesh.confidence[v] > 0) {
+      EXPECT_NE(surface.mesh.hole[v], contradicted);
+    }
   }
 }
 
