@@ -238,6 +238,9 @@ TEST_F(Exchange, BadOpencvFilesAreNamed) {
   expect_bad(read(write("bad.xml", "<?xml version=\"1.0\"?><opencv_storage><a")), "bad.xml");
   expect_bad(read(write("zero.xml", std::string("<?xml version=\0\0<a>", 20))), "must be text");
   expect_bad(read(write("end.xml", "<?xml version=\n \n")), "must be XML that ends with a tag");
+  for (const char* endless : {"%YAML:1.0\n t: d\nncv-\n ", "%YAML:1.0\n--- t: d\nncv-\n ",
+                              "%YAML:1.0\n# c\n---\n\n  t: d\n ncv-\n ", " t: d\r\nncv-\n "})
+    expect_bad(read(write("endless.yml", endless)), "first key at the beginning of a line");
   expect_bad(read(changed("camera_matrix", "other_matrix")), "camera_matrix");
   expect_bad(read(changed("image_width: 640", "image_width: 0")), "image_width");
   expect_bad(read(changed("cols: 5", "cols: 3")), "distortion_coefficients");

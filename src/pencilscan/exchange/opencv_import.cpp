@@ -4,6 +4,7 @@
 #include <initializer_list>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core/eigen.hpp>
+#include <string_view>
 
 #include "pencilscan/core/error.h"
 #include "pencilscan/exchange/opencv_file.h"
@@ -14,6 +15,22 @@ namespace {
 
 constexpr double kRotationTolerance = 1e-4;
 constexpr int kLargestSide = 1 << 16;  ///< px
+
+/// True where the first key of a YAML text stands at the beginning of its line. Of a text that is
+/// indented as a whole, OpenCV's parser reads what follows less indented for ever.
+bool begins_in_first_column(std::string_view text) {
+  constexpr std::string_view kBlanks = " \t\r";
+  while (!text.empty()) {
+    const std::string_view line = text.substr(0, text.find('\n'));
+    text.remove_prefix(std::min(text.size(), line.size() + 1));
+    const bool is_mark = line.starts_with("---");
+    const std::string_view rest = is_mark ? line.substr(3) : line;
+    const auto first = rest.find_first_not_of(kBlanks);
+    if (first == std::string_view::npos || rest[first] == '#' || line.starts_with("%")) continue;
+    return !is_mark && first == 0;
+  }
+  return true;
+}
 
 /// One file; complaints name it.
 class OpencvReader {
@@ -31,6 +48,8 @@ class OpencvReader {
     const bool has_signature =
         text.starts_with("%YAML") || text.starts_with("<?xml") || text.starts_with("{");
     if (!has_signature) text = "%YAML:1.0\n---\n" + text;
+    if (text.starts_with("%YAML") && !begins_in_first_column(text))
+      fail("", "", "must have its first key at the beginning of a line");
     try {
       storage_.open(text, cv::FileStorage::READ | cv::FileStorage::MEMORY);
     } catch (const std::exception&) {  // OpenCV's own, and what its parser runs into
