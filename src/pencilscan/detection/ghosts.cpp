@@ -11,6 +11,7 @@ namespace pencilscan {
 namespace {
 
 constexpr float kJudgedWidths = 8;    // to either side of a place
+constexpr float kHeightWidths = 3;    // of the mean height
 constexpr float kDark = 0.4F;         // of the line's height
 constexpr std::size_t kFifth = 5;     // the lower one
 constexpr std::size_t kTogether = 4;  // places that are judged as one
@@ -28,18 +29,31 @@ float median_width(std::span<const CurvePoint> points) {
   return quantile(widths, 2);
 }
 
-/// The presence along a curve, each the mean over `half` points to either side.
-std::vector<float> light_along(const cv::Mat& presence, std::span<const CurvePoint> points,
-                               std::size_t half) {
+/// Means of values along a curve over `half` of them to either side.
+std::vector<float> means(std::span<const float> values, std::size_t half) {
   std::vector<float> sums{0};
-  for (const CurvePoint& p : points)
-    sums.push_back(sums.back() + sample_bilinear(presence, p.position.x(), p.position.y()));
-  std::vector<float> light;
-  for (std::size_t i = 0; i < points.size(); ++i) {
+  for (const float value : values) sums.push_back(sums.back() + value);
+  std::vector<float> result;
+  for (std::size_t i = 0; i < values.size(); ++i) {
     const std::size_t low = i - std::min(i, half);
-    const std::size_t high = std::min(points.size(), i + half + 1);
-    light.push_back((sums[high] - sums[low]) / static_cast<float>(high - low));
+    const std::size_t high = std::min(values.size(), i + half + 1);
+    result.push_back((sums[high] - sums[low]) / static_cast<float>(high - low));
   }
+  return result;
+}
+
+/// The presence along a curve over the line's height around, which follows what the light falls on.
+std::vector<float> light_along(const cv::Mat& presence, std::span<const CurvePoint> points,
+                               float width) {
+  std::vector<float> light;
+  std::vector<float> heights;
+  for (const CurvePoint& p : points) {
+    light.push_back(sample_bilinear(presence, p.position.x(), p.position.y()));
+    heights.push_back(p.amplitude);
+  }
+  light = means(light, static_cast<std::size_t>(nearest(width)));
+  heights = means(heights, static_cast<std::size_t>(nearest(kHeightWidths * width)));
+  for (std::size_t i = 0; i < light.size(); ++i) light[i] /= heights[i];
   return light;
 }
 
@@ -47,8 +61,7 @@ std::vector<float> light_along(const cv::Mat& presence, std::span<const CurvePoi
 std::vector<char> ghostly(const cv::Mat& presence, std::span<const CurvePoint> points) {
   const float width = std::max(1.F, median_width(points));
   const auto reach = static_cast<std::size_t>(nearest(kJudgedWidths * width));
-  const std::vector<float> light =
-      light_along(presence, points, static_cast<std::size_t>(nearest(width)));
+  const std::vector<float> light = light_along(presence, points, width);
   const std::size_t n = points.size();
   const std::size_t window = std::min(n, 2 * reach + 1);
   std::vector<char> is_ghost(n, 0);
@@ -58,10 +71,7 @@ std::vector<char> ghostly(const cv::Mat& presence, std::span<const CurvePoint> p
     const std::size_t low = std::min(middle - std::min(middle, reach), n - window);
     values.assign(light.begin() + static_cast<std::ptrdiff_t>(low),
                   light.begin() + static_cast<std::ptrdiff_t>(low + window));
-    const float dark = quantile(values, kFifth);
-    values.clear();
-    for (std::size_t i = low; i < low + window; ++i) values.push_back(points[i].amplitude);
-    if (dark >= kDark * quantile(values, 2)) continue;
+    if (quantile(values, kFifth) >= kDark) continue;
     for (std::size_t i = first; i < std::min(first + kTogether, n); ++i) is_ghost[i] = 1;
   }
   return is_ghost;
