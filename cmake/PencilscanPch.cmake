@@ -4,8 +4,6 @@
 # nlohmann/json.hpp and CLI/CLI.hpp are not among them: GCC would instantiate what they leave pending
 # in every file again, which takes longer than reading them where they are needed.
 
-# pencilscan_pch(<kind> LINK targets... HEADERS headers...) makes what pencilscan_use_pch(<target> <kind>)
-# takes. GCC wants the same flags on both sides: a kind for libraries and one for programs; tests have their own.
 # What tests do themselves takes little time: to optimise it less saves a fifth of theirs to compile.
 function(pencilscan_options_of_kind target kind)
   if(kind STREQUAL "test")
@@ -13,6 +11,8 @@ function(pencilscan_options_of_kind target kind)
   endif()
 endfunction()
 
+# pencilscan_pch(<kind> LINK targets... HEADERS headers...) makes what pencilscan_use_pch(<target> <kind>)
+# takes. GCC wants the same flags on both sides: a kind for libraries and one for programs; tests have their own.
 function(pencilscan_pch kind)
   cmake_parse_arguments(ARG "" "" "LINK;HEADERS" ${ARGN})
   file(CONFIGURE OUTPUT ${PROJECT_BINARY_DIR}/pch/${kind}.cpp CONTENT "")

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
@@ -294,19 +295,19 @@ Curve straight_curve(Eigen::Vector2f from, double angle, int count, float amplit
 }
 
 TEST(Ghosts, DiagonalsOfALatticeGoAndItsLinesStay) {
-  constexpr double kPi = 3.14159265358979;
+  using std::numbers::pi;
   std::vector<TestLine> lines;
   for (int k = 0; k < 16; ++k) {
     lines.push_back({.x = 0, .y = 10.0 + 8 * k, .angle = 0, .width = 2.5});
-    lines.push_back({.x = 10.0 + 8 * k, .y = 0, .angle = kPi / 2, .width = 2.5});
+    lines.push_back({.x = 10.0 + 8 * k, .y = 0, .angle = pi / 2, .width = 2.5});
   }
   cv::Mat presence;
   cv::extractChannel(draw(lines, 140, 140, 0.02), presence, 2);
-  const Curve line = straight_curve({50, 12}, kPi / 2, 60, 0.45F);
+  const Curve line = straight_curve({50, 12}, pi / 2, 60, 0.45F);
   const Curve faint = straight_curve({12, 66}, 0, 60, 0.6F);  // fitted a third too high
-  const Curve ghost = straight_curve({18, 18}, kPi / 4, 90, 0.3F);
-  Curve turning = straight_curve({50, 14}, kPi / 2, 60, 0.45F);
-  const Curve away = straight_curve({50, 74}, kPi / 4, 60, 0.3F);
+  const Curve ghost = straight_curve({18, 18}, pi / 4, 90, 0.3F);
+  Curve turning = straight_curve({50, 14}, pi / 2, 60, 0.45F);
+  const Curve away = straight_curve({50, 74}, pi / 4, 60, 0.3F);
   turning.points.insert(turning.points.end(), away.points.begin(), away.points.end());
   const std::vector<Curve> kept = without_ghosts(presence, {line, faint, ghost, turning}, 6);
   ASSERT_EQ(kept.size(), 3U);

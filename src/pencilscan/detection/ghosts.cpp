@@ -4,6 +4,8 @@
 #include <span>
 #include <utility>
 
+#include "pencilscan/core/median.h"
+#include "pencilscan/core/stretches.h"
 #include "pencilscan/detection/refine.h"
 #include "pencilscan/view/nearest.h"
 
@@ -16,17 +18,10 @@ constexpr float kDark = 0.4F;         // of the line's height
 constexpr std::size_t kFifth = 5;     // the lower one
 constexpr std::size_t kTogether = 4;  // places that are judged as one
 
-/// The value of which one of `parts` lies below.
-float quantile(std::vector<float>& values, std::size_t parts) {
-  const auto at = values.begin() + static_cast<std::ptrdiff_t>(values.size() / parts);
-  std::nth_element(values.begin(), at, values.end());
-  return *at;
-}
-
 float median_width(std::span<const CurvePoint> points) {
   std::vector<float> widths;
   for (const CurvePoint& p : points) widths.push_back(p.width_px);
-  return quantile(widths, 2);
+  return upper_median(std::move(widths));
 }
 
 /// Means of values along a curve over `half` of them to either side.
@@ -71,7 +66,9 @@ std::vector<char> ghostly(const cv::Mat& presence, std::span<const CurvePoint> p
     const std::size_t low = std::min(middle - std::min(middle, reach), n - window);
     values.assign(light.begin() + static_cast<std::ptrdiff_t>(low),
                   light.begin() + static_cast<std::ptrdiff_t>(low + window));
-    if (quantile(values, kFifth) >= kDark) continue;
+    const auto fifth = values.begin() + static_cast<std::ptrdiff_t>(window / kFifth);
+    std::nth_element(values.begin(), fifth, values.end());
+    if (*fifth >= kDark) continue;
     for (std::size_t i = first; i < std::min(first + kTogether, n); ++i) is_ghost[i] = 1;
   }
   return is_ghost;
@@ -89,16 +86,12 @@ std::vector<Curve> without_ghosts(const cv::Mat& presence, std::vector<Curve> cu
       kept.push_back(std::move(curve));
       continue;
     }
-    for (auto begin = is_ghost.begin(); begin != is_ghost.end();) {
-      const auto end = std::find(begin, is_ghost.end(), *begin == 0 ? 1 : 0);
-      if (*begin == 0 && end - begin >= min_points) {
-        Curve& part = kept.emplace_back();
-        part.family = curve.family;
-        const auto points = curve.points.begin();
-        part.points.assign(points + (begin - is_ghost.begin()), points + (end - is_ghost.begin()));
-      }
-      begin = end;
-    }
+    for_each_stretch(is_ghost, [&](int begin, int end) {
+      if (is_ghost[static_cast<std::size_t>(begin)] != 0 || end - begin < min_points) return;
+      Curve& part = kept.emplace_back();
+      part.family = curve.family;
+      part.points.assign(curve.points.begin() + begin, curve.points.begin() + end);
+    });
   }
   return kept;
 }

@@ -8,6 +8,7 @@
 
 #include "pencilscan/core/median.h"
 #include "pencilscan/core/parallel.h"
+#include "pencilscan/core/stretches.h"
 #include "pencilscan/detection/code_evidence.h"
 #include "pencilscan/detection/curve_rendering.h"
 #include "pencilscan/detection/profile_fit.h"
@@ -41,17 +42,6 @@ struct NamedPlace {
   Vector2f position;
   LineName name;
 };
-
-/// visit(begin, end) for each stretch [begin, end) of equal values.
-template <class Values, class Visit>
-void for_each_stretch(const Values& values, Visit visit) {
-  for (auto begin = values.begin(); begin != values.end();) {
-    const auto end =
-        std::find_if(begin, values.end(), [&](const auto& value) { return !(value == *begin); });
-    visit(static_cast<int>(begin - values.begin()), static_cast<int>(end - values.begin()));
-    begin = end;
-  }
-}
 
 /// Guided matching in one camera.
 class CameraMatching {

@@ -208,7 +208,7 @@ FrameResult leave_unsupported(const Rig& rig, FrameResult result, const FusionOp
   TriangleMesh& mesh = shape.surface.mesh;
   const std::vector<char> unsupported =
       unsupported_vertices(mesh, result.points.points, kReach * line_spacing(rig));
-  if (std::count(unsupported.begin(), unsupported.end(), 1) == 0) return result;
+  if (std::find(unsupported.begin(), unsupported.end(), 1) == unsupported.end()) return result;
   contradict_vertices(mesh, unsupported, shape.holes);
   for (std::size_t v = 0; v < unsupported.size(); ++v) {
     if (unsupported[v] == 0) continue;

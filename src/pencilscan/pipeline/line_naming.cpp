@@ -62,8 +62,9 @@ LineNaming name_lines(const Rig& rig, const std::vector<ColorFamily>& families,
     return result;
   const bool meets =
       !is_off && result.crossings.median_px <= kAsClosely * result.crossings.expected_px;
-  if (meets && named_share(graphs, result.labeling) > kMost) return result;
-  if (meets && guided_share && guided_share() > kMost) return result;
+  if (meets &&
+      (named_share(graphs, result.labeling) > kMost || (guided_share && guided_share() > kMost)))
+    return result;
 
   const FrameCurves curves{families, graphs};
   RigRefinementOptions refinement;

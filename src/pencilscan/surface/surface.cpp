@@ -82,12 +82,19 @@ std::vector<char> points_on_maps(const Rig& rig, std::span<const MeasuredPoint> 
   return used;
 }
 
-void note_quality(double area, SurfaceResult& result) {
+/// The measured part without islands below an area, and its share.
+void take_measured_part(double least_island, SurfaceResult& result) {
+  result.measured = measured_part(result.mesh, least_island);
+  result.measured.hole.clear();  // it has none
+  const double area = surface_area(result.mesh);
+  result.report.measured_share = area > 0 ? surface_area(result.measured) / area : 0;
+}
+
+void note_quality(SurfaceResult& result) {
   SurfaceReport& report = result.report;
   report.edges = count_edges(result.mesh);
   report.vertices = result.mesh.vertices.size();
   report.faces = result.mesh.faces.size();
-  report.measured_share = area > 0 ? surface_area(result.measured) / area : 0;
   if (result.mesh.faces.empty() || report.edges.boundary > 0 || report.edges.non_manifold > 0) {
     report.status = SurfaceStatus::kNotClosed;
     report.warnings.push_back(
@@ -172,8 +179,8 @@ SurfaceResult reconstruct_surface(const Rig& rig, std::span<const MeasuredPoint>
   closing.floor = rig.floor;
   take(closed_surface(kept, closing), result);
   report.seconds_closing = closing_watch.seconds();
-  result.measured = measured_part(result.mesh, 4 * set.spacing * set.spacing);
-  note_quality(surface_area(result.mesh), result);
+  take_measured_part(4 * set.spacing * set.spacing, result);
+  note_quality(result);
   report.seconds = watch.seconds();
   tell(1);
   return result;
@@ -255,16 +262,13 @@ void finish_surface(const Rig& rig, std::span<const MeasuredPoint> points,
   result.used = points_on_maps(rig, points, maps, spacing);
   for (const char used : result.used) report.points_used += static_cast<std::size_t>(used);
   take_measured_part(options, result);
-  note_quality(surface_area(result.mesh), result);
+  note_quality(result);
   report.seconds += watch.seconds();
 }
 
 void take_measured_part(const FusionOptions& options, SurfaceResult& result) {
   const double spacing = result.report.spacing_mm;
-  result.measured = measured_part(result.mesh, options.least_island_spacings2 * spacing * spacing);
-  result.measured.hole.clear();  // it has none
-  const double area = surface_area(result.mesh);
-  result.report.measured_share = area > 0 ? surface_area(result.measured) / area : 0;
+  take_measured_part(options.least_island_spacings2 * spacing * spacing, result);
 }
 
 std::string to_string(SurfaceStatus status) {
