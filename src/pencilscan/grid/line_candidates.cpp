@@ -50,7 +50,8 @@ std::vector<LineCandidate> line_candidates(const Rig& rig, const Camera& camera,
 }
 
 bool can_see_pattern(const Rig& rig, const Camera& camera, int projector) {
-  constexpr double kMinCosine = -0.5;
+  // Light comes in at 77 degrees, and leaves so: a fifth of what it would be, on each way.
+  constexpr double kMinCosine = -0.9;
   return camera.forward().dot(rig.projectors[static_cast<std::size_t>(projector)].forward()) >
          kMinCosine;
 }

@@ -30,7 +30,8 @@ struct DepthRange {
                                                          const DepthRange& range,
                                                          PatternRef pattern, const Vec2& pixel);
 
-/// False when no surface can face both devices well: their axes are more than 120 degrees apart.
+/// False when no surface can face both devices but at a graze: their axes are more than 154 degrees
+/// apart.
 [[nodiscard]] bool can_see_pattern(const Rig& rig, const Camera& camera, int projector);
 
 }  // namespace pencilscan

@@ -31,17 +31,25 @@ class SurfaceCheck {
     return hit;
   }
 
-  /// `hit`: where the ray through the pixel meets the surface.
+  /// `hit`: where the ray through the pixel meets the surface. Where that was not measured, what
+  /// lies a pixel beside it counts.
   [[nodiscard]] bool contradicts(const Camera& camera, const Vec2& pixel, PatternRef pattern,
                                  int line, const Hit& hit) const {
-    RayVerdict verdict = verdict_of(hit, pattern, line);
-    bool is_seen = verdict == RayVerdict::kContradicted;
+    const RayVerdict verdict = verdict_of(hit, pattern, line);
+    if (verdict != RayVerdict::kUnseen) return verdict == RayVerdict::kContradicted;
+    bool is_contradicted = false;
     for (const Vec2& beside : {Vec2(1, 0), Vec2(-1, 0), Vec2(0, 1), Vec2(0, -1)}) {
-      if (verdict == RayVerdict::kKept) return false;
-      verdict = verdict_of(look(camera.ray(pixel + beside)), pattern, line);
-      is_seen = is_seen || verdict == RayVerdict::kContradicted;
+      switch (verdict_of(look(camera.ray(pixel + beside)), pattern, line)) {
+        case RayVerdict::kKept:
+          return false;
+        case RayVerdict::kContradicted:
+          is_contradicted = true;
+          break;
+        case RayVerdict::kUnseen:
+          break;
+      }
     }
-    return is_seen && verdict != RayVerdict::kKept;
+    return is_contradicted;
   }
 
   /// Standard deviation of the surface where a ray meets it, along the ray.
@@ -91,14 +99,16 @@ class SurfaceCheck {
                : RayVerdict::kContradicted;
   }
 
-  /// False where the surface turns away from the projector, or measured surface stands in its
+  /// False where the surface may turn away from the projector, or measured surface stands in its
   /// light.
   [[nodiscard]] bool may_be_lit(const RayScene::Hit& hit, const Projector& projector) const {
-    constexpr double kTurnedAway = -0.1;  // cosine; the mesh's own slope errs by some degrees
-    constexpr double kOff = 3;            // footprints that roughness and errors of the mesh take
+    // Cosine of the incidence; two deviations of the mesh's own slope, which near the edge of the
+    // light errs by .03 to .07 (docs/experiments.md).
+    constexpr double kSurelyFacing = 0.1;
+    constexpr double kOff = 3;  // footprints that roughness and errors of the mesh take
     const Vec3 to_light = (projector.center() - hit.point).normalized();
     const Vec3 normal = face_normal(surface_.mesh(), hit.face);
-    if (normal.dot(to_light) < kTurnedAway) return false;
+    if (normal.dot(to_light) < kSurelyFacing) return false;
     return !look(Ray{hit.point + kOff * (normal + to_light), to_light});
   }
 

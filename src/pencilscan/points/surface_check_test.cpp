@@ -95,6 +95,31 @@ TEST_F(SurfaceCheckTest, WhatWasNotMeasuredContradictsNothing) {
                            [](const PointEvidence& e) { return e.settled; }));
 }
 
+TEST_F(SurfaceCheckTest, ALineStaysWhereTheSurfaceSurelyFacesItsProjector) {
+  const std::vector<MeasuredPoint> all = points();
+  const MeasuredPoint& point = all[all.size() / 2];
+  const Vec3 x = position_of(point);
+  const Vec3 to_light = (rig.projectors[point.projector].center() - x).normalized();
+  const Vec3 to_camera = (rig.cameras[0].center() - x).normalized();
+  const Vec3 beside_light = (to_camera - to_camera.dot(to_light) * to_light).normalized();
+  const auto is_kept_at = [&](double cosine) {
+    const Vec3 normal = cosine * to_light + std::sqrt(1 - cosine * cosine) * beside_light;
+    const Vec3 across = 10 * normal.unitOrthogonal();
+    const Vec3 along = normal.cross(across);
+    TriangleMesh flat;
+    flat.vertices = {x - across - along, x + across - along, x + across + along,
+                     x - across + along};
+    flat.faces = {{0, 1, 2}, {0, 2, 3}};
+    flat.sigma.assign(4, 0.02F);
+    flat.confidence.assign(4, 1.F);
+    return settle_on_surface(rig, RayScene(flat), {&point, 1}, 0).points.size() == 1;
+  };
+  EXPECT_TRUE(is_kept_at(0.5));
+  EXPECT_TRUE(is_kept_at(0.15));
+  EXPECT_FALSE(is_kept_at(0.05)) << "the mesh's slope errs by as much";
+  EXPECT_FALSE(is_kept_at(-0.05));
+}
+
 TEST_F(SurfaceCheckTest, PointsOfLittleConfidenceStayOnMeasuredSurfaceOnly) {
   std::vector<MeasuredPoint> doubtful = points();
   for (MeasuredPoint& p : doubtful) p.confidence = 0.99F;
