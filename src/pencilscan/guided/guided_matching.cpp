@@ -77,8 +77,10 @@ class CameraMatching {
     return across_px < options_.max_offset_px &&
            across_px < options_.max_offset_lines * p.spacing_px;
   }
-  [[nodiscard]] bool is_of_other_color(const Curve& curve, int begin, int end,
-                                       const LineName& name) const;
+  [[nodiscard]] float color_margin(const Curve& curve, int begin, int end,
+                                   const LineName& name) const;
+  [[nodiscard]] bool is_supported(const Curve& curve, int begin, int end, const LineName& name,
+                                  float margin) const;
   [[nodiscard]] bool is_long_enough(const std::vector<char>& decided, int begin, int end) const;
   [[nodiscard]] std::vector<std::vector<char>> decided_points() const;
   [[nodiscard]] int family_of(PatternRef ref) const;
@@ -100,6 +102,7 @@ class CameraMatching {
   std::vector<PatternRef> patterns_;  ///< that the camera can see
   std::vector<cv::Mat> unexplained_;  ///< per family; empty without images
   LocalSurface surface_;
+  bool has_dense_;                          ///< the surface does not rest on labels alone
   std::vector<MeasuredPoint> dense_;        ///< more points, not on the surface yet
   std::vector<LabeledRun> not_on_surface_;  ///< runs whose points it does not hold yet
   Places<KnownPoint> known_;
@@ -121,6 +124,7 @@ CameraMatching::CameraMatching(const Rig& rig, const std::vector<ColorFamily>& f
       tentative_(tentative),
       options_(options),
       surface_(camera_, options.surface),
+      has_dense_(!dense.empty()),
       known_(camera_.width, camera_.height, kPlaceCellPx),
       known_names_(camera_.width, camera_.height, kNearCellPx),
       missing_places_(camera_.width, camera_.height, kNearCellPx) {
@@ -307,18 +311,31 @@ void CameraMatching::confirm_tentative() {
   accept(std::move(confirmed));
 }
 
-/// True where the colour of a stretch [begin, end) says more against a name than a guided name is
-/// certain: a surface that is not there predicts lines too, and only their places fit.
-bool CameraMatching::is_of_other_color(const Curve& curve, int begin, int end,
-                                       const LineName& name) const {
+/// Logarithm of how much likelier the colour of a stretch [begin, end) is under a name than under
+/// the likeliest other colour; 0 where the family has one colour.
+float CameraMatching::color_margin(const Curve& curve, int begin, int end,
+                                   const LineName& name) const {
   const auto family = static_cast<std::size_t>(curve.family);
   const LinePattern& pattern = rig_.pattern(name.pattern);
   const auto own = static_cast<std::size_t>(families_[family].color_of_symbol(
       pattern)[static_cast<std::size_t>(pattern.symbol(name.line))]);
-  const std::vector<float> evidence =
-      color_evidence(curve, begin, end, families_[family].colors.size());
-  const float against = *std::max_element(evidence.begin(), evidence.end()) - evidence[own];
-  return against > std::log(options_.confidence / (1 - options_.confidence));
+  std::vector<float> evidence = color_evidence(curve, begin, end, families_[family].colors.size());
+  std::swap(evidence[own], evidence.back());
+  const float of_name = evidence.back();
+  evidence.pop_back();
+  return evidence.empty() ? 0 : of_name - *std::max_element(evidence.begin(), evidence.end());
+}
+
+/// True where the lines around support a name, or the stretch's own colour on a surface that does
+/// not rest on labels alone: lines of a projector that were all missed in a place have none around.
+bool CameraMatching::is_supported(const Curve& curve, int begin, int end, const LineName& name,
+                                  float margin) const {
+  if (has_dense_ && margin > 0 && end - begin >= options_.min_adopted) return true;
+  const auto first = curve.points.begin() + begin;
+  const auto supported = std::count_if(first, first + (end - begin), [&](const CurvePoint& p) {
+    return fits(p, name, curve.family);
+  });
+  return 2 * supported > end - begin;
 }
 
 /// A stretch [begin, end) on one line, within what is undecided of its curve.
@@ -334,6 +351,9 @@ bool CameraMatching::is_long_enough(const std::vector<char>& decided, int begin,
 
 void CameraMatching::adopt_curves() {
   const auto decided = decided_points();
+  // Colour may say less against a name than a guided name is certain: a surface that is not there
+  // predicts lines too, and only their places fit.
+  const float certainty = std::log(options_.confidence / (1 - options_.confidence));
   std::vector<LabeledRun> adopted;
   std::vector<std::optional<LineName>> names;
   for (std::size_t c = 0; c < graph_.curves.size(); ++c) {
@@ -345,12 +365,8 @@ void CameraMatching::adopt_curves() {
     for_each_stretch(names, [&](int begin, int end) {
       const auto& name = names[static_cast<std::size_t>(begin)];
       if (!name || !is_long_enough(decided[c], begin, end)) return;
-      if (is_of_other_color(curve, begin, end, *name)) return;
-      const auto first = curve.points.begin() + begin;
-      const auto supported = std::count_if(first, first + (end - begin), [&](const CurvePoint& p) {
-        return fits(p, *name, curve.family);
-      });
-      if (2 * supported > end - begin)
+      const float margin = color_margin(curve, begin, end, *name);
+      if (margin > -certainty && is_supported(curve, begin, end, *name, margin))
         adopted.push_back(run_of(static_cast<int>(c), begin, end, *name));
     });
   }

@@ -34,7 +34,8 @@ struct GuidedMatchingOptions {
 /// have to be. Each pass
 ///   1. predicts the lines of all projectors on the surface around the labelled points,
 ///   2. gives an undecided stretch of a curve the label of the predicted line that it lies on, if
-///      no other curve shows that line and the stretch does not have another line's colour,
+///      no other curve shows that line, the stretch does not have another line's colour, and lines
+///      around or, on a dense surface, its own colour support it,
 ///   3. fits a new curve where a line is predicted and no curve was found. The fit is to the image
 ///      that remains once the known curves are subtracted.
 /// New curves are appended to `graphs`, new runs to `labeling`. The function returns, per graph,
