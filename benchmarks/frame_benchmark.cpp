@@ -107,7 +107,7 @@ void run(const Rig& stated, const std::filesystem::path& folder, int threads, in
       if (!with_shape) return;
       result.shape = measure_shape(rig, frame, result.points, {}, {}, clock);
       result = match_on_surface(rig, std::move(result), {}, clock);
-      result = leave_unsupported(rig, std::move(result));
+      result = finish_shape(rig, std::move(result));
     });
     if (i == 0) {
       for (const StageTime& time : times) stages.push_back(time.stage);

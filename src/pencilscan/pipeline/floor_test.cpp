@@ -69,6 +69,7 @@ TEST(StatedFloor, LeavesTheObjectAloneWithoutFlapsBesideIt) {
     if (stated == 1) rig.floor = Floor{{0, 0, kFloorHeight}, Vec3::UnitZ()};
     FrameResult result{measure_points(rig, frame), {}, {}};
     result.shape = measure_shape(rig, frame, result.points, {});
+    result = finish_shape(rig, std::move(result));
     for (const MeasuredPoint& p : result.points.points) points[stated].add(position_of(p));
     for (const Vec3& x : result.shape.surface.measured.vertices) surface[stated].add(x);
     for (const Vec3& x : result.shape.surface.mesh.vertices)

@@ -63,7 +63,7 @@ FrameResult measure_frame(const Rig& rig, const Frame& frame, PointResult lines,
   const Frame right = without(frame, result.points.left_out);
   result.shape = measure_shape(rig, right, result.points, options.shape, links, clock);
   result = match_on_surface(rig, std::move(result), options.points, clock);
-  result = leave_unsupported(rig, std::move(result), options.shape.fusion);
+  result = finish_shape(rig, std::move(result), options.shape.fusion);
   return count_motion(rig, std::move(result));
 }
 

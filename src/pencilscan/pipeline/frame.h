@@ -157,7 +157,7 @@ struct NothingFound : StageError {
                                        const StageClock& clock = {});
 
 /// Dense depth from the labelled points, checked between the views and fused into one closed
-/// surface.
+/// surface, whose measured part finish_shape() takes.
 [[nodiscard]] ShapeResult measure_shape(const Rig& rig, const Frame& frame,
                                         const PointResult& points, const ShapeOptions& options = {},
                                         const FrameLinks& links = {}, const StageClock& clock = {});
@@ -169,10 +169,10 @@ struct NothingFound : StageError {
                                            const PointOptions& options = {},
                                            const StageClock& clock = {});
 
-/// Surface that none of the points lies near was not measured after all (surface/supported.h).
-/// Where lines were not matched on the surface everything stays as it is.
-[[nodiscard]] FrameResult leave_unsupported(const Rig& rig, FrameResult result,
-                                            const FusionOptions& options = {});
+/// What of the surface was measured, and what it is worth. Where lines were matched on the surface,
+/// what none of the points lies near was not measured after all (surface/supported.h).
+[[nodiscard]] FrameResult finish_shape(const Rig& rig, FrameResult result,
+                                       const FusionOptions& options = {});
 
 /// Where the object moved within the exposure, points and surface are as much less sure as that
 /// makes them.

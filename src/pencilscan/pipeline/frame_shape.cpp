@@ -81,17 +81,6 @@ std::vector<Silhouette> silhouettes_of(const Rig& rig, const std::vector<ColorVi
   return silhouettes;
 }
 
-/// The measured mesh has vertices of the closed one, in the same order.
-void copy_colors(const TriangleMesh& mesh, TriangleMesh& measured) {
-  std::size_t v = 0;
-  for (const Vec3& x : measured.vertices) {
-    while (v < mesh.vertices.size() && mesh.vertices[v] != x) ++v;
-    if (v == mesh.vertices.size()) break;
-    measured.color.push_back(mesh.color[v]);
-  }
-  PENCILSCAN_CHECK(measured.color.size() == measured.vertices.size());
-}
-
 /// Dense depth of all cameras.
 DepthResult depth_of(const Rig& rig, const Frame& frame, const PointResult& points,
                      const DepthStageOptions& options) {
@@ -157,7 +146,7 @@ void fuse(const Rig& rig, const PointResult& points, const std::vector<ColorView
   follow_depth(rig, result.depth.maps, options.fusion, surface);
   if (links.hand_on && !surface.mesh.faces.empty())
     hand_on(links, before.get(), traveled, std::move(next), surface);
-  finish_surface(rig, points.points, result.depth.maps, options.fusion, surface);
+  note_points_used(rig, points.points, result.depth.maps, surface);
 }
 
 void mark_holes(const Rig& rig, ShapeResult& result) {
@@ -183,11 +172,7 @@ ShapeResult measure_shape(const Rig& rig, const Frame& frame, const PointResult&
     });
     if (result.surface.report.status != SurfaceStatus::kTooFewPoints) {
       clock("holes", [&] { mark_holes(rig, result); });
-      clock("color", [&] {
-        TriangleMesh& mesh = result.surface.mesh;
-        mesh.color = vertex_colors(rig, *result.scene, views);
-        if (!mesh.color.empty()) copy_colors(mesh, result.surface.measured);
-      });
+      clock("color", [&] { result.surface.mesh.color = vertex_colors(rig, *result.scene, views); });
       return result;
     }
   }
@@ -201,21 +186,22 @@ ShapeResult measure_shape(const Rig& rig, const Frame& frame, const PointResult&
   return result;
 }
 
-FrameResult leave_unsupported(const Rig& rig, FrameResult result, const FusionOptions& options) {
+FrameResult finish_shape(const Rig& rig, FrameResult result, const FusionOptions& options) {
   constexpr double kReach = 2;  // line spacings
-  if (!result.points.is_on_surface) return result;
   ShapeResult& shape = result.shape;
+  if (!shape.scene) return result;
   TriangleMesh& mesh = shape.surface.mesh;
-  const std::vector<char> unsupported =
-      unsupported_vertices(mesh, result.points.points, kReach * line_spacing(rig));
-  if (std::find(unsupported.begin(), unsupported.end(), 1) == unsupported.end()) return result;
-  contradict_vertices(mesh, unsupported, shape.holes);
-  for (std::size_t v = 0; v < unsupported.size(); ++v) {
-    if (unsupported[v] == 0) continue;
-    mesh.confidence[v] = 0;
-    mesh.hole[v] = static_cast<std::uint8_t>(HoleReason::kContradicted);
+  if (result.points.is_on_surface) {
+    const std::vector<char> unsupported =
+        unsupported_vertices(mesh, result.points.points, kReach * line_spacing(rig));
+    contradict_vertices(mesh, unsupported, shape.holes);
+    for (std::size_t v = 0; v < unsupported.size(); ++v) {
+      if (unsupported[v] == 0) continue;
+      mesh.confidence[v] = 0;
+      mesh.hole[v] = static_cast<std::uint8_t>(HoleReason::kContradicted);
+    }
   }
-  take_measured_part(options, shape.surface);
+  finish_surface(options, shape.surface);
   return result;
 }
 

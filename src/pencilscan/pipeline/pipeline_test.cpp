@@ -103,6 +103,7 @@ TEST_F(PipelineTest, SurfaceWhosePointsWereTakenBackIsNotMeasured) {
   FrameResult made{measure_points(*rig_, *frame_), {}, {}};
   made.shape = measure_shape(*rig_, *frame_, made.points, options.shape);
   made = match_on_surface(*rig_, std::move(made));
+  made = finish_shape(*rig_, std::move(made), options.shape.fusion);
   const double reach = 2 * line_spacing(*rig_);
   std::erase_if(made.points.points, [](const MeasuredPoint& p) { return p.z > 20; });
   const auto highest = [](const TriangleMesh& mesh) {
@@ -117,7 +118,7 @@ TEST_F(PipelineTest, SurfaceWhosePointsWereTakenBackIsNotMeasured) {
   const double area = whole_area();
   const double share = made.shape.surface.report.measured_share;
   ASSERT_GT(highest(made.shape.surface.measured), 20 + 2 * reach);
-  made = leave_unsupported(*rig_, std::move(made), options.shape.fusion);
+  made = finish_shape(*rig_, std::move(made), options.shape.fusion);
   const SurfaceResult& surface = made.shape.surface;
   EXPECT_LT(highest(surface.measured), 20 + reach);
   EXPECT_GT(highest(surface.measured), 20);

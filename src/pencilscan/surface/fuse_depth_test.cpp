@@ -21,7 +21,8 @@ SurfaceResult surface_of(const Rig& rig, std::span<const MeasuredPoint> points,
                          std::span<const DepthMap> maps, const FusionOptions& options = {}) {
   SurfaceResult result = close_depth(rig, maps, options);
   follow_depth(rig, maps, options, result);
-  finish_surface(rig, points, maps, options, result);
+  note_points_used(rig, points, maps, result);
+  finish_surface(options, result);
   return result;
 }
 

@@ -82,14 +82,6 @@ std::vector<char> points_on_maps(const Rig& rig, std::span<const MeasuredPoint> 
   return used;
 }
 
-/// The measured part without islands below an area, and its share.
-void take_measured_part(double least_island, SurfaceResult& result) {
-  result.measured = measured_part(result.mesh, least_island);
-  result.measured.hole.clear();  // it has none
-  const double area = surface_area(result.mesh);
-  result.report.measured_share = area > 0 ? surface_area(result.measured) / area : 0;
-}
-
 void note_quality(SurfaceResult& result) {
   SurfaceReport& report = result.report;
   report.edges = count_edges(result.mesh);
@@ -111,6 +103,15 @@ void note_quality(SurfaceResult& result) {
                                {},
                                {{"share", report.measured_share}}});
   }
+}
+
+/// The measured part without islands below an area, and what the surface is worth.
+void finish(double least_island, SurfaceResult& result) {
+  result.measured = measured_part(result.mesh, least_island);
+  result.measured.hole.clear();  // it has none
+  const double area = surface_area(result.mesh);
+  result.report.measured_share = area > 0 ? surface_area(result.measured) / area : 0;
+  note_quality(result);
 }
 
 void take(ClosedSurface closed, SurfaceResult& result) {
@@ -179,8 +180,7 @@ SurfaceResult reconstruct_surface(const Rig& rig, std::span<const MeasuredPoint>
   closing.floor = rig.floor;
   take(closed_surface(kept, closing), result);
   report.seconds_closing = closing_watch.seconds();
-  take_measured_part(4 * set.spacing * set.spacing, result);
-  note_quality(result);
+  finish(4 * set.spacing * set.spacing, result);
   report.seconds = watch.seconds();
   tell(1);
   return result;
@@ -250,25 +250,20 @@ void follow_depth(const Rig& rig, std::span<const DepthMap> maps, const FusionOp
   report.seconds += watch.seconds();
 }
 
-void finish_surface(const Rig& rig, std::span<const MeasuredPoint> points,
-                    std::span<const DepthMap> maps, const FusionOptions& options,
-                    SurfaceResult& result) {
-  const Stopwatch watch;
+void note_points_used(const Rig& rig, std::span<const MeasuredPoint> points,
+                      std::span<const DepthMap> maps, SurfaceResult& result) {
   SurfaceReport& report = result.report;
   report.points = points.size();
   result.used.assign(points.size(), 0);
   if (report.status == SurfaceStatus::kTooFewPoints) return;
-  const double spacing = report.spacing_mm;
-  result.used = points_on_maps(rig, points, maps, spacing);
+  result.used = points_on_maps(rig, points, maps, report.spacing_mm);
   for (const char used : result.used) report.points_used += static_cast<std::size_t>(used);
-  take_measured_part(options, result);
-  note_quality(result);
-  report.seconds += watch.seconds();
 }
 
-void take_measured_part(const FusionOptions& options, SurfaceResult& result) {
+void finish_surface(const FusionOptions& options, SurfaceResult& result) {
+  if (result.report.status == SurfaceStatus::kTooFewPoints) return;
   const double spacing = result.report.spacing_mm;
-  take_measured_part(options.least_island_spacings2 * spacing * spacing, result);
+  finish(options.least_island_spacings2 * spacing * spacing, result);
 }
 
 std::string to_string(SurfaceStatus status) {

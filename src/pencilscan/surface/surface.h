@@ -111,14 +111,13 @@ struct FusionOptions {
 void follow_depth(const Rig& rig, std::span<const DepthMap> maps, const FusionOptions& options,
                   SurfaceResult& result);
 
-/// The measured part of a surface that followed the depth, its quality, and which `points` it bears
-/// out. None of it where the status is kTooFewPoints.
-void finish_surface(const Rig& rig, std::span<const MeasuredPoint> points,
-                    std::span<const DepthMap> maps, const FusionOptions& options,
-                    SurfaceResult& result);
+/// Which `points` the depth maps bear out; none where the status is kTooFewPoints.
+void note_points_used(const Rig& rig, std::span<const MeasuredPoint> points,
+                      std::span<const DepthMap> maps, SurfaceResult& result);
 
-/// The measured part anew, as finish_surface() makes it, after confidences were taken back.
-void take_measured_part(const FusionOptions& options, SurfaceResult& result);
+/// The measured part of a surface whose attributes are known, and what the surface is worth. None
+/// of it where the status is kTooFewPoints.
+void finish_surface(const FusionOptions& options, SurfaceResult& result);
 
 [[nodiscard]] std::string to_string(SurfaceStatus status);
 
