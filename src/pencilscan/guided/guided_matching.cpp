@@ -343,7 +343,8 @@ bool CameraMatching::is_long_enough(const std::vector<char>& decided, int begin,
   constexpr double kMost = 0.8;
   const int n = static_cast<int>(decided.size());
   const int length = end - begin;
-  if (length >= options_.min_adopted) return true;
+  // A dense surface says as much for a stretch as for a line that was not found at all.
+  if (length >= (has_dense_ ? options_.min_points : options_.min_adopted)) return true;
   while (begin > 0 && decided[static_cast<std::size_t>(begin - 1)] == 0) --begin;
   while (end < n && decided[static_cast<std::size_t>(end)] == 0) ++end;
   return length >= options_.min_whole && length >= kMost * (end - begin);
