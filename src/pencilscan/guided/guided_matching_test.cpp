@@ -169,6 +169,35 @@ TEST_F(LabeledScene, UndecidedCurveOfTheOtherColorStaysUndecided) {
   EXPECT_EQ(label_of(curve), true_lines[0][curve]);
 }
 
+TEST_F(LabeledScene, LinesOfAProjectorWithoutAnyLabelAreNamedByTheirColourOnADenseSurface) {
+  std::vector<MeasuredPoint> dense = points();
+  std::vector<std::size_t> curves;
+  for (std::size_t k = 0; k < graph_.curves.size(); ++k) {
+    if (graph_.curves[k].family != 1) continue;
+    remove_label(k);
+    if (graph_.curves[k].points.size() > 150) curves.push_back(k);
+  }
+  ASSERT_GT(curves.size(), 5U);
+  const auto share_named = [&](std::span<const MeasuredPoint> more, float code) {
+    GridGraph graph = graph_;
+    for (Curve& curve : graph.curves) {
+      for (float& c : curve.code) c *= code;
+    }
+    Labeling labeling = labeling_;
+    match_guided(rig, families, std::vector<std::vector<cv::Mat>>(1), {&graph, 1}, labeling, {},
+                 more);
+    std::swap(labeling_, labeling);
+    const auto named = std::count_if(curves.begin(), curves.end(), [&](std::size_t k) {
+      return label_of(k) == true_lines[0][k];
+    });
+    std::swap(labeling_, labeling);
+    return static_cast<double>(named) / static_cast<double>(curves.size());
+  };
+  EXPECT_EQ(share_named({}, 1), 0) << "labels alone: no line around supports any";
+  EXPECT_GT(share_named(dense, 1), 0.8);
+  EXPECT_EQ(share_named(dense, 0), 0) << "no colour supports any either";
+}
+
 TEST_F(LabeledScene, CurveMuchWiderThanThePredictedLineGetsNoLabel) {
   const std::size_t curve = middle_curve(0);
   remove_label(curve);
