@@ -56,4 +56,19 @@ bool can_see_pattern(const Rig& rig, const Camera& camera, int projector) {
          kMinCosine;
 }
 
+std::vector<float> phase_costs(const Rig& rig, const Camera& camera, const ColorFamily& family) {
+  constexpr float kLeastShare = 1e-3F;  // opposite ones see none of each other's light
+  const Vec3 center = working_volume(rig).center;
+  const Vec3 to_camera = (camera.center() - center).normalized();
+  std::vector<float> costs;
+  for (const PatternRef& ref : family.patterns) {
+    const Vec3 to_light = (rig.projector(ref.projector).center() - center).normalized();
+    const float share = 0.5F * (1 + static_cast<float>(to_camera.dot(to_light)));
+    costs.push_back(-std::log(std::max(share, kLeastShare)));
+  }
+  const float least = *std::min_element(costs.begin(), costs.end());
+  for (float& cost : costs) cost -= least;
+  return costs;
+}
+
 }  // namespace pencilscan

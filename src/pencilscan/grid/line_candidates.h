@@ -34,4 +34,10 @@ struct DepthRange {
 /// apart.
 [[nodiscard]] bool can_see_pattern(const Rig& rig, const Camera& camera, int projector);
 
+/// Per pattern of a family, the negative logarithm of how often a camera sees its lines, 0 for the
+/// most frequent one: of a ball's picture a projector lights (1 + cos a) / 2, as of the moon's
+/// disc, at the phase angle a of camera and light (Meeus, Astronomical Algorithms, ch. 48).
+[[nodiscard]] std::vector<float> phase_costs(const Rig& rig, const Camera& camera,
+                                             const ColorFamily& family);
+
 }  // namespace pencilscan

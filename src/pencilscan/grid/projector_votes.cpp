@@ -104,12 +104,15 @@ VoteTable empty_table(const Rig& rig, const ColorFamily& family) {
   return table;
 }
 
-CurveIdentity decide(const VoteTable& table, const std::vector<PatternRef>& patterns) {
+/// `costs`: of a pattern before anything votes.
+CurveIdentity decide(const VoteTable& table, const std::vector<PatternRef>& patterns,
+                     const std::vector<float>& costs) {
   CurveIdentity identity;
   double best = 0;
   double second = 0;
   for (std::size_t k = 0; k < table.size(); ++k) {
-    const double score = table[k].empty() ? 0 : *std::max_element(table[k].begin(), table[k].end());
+    if (table[k].empty()) continue;
+    const double score = *std::max_element(table[k].begin(), table[k].end()) - costs[k];
     if (score > best) {
       second = best;
       best = score;
@@ -152,10 +155,12 @@ void vote_for_projectors(const Rig& rig, const std::vector<ColorFamily>& familie
     add_votes(of_b, families[static_cast<std::size_t>(b.family)].patterns,
               tables[static_cast<std::size_t>(crossing.curve_b)]);
   }
+  std::vector<std::vector<float>> costs;
+  for (const ColorFamily& family : families) costs.push_back(phase_costs(rig, camera, family));
   graph.identities.clear();
   for (std::size_t c = 0; c < graph.curves.size(); ++c) {
-    graph.identities.push_back(
-        decide(tables[c], families[static_cast<std::size_t>(graph.curves[c].family)].patterns));
+    const auto family = static_cast<std::size_t>(graph.curves[c].family);
+    graph.identities.push_back(decide(tables[c], families[family].patterns, costs[family]));
   }
 }
 

@@ -187,22 +187,11 @@ void keep_supported(LabelledPieces& pieces, const JointOptions& options) {
   }
 }
 
-/// The share of a ball's picture that a projector lights: that of the moon's disc at the phase
-/// angle of camera and light.
-float lit_share_of_ball(const Rig& rig, const Camera& camera, int projector) {
-  const Vec3 center = working_volume(rig).center;
-  const Vec3 to_camera = (camera.center() - center).normalized();
-  const Vec3 to_light = (rig.projector(projector).center() - center).normalized();
-  return 0.5F * (1 + static_cast<float>(to_camera.dot(to_light)));
-}
-
 /// The lines of a pattern in a camera.
 struct VisiblePattern {
   VisiblePattern(const Rig& rig, const Camera& camera, const ColorFamily& family,
                  PatternRef pattern)
-      : ref(pattern),
-        sheets(rig, camera, pattern),
-        lit_share(lit_share_of_ball(rig, camera, pattern.projector)) {
+      : ref(pattern), sheets(rig, camera, pattern) {
     const LinePattern& lines = rig.pattern(ref);
     const std::vector<int> color_of_symbol = family.color_of_symbol(lines);
     for (const int symbol : lines.sequence)
@@ -215,17 +204,9 @@ struct VisiblePattern {
 
   PatternRef ref;
   LineSheets sheets;
-  float lit_share = 0;
-  float cost = 0;  ///< of any of its lines, before anything of the picture is known
+  float cost = 0;                   ///< of any of its lines, before the picture says anything
   std::vector<std::size_t> colors;  ///< of one period
 };
-
-/// A line is one of a projector that lights much rather than of one that lights little.
-void take_costs(std::vector<VisiblePattern>& patterns) {
-  float most = 0;
-  for (const VisiblePattern& pattern : patterns) most = std::max(most, pattern.lit_share);
-  for (VisiblePattern& pattern : patterns) pattern.cost = std::log(most / pattern.lit_share);
-}
 
 /// The picture's pixel in the middle of a piece.
 Vec2 middle_pixel(const GridGraph& graph, const CurvePiece& piece) {
@@ -336,11 +317,13 @@ LabelledPieces possible_labels(const Rig& rig, const std::vector<ColorFamily>& f
   result.graph = cut_into_pieces(camera, graph, options.piece_length);
   std::vector<std::vector<VisiblePattern>> visible(families.size());
   for (std::size_t f = 0; f < families.size(); ++f) {
-    for (const PatternRef& ref : families[f].patterns) {
-      if (can_see_pattern(rig, camera, ref.projector))
-        visible[f].emplace_back(rig, camera, families[f], ref);
+    const std::vector<float> costs = phase_costs(rig, camera, families[f]);
+    for (std::size_t k = 0; k < costs.size(); ++k) {
+      const PatternRef& ref = families[f].patterns[k];
+      if (!can_see_pattern(rig, camera, ref.projector)) continue;
+      visible[f].emplace_back(rig, camera, families[f], ref);
+      visible[f].back().cost = costs[k];
     }
-    take_costs(visible[f]);
   }
   const std::vector<char> is_inside = meets_volume(camera, volume, graph, result.graph);
   const Sphere reach = reach_of_labels(volume, is_inside);
