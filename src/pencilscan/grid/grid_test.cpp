@@ -1,8 +1,10 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numbers>
 
 #include "pencilscan/grid/grid_graph.h"
+#include "pencilscan/grid/line_candidates.h"
 #include "pencilscan/grid/local_ids.h"
 #include "pencilscan/rig/sample_devices.h"
 
@@ -159,6 +161,35 @@ TEST_F(PlaneGrid, CandidatesLieOnTheirLightSheetAndInTheVolume) {
       EXPECT_GT(candidates[i].depth, candidates[i - 1].depth);
     }
   }
+}
+
+TEST(PhaseCosts, AProjectorCostsWhatItLightsLessOfABall) {
+  // Devices around z that look at the origin; a patch halfway between two faces both.
+  const auto at = [](double degrees) {
+    const double angle = degrees * std::numbers::pi / 180;
+    return Vec3(1000 * std::cos(angle), 1000 * std::sin(angle), 0);
+  };
+  Rig rig = sample::two_by_two(sample::device_at<Camera>(at(0), "cam", 640, 480, 1100),
+                               sample::device_at<Projector>(at(30), "proj0", 640, 512, 1200),
+                               sample::device_at<Projector>(at(90), "proj1", 640, 512, 1200), 110);
+  const Projector beside = rig.projectors[0];
+  for (const double degrees : {150.0, 180.0}) {
+    Projector opposite = sample::device_at<Projector>(at(degrees), "proj", 640, 512, 1200);
+    opposite.patterns = beside.patterns;
+    rig.projectors.push_back(std::move(opposite));
+  }
+  rig.projectors[1].patterns = beside.patterns;
+  const std::vector<ColorFamily> families = color_families(rig);
+  ASSERT_EQ(families.size(), 1U);
+  const Camera& camera = rig.cameras[0];
+  const std::vector<float> costs = phase_costs(rig, camera, families[0]);
+  ASSERT_EQ(costs.size(), 4U);
+  EXPECT_EQ(costs[0], 0);
+  EXPECT_NEAR(costs[1], 0.62, 0.01);  // log(.933 / .5)
+  EXPECT_NEAR(costs[2], 2.63, 0.01);  // log(.933 / .067)
+  EXPECT_TRUE(std::isfinite(costs[3]));
+  for (const int sees : {0, 1, 2}) EXPECT_TRUE(can_see_pattern(rig, camera, sees)) << sees;
+  EXPECT_FALSE(can_see_pattern(rig, camera, 3));
 }
 
 }  // namespace
