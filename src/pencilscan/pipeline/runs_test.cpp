@@ -184,8 +184,9 @@ TEST_F(PipelineTest, TrackedFramesGoOnFromWhereAKilledProgramWas) {
   fs::remove_all(parts / "000001");  // its surface decides the next one's, too
   EXPECT_TRUE(run(frames, parts, options)[1].done);
   static_cast<void>(run(frames, whole, options));
-  options.output.tracks = false;
-  static_cast<void>(run(frames, alone, options));
+  SequenceOptions independent = options;
+  independent.output.tracks = false;
+  static_cast<void>(run(frames, alone, independent));
 
   const auto mesh = [](const fs::path& out, const std::string& frame) {
     return read_file(out / frame / "mesh.ply");
@@ -201,6 +202,15 @@ TEST_F(PipelineTest, TrackedFramesGoOnFromWhereAKilledProgramWas) {
   EXPECT_EQ(age("000003"), 0);
   EXPECT_TRUE(mesh(whole, "000003") == mesh(alone, "000003"));
   EXPECT_FALSE(fs::exists(whole / ".surfaces"));
+  // A program that is killed behind its last frame leaves surfaces behind; the next one takes them
+  // away, whether frames are missing or not.
+  for (const bool is_whole : {true, false}) {
+    fs::create_directories(parts / ".surfaces");
+    write_text(parts / ".surfaces" / "000000", "left behind");
+    if (!is_whole) fs::remove_all(parts / "000003");
+    static_cast<void>(run(frames, parts, options));
+    EXPECT_FALSE(fs::exists(parts / ".surfaces")) << is_whole;
+  }
 }
 
 /// Expects an InputError whose line has all the given parts, and no output.

@@ -58,8 +58,12 @@ SurfaceChain::SurfaceChain(fs::path out, std::vector<std::string> names,
 void SurfaceChain::add_chunk(const std::vector<std::size_t>& frames,
                              const std::vector<char>& there) {
   const auto missing = std::find(there.begin(), there.end(), 0);
-  if (missing == there.end()) return;
   auto begin = static_cast<std::size_t>(missing - there.begin());
+  // What a run that was killed left behind; a whole chunk goes on from nothing.
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    if (i + 1 != begin || missing == there.end()) forget(frames[i]);
+  }
+  if (missing == there.end()) return;
   std::size_t end = there.size();
   while (there[end - 1] != 0) --end;
   Surface first;
