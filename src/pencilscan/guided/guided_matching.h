@@ -19,7 +19,7 @@ struct GuidedMatchingOptions {
   double min_amplitude = 0.3;     ///< share of the amplitude of the lines around
   double min_tentative = 0.7;     ///< confidence of a tentative label that can be confirmed
   int min_points = 4;             ///< of a new curve or a confirmed label, in a row
-  int min_adopted = 10;           ///< of a part of an undecided stretch that labels' surface names
+  int min_adopted = 10;           ///< of a part of a stretch that labels' surface, or colour, names
   int min_whole = 6;              ///< of most of an undecided stretch, in a row
   double support_px = 16;         ///< within which lines around must be known ...
   double support_lines = 1.5;     ///< ... or so many line spacings, if those are more

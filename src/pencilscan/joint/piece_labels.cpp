@@ -190,8 +190,8 @@ void keep_supported(LabelledPieces& pieces, const JointOptions& options) {
 /// The lines of a pattern in a camera.
 struct VisiblePattern {
   VisiblePattern(const Rig& rig, const Camera& camera, const ColorFamily& family,
-                 PatternRef pattern)
-      : ref(pattern), sheets(rig, camera, pattern) {
+                 PatternRef pattern, float cost_of_any)
+      : ref(pattern), sheets(rig, camera, pattern), cost(cost_of_any) {
     const LinePattern& lines = rig.pattern(ref);
     const std::vector<int> color_of_symbol = family.color_of_symbol(lines);
     for (const int symbol : lines.sequence)
@@ -204,7 +204,7 @@ struct VisiblePattern {
 
   PatternRef ref;
   LineSheets sheets;
-  float cost = 0;                   ///< of any of its lines, before the picture says anything
+  float cost;                       ///< of any of its lines, before the picture says anything
   std::vector<std::size_t> colors;  ///< of one period
 };
 
@@ -321,8 +321,7 @@ LabelledPieces possible_labels(const Rig& rig, const std::vector<ColorFamily>& f
     for (std::size_t k = 0; k < costs.size(); ++k) {
       const PatternRef& ref = families[f].patterns[k];
       if (!can_see_pattern(rig, camera, ref.projector)) continue;
-      visible[f].emplace_back(rig, camera, families[f], ref);
-      visible[f].back().cost = costs[k];
+      visible[f].emplace_back(rig, camera, families[f], ref, costs[k]);
     }
   }
   const std::vector<char> is_inside = meets_volume(camera, volume, graph, result.graph);

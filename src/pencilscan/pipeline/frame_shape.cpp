@@ -1,8 +1,8 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <span>
 
-#include "pencilscan/core/check.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/pipeline/frame.h"
 #include "pencilscan/rig/camera_light.h"
@@ -149,6 +149,21 @@ void fuse(const Rig& rig, const PointResult& points, const std::vector<ColorView
   note_points_used(rig, points.points, result.depth.maps, surface);
 }
 
+/// Surface that none of the points lies near was not measured.
+void leave_unsupported(const Rig& rig, std::span<const MeasuredPoint> points, ShapeResult& result) {
+  constexpr double kReach = 2;  // line spacings
+  TriangleMesh& mesh = result.surface.mesh;
+  const std::vector<char> unsupported =
+      unsupported_vertices(mesh, points, kReach * line_spacing(rig));
+  if (std::find(unsupported.begin(), unsupported.end(), 1) == unsupported.end()) return;
+  contradict_vertices(mesh, unsupported, result.holes);
+  for (std::size_t v = 0; v < unsupported.size(); ++v) {
+    if (unsupported[v] == 0) continue;
+    mesh.confidence[v] = 0;
+    mesh.hole[v] = static_cast<std::uint8_t>(HoleReason::kContradicted);
+  }
+}
+
 void mark_holes(const Rig& rig, ShapeResult& result) {
   result.scene = std::make_shared<RayScene>(result.surface.mesh);
   result.holes = explain_holes(rig, *result.scene, result.depth.maps);
@@ -187,20 +202,9 @@ ShapeResult measure_shape(const Rig& rig, const Frame& frame, const PointResult&
 }
 
 FrameResult finish_shape(const Rig& rig, FrameResult result, const FusionOptions& options) {
-  constexpr double kReach = 2;  // line spacings
   ShapeResult& shape = result.shape;
-  if (!shape.scene) return result;
-  TriangleMesh& mesh = shape.surface.mesh;
-  if (result.points.is_on_surface) {
-    const std::vector<char> unsupported =
-        unsupported_vertices(mesh, result.points.points, kReach * line_spacing(rig));
-    contradict_vertices(mesh, unsupported, shape.holes);
-    for (std::size_t v = 0; v < unsupported.size(); ++v) {
-      if (unsupported[v] == 0) continue;
-      mesh.confidence[v] = 0;
-      mesh.hole[v] = static_cast<std::uint8_t>(HoleReason::kContradicted);
-    }
-  }
+  if (!shape.scene) return result;  // a surface of curves alone is finished
+  if (result.points.is_on_surface) leave_unsupported(rig, result.points.points, shape);
   finish_surface(options, shape.surface);
   return result;
 }

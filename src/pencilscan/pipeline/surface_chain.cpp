@@ -59,11 +59,15 @@ void SurfaceChain::add_chunk(const std::vector<std::size_t>& frames,
                              const std::vector<char>& there) {
   const auto missing = std::find(there.begin(), there.end(), 0);
   auto begin = static_cast<std::size_t>(missing - there.begin());
-  // What a run that was killed left behind; a whole chunk goes on from nothing.
-  for (std::size_t i = 0; i < frames.size(); ++i) {
-    if (i + 1 != begin || missing == there.end()) forget(frames[i]);
+  const bool is_whole = missing == there.end();
+  // A program that is killed leaves surfaces behind; one of them is gone on from.
+  std::error_code ignored;
+  if (fs::exists(out_ / kSurfacesFolder, ignored)) {
+    for (std::size_t i = 0; i < frames.size(); ++i) {
+      if (is_whole || i + 1 != begin) forget(frames[i]);
+    }
   }
-  if (missing == there.end()) return;
+  if (is_whole) return;
   std::size_t end = there.size();
   while (there[end - 1] != 0) --end;
   Surface first;

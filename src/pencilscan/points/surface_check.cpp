@@ -103,7 +103,7 @@ class SurfaceCheck {
   /// light.
   [[nodiscard]] bool may_be_lit(const RayScene::Hit& hit, const Projector& projector) const {
     // Cosine of the incidence; two deviations of the mesh's own slope, which near the edge of the
-    // light errs by .03 to .07 (docs/experiments.md).
+    // light errs by .03 to .07 (docs/solutions.md).
     constexpr double kSurelyFacing = 0.1;
     constexpr double kOff = 3;  // footprints that roughness and errors of the mesh take
     const Vec3 to_light = (projector.center() - hit.point).normalized();
