@@ -104,31 +104,38 @@ void SurfaceChain::hand_on(std::size_t step, Surface surface) {
     write_tracked_surface(file_of(frame), *surface, keys_[frame]);
   is_handed_on_[step] = 1;
   promises_[step].set_value(std::move(surface));
+  promises_[step] = {};  // it would hold the surface as long as the chain lives
 }
 
 void SurfaceChain::end(std::size_t step, bool broken) {
-  if (broken && is_handed_on_[step] == 0) {
-    is_handed_on_[step] = 1;
-    promises_[step].set_exception(std::make_exception_ptr(
-        ChainBroken("frame " + names_[steps_[step].frame] +
-                    ", which it starts from, could not be made this time")));
-    return;
-  }
-  if (is_handed_on_[step] == 0) {
+  const bool is_cut = broken && is_handed_on_[step] == 0;
+  if (is_cut) {
+    cut(step, std::make_exception_ptr(
+                  ChainBroken("frame " + names_[steps_[step].frame] +
+                              ", which it starts from, could not be made this time")));
+  } else if (is_handed_on_[step] == 0) {
     try {
       hand_on(step, before(step));
     } catch (const ChainBroken&) {
-      is_handed_on_[step] = 1;
-      promises_[step].set_exception(std::current_exception());
+      cut(step, std::current_exception());
     }
   }
+  // Nobody asks for these surfaces any more.
+  if (steps_[step].follows) surfaces_[step - 1] = {};
+  if (!is_followed(step)) surfaces_[step] = {};
+  if (is_cut) return;
   // Should the program end now, it goes on from this frame, or from the one before while that is
   // still being written.
-  if (steps_[step].first) forget(steps_[step].frame - 1);
+  if (std::exchange(steps_[step].first, nullptr)) forget(steps_[step].frame - 1);
   if (steps_[step].follows && step >= 2) forget_step(step - 2);
   if (is_followed(step)) return;
   if (step >= 1) forget_step(step - 1);
   forget_step(step);
+}
+
+void SurfaceChain::cut(std::size_t step, std::exception_ptr why) {
+  is_handed_on_[step] = 1;
+  promises_[step].set_exception(std::move(why));
 }
 
 bool SurfaceChain::is_followed(std::size_t step) const {

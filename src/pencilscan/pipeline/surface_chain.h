@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <exception>
 #include <filesystem>
 #include <future>
 #include <memory>
@@ -56,6 +57,7 @@ class SurfaceChain {
   void add_chunk(const std::vector<std::size_t>& frames, const std::vector<char>& there);
   [[nodiscard]] Surface before(std::size_t step) const;
   void hand_on(std::size_t step, Surface surface);
+  void cut(std::size_t step, std::exception_ptr why);
   [[nodiscard]] std::filesystem::path file_of(std::size_t frame) const;
   void forget_step(std::size_t step) const;
   void forget(std::size_t frame) const;
