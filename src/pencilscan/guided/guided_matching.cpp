@@ -13,6 +13,7 @@
 #include "pencilscan/detection/curve_rendering.h"
 #include "pencilscan/detection/profile_fit.h"
 #include "pencilscan/detection/refine.h"
+#include "pencilscan/guided/denied_lines.h"
 #include "pencilscan/guided/line_chains.h"
 #include "pencilscan/points/triangulate.h"
 #include "pencilscan/view/places.h"
@@ -60,6 +61,8 @@ class CameraMatching {
   void adopt_curves();
   /// Fits what is still missing to what the known curves leave of the presence images.
   void find_missing();
+  /// Where colours denied a dense surface in the last pass.
+  [[nodiscard]] const std::vector<DeniedRun>& denied() const { return denied_; }
   /// The surface of all that is labelled now.
   [[nodiscard]] LocalSurface take_surface();
 
@@ -109,6 +112,7 @@ class CameraMatching {
   Places<NamedPlace> known_names_;       ///< of the same points
   std::vector<PredictedPoint> missing_;  ///< predicted points that no label explains
   Places<PredictedPoint> missing_places_;
+  std::vector<DeniedRun> denied_;
 };
 
 CameraMatching::CameraMatching(const Rig& rig, const std::vector<ColorFamily>& families,
@@ -357,16 +361,22 @@ void CameraMatching::adopt_curves() {
   const float certainty = std::log(options_.confidence / (1 - options_.confidence));
   std::vector<LabeledRun> adopted;
   std::vector<std::optional<LineName>> names;
+  std::vector<float> spacings;
+  denied_.clear();
   for (std::size_t c = 0; c < graph_.curves.size(); ++c) {
     const Curve& curve = graph_.curves[c];
     names.assign(curve.points.size(), std::nullopt);
+    spacings.assign(curve.points.size(), 0.F);
     for (std::size_t i = 0; i < names.size(); ++i) {
-      if (decided[c][i] == 0) names[i] = line_at(curve.points[i], curve.family);
+      if (decided[c][i] == 0) names[i] = line_at(curve.points[i], curve.family, &spacings[i]);
     }
     for_each_stretch(names, [&](int begin, int end) {
       const auto& name = names[static_cast<std::size_t>(begin)];
       if (!name || !is_long_enough(decided[c], begin, end)) return;
       const float margin = color_margin(curve, begin, end, *name);
+      if (margin < -certainty && has_dense_ && end - begin >= options_.min_adopted)
+        denied_.push_back({static_cast<int>(c), begin, end, name->pattern, name->line,
+                           spacings[static_cast<std::size_t>((begin + end) / 2)]});
       if (margin > -certainty && is_supported(curve, begin, end, *name, margin))
         adopted.push_back(run_of(static_cast<int>(c), begin, end, *name));
     });
@@ -453,6 +463,8 @@ std::vector<LocalSurface> match_guided(const Rig& rig, const std::vector<ColorFa
                                        const GuidedMatchingOptions& options,
                                        std::span<const MeasuredPoint> dense) {
   std::vector<std::optional<LocalSurface>> surfaces(graphs.size());
+  labeling.denied.assign(labeling.runs.size(), {});
+  labeling.undecided.resize(labeling.runs.size());
   parallel_for(graphs.size(), [&](std::size_t g) {
     const auto camera = static_cast<std::size_t>(graphs[g].camera);
     CameraMatching look(rig, families, presence[g], graphs[g], labeling.runs[camera],
@@ -463,6 +475,10 @@ std::vector<LocalSurface> match_guided(const Rig& rig, const std::vector<ColorFa
       look.adopt_curves();
       look.find_missing();
     }
+    if (!look.denied().empty())
+      drop_beside_denied(graphs[g], look.denied(), labeling.runs[camera],
+                         labeling.undecided[camera]);
+    labeling.denied[camera] = look.denied();
     surfaces[g] = look.take_surface();
   });
   std::vector<LocalSurface> result;

@@ -198,6 +198,56 @@ TEST_F(LabeledScene, LinesOfAProjectorWithoutAnyLabelAreNamedByTheirColourOnADen
   EXPECT_EQ(share_named(dense, 0), 0) << "no colour supports any either";
 }
 
+TEST_F(LabeledScene, OnADenseSurfaceALineOfTheOtherColorTakesTheNextLinesLabelsBackBesideIt) {
+  const std::size_t curve = middle_curve(0);
+  const int line = true_lines[0][curve];
+  remove_label(curve);
+  std::vector<float>& code = graph_.curves[curve].code;
+  for (std::size_t i = 0; i < code.size(); i += 2) std::swap(code[i], code[i + 1]);
+  // The curve is seen along the first half of its line only.
+  Curve& seen = graph_.curves[curve];
+  seen.points.resize(seen.points.size() / 2);
+  seen.code.resize(2 * seen.points.size());
+  const Eigen::Vector2f last = seen.points.back().position;
+  const Eigen::Vector2f onward = (last - seen.points.front().position).normalized();
+  const std::vector<MeasuredPoint> dense = points();
+  const auto labelled = [&](const Labeling& labeling, int of_line, bool beside) {
+    int count = 0;
+    for (const LabeledRun& run : labeling.runs[0]) {
+      if (run.label.pattern != PatternRef{0, 0} || run.label.line != of_line) continue;
+      for (int i = run.begin; i < run.end; ++i) {
+        const Eigen::Vector2f& place = graph_.curves[static_cast<std::size_t>(run.curve)]
+                                           .points[static_cast<std::size_t>(i)]
+                                           .position;
+        const float along = (place - last).dot(onward);
+        if (beside ? along < -15 : along > 15) ++count;
+      }
+    }
+    return count;
+  };
+  Labeling labels_alone = labeling_;
+  const std::vector<std::vector<cv::Mat>> no_images(1);
+  match_guided(rig, families, no_images, {&graph_, 1}, labels_alone);
+  EXPECT_TRUE(labels_alone.denied[0].empty());
+  EXPECT_GT(labelled(labels_alone, line + 1, true), 30);
+  Labeling labeling = labeling_;
+  match_guided(rig, families, no_images, {&graph_, 1}, labeling, {}, dense);
+  ASSERT_FALSE(labeling.denied[0].empty());
+  for (const DeniedRun& denied : labeling.denied[0]) {
+    EXPECT_EQ(denied.curve, static_cast<int>(curve));
+    EXPECT_EQ(denied.line, line);
+  }
+  for (const int next : {line - 1, line + 1}) {
+    // At its rim the surface predicts nothing.
+    EXPECT_LT(2 * labelled(labeling, next, true), labelled(labeling_, next, true));
+    EXPECT_EQ(labelled(labeling, next, false), labelled(labeling_, next, false));
+  }
+  for (const int second : {line - 2, line + 2})
+    EXPECT_EQ(labelled(labeling, second, true), labelled(labeling_, second, true));
+  const auto undecided = undecided_points(labeling.undecided[0], labeling.runs[0]);
+  EXPECT_GT(undecided[static_cast<std::size_t>(UndecidedReason::kContradicted)], 60U);
+}
+
 TEST_F(LabeledScene, CurveMuchWiderThanThePredictedLineGetsNoLabel) {
   const std::size_t curve = middle_curve(0);
   remove_label(curve);

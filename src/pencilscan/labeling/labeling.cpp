@@ -16,6 +16,18 @@ std::size_t labelled_points(const Labeling& labeling) {
   return count;
 }
 
+void add_undecided(const UndecidedRun& run, std::vector<UndecidedRun>& undecided) {
+  for (std::size_t k = 0, others = undecided.size(); k < others; ++k) {
+    UndecidedRun& other = undecided[k];
+    if (other.curve != run.curve || other.end <= run.begin || other.begin >= run.end) continue;
+    const UndecidedRun after{other.curve, run.end, other.end, other.reason};
+    other.end = std::max(other.begin, run.begin);
+    if (after.begin < after.end) undecided.push_back(after);
+  }
+  std::erase_if(undecided, [](const UndecidedRun& other) { return other.begin == other.end; });
+  undecided.push_back(run);
+}
+
 std::array<std::size_t, 4> undecided_points(std::span<const UndecidedRun> undecided,
                                             std::span<const LabeledRun> labelled) {
   std::array<std::size_t, 4> points{};

@@ -59,6 +59,16 @@ struct UndecidedRun {
   UndecidedReason reason = UndecidedReason::kAmbiguous;
 };
 
+/// A stretch of a curve that lies where a surface predicts a line, and has another line's colour.
+struct DeniedRun {
+  int curve = 0;
+  int begin = 0;  ///< first point
+  int end = 0;    ///< one past the last
+  PatternRef pattern;
+  int line = 0;          ///< that the surface predicts
+  float spacing_px = 0;  ///< of the lines there, in the picture
+};
+
 /// Result of a solution over all cameras; curve points in no run are undecided.
 struct Labeling {
   std::vector<std::vector<LabeledRun>> runs;  ///< per camera, ordered by (curve, begin), disjoint
@@ -66,11 +76,15 @@ struct Labeling {
   std::vector<std::vector<LabeledRun>> tentative;
   std::vector<ComponentReport> components;           ///< all but joint
   std::vector<std::vector<UndecidedRun>> undecided;  ///< per camera; joint only
+  std::vector<std::vector<DeniedRun>> denied;  ///< per camera; guided matching on a dense surface
 };
 
 [[nodiscard]] std::size_t labelled_points(std::span<const LabeledRun> runs);
 /// Of all cameras.
 [[nodiscard]] std::size_t labelled_points(const Labeling& labeling);
+
+/// Adds a run, whose points are those of no other undecided run from here on.
+void add_undecided(const UndecidedRun& run, std::vector<UndecidedRun>& undecided);
 
 /// Points of undecided runs that no labelled run holds, per reason (the order of the enum).
 [[nodiscard]] std::array<std::size_t, 4> undecided_points(std::span<const UndecidedRun> undecided,

@@ -149,12 +149,27 @@ void fuse(const Rig& rig, const PointResult& points, const std::vector<ColorView
   note_points_used(rig, points.points, result.depth.maps, surface);
 }
 
-/// Surface that none of the points lies near was not measured.
-void leave_unsupported(const Rig& rig, std::span<const MeasuredPoint> points, ShapeResult& result) {
+/// Where the surface has to be for curves that deny it to lie on its lines.
+std::vector<MeasuredPoint> denied_places(const Rig& rig, const PointResult& points) {
+  Labeling labeling;
+  for (const auto& denied : points.labeling.denied) {
+    auto& runs = labeling.runs.emplace_back();
+    for (const DeniedRun& run : denied)
+      runs.push_back({run.curve,
+                      run.begin,
+                      run.end,
+                      {run.pattern, run.line, static_cast<double>(run.line), 1}});
+  }
+  labeling.runs.resize(rig.cameras.size());
+  return triangulate(rig, points.graphs, labeling, {});
+}
+
+/// Surface that none of the points lies near was not measured, nor was what curves deny.
+void leave_unsupported(const Rig& rig, const PointResult& points, ShapeResult& result) {
   constexpr double kReach = 2;  // line spacings
   TriangleMesh& mesh = result.surface.mesh;
-  const std::vector<char> unsupported =
-      unsupported_vertices(mesh, points, kReach * line_spacing(rig));
+  const std::vector<char> unsupported = unsupported_vertices(
+      mesh, points.points, denied_places(rig, points), kReach * line_spacing(rig));
   if (std::find(unsupported.begin(), unsupported.end(), 1) == unsupported.end()) return;
   contradict_vertices(mesh, unsupported, result.holes);
   for (std::size_t v = 0; v < unsupported.size(); ++v) {
@@ -204,7 +219,7 @@ ShapeResult measure_shape(const Rig& rig, const Frame& frame, const PointResult&
 FrameResult finish_shape(const Rig& rig, FrameResult result, const FusionOptions& options) {
   ShapeResult& shape = result.shape;
   if (!shape.scene) return result;  // a surface of curves alone is finished
-  if (result.points.is_on_surface) leave_unsupported(rig, result.points.points, shape);
+  if (result.points.is_on_surface) leave_unsupported(rig, result.points, shape);
   finish_surface(options, shape.surface);
   return result;
 }

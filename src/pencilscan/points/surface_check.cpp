@@ -179,7 +179,8 @@ std::size_t drop_contradicted(const Rig& rig, const RayScene& surface,
       const auto undecided_until = [&](int end) {
         if (end <= at) return;
         dropped += static_cast<std::size_t>(end - at);
-        labeling.undecided[c].push_back({runs[k].curve, at, end, UndecidedReason::kContradicted});
+        add_undecided({runs[k].curve, at, end, UndecidedReason::kContradicted},
+                      labeling.undecided[c]);
       };
       for (const LabeledRun& run : kept[k]) {
         undecided_until(run.begin);

@@ -1,0 +1,57 @@
+#include "pencilscan/guided/denied_lines.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "pencilscan/core/stretches.h"
+
+namespace pencilscan {
+namespace {
+
+using Eigen::Vector2f;
+
+/// True where a label lies beside a point of a denied line, and is the next line.
+bool is_next(const Vector2f& place, const CurveLabel& label, const CurvePoint& point,
+             const DeniedRun& denied) {
+  // Of the spacing: the second line is 2 away; and along a line, names change with the surface.
+  constexpr float kNext = 1.5F;
+  constexpr float kAlong = 0.5F;
+  if (!(label.pattern == denied.pattern) || std::abs(label.line - denied.line) != 1) return false;
+  const Vector2f way = place - point.position;
+  const float along = way.x() * point.normal.y() - way.y() * point.normal.x();
+  return std::abs(way.dot(point.normal)) < kNext * denied.spacing_px &&
+         std::abs(along) < kAlong * denied.spacing_px;
+}
+
+}  // namespace
+
+void drop_beside_denied(const GridGraph& graph, std::span<const DeniedRun> denied,
+                        std::vector<LabeledRun>& runs, std::vector<UndecidedRun>& undecided) {
+  const std::vector<LabeledRun> all = std::exchange(runs, {});
+  std::vector<char> stays;
+  for (const LabeledRun& run : all) {
+    const auto& points = graph.curves[static_cast<std::size_t>(run.curve)].points;
+    stays.assign(static_cast<std::size_t>(run.end - run.begin), 1);
+    for (const DeniedRun& line : denied) {
+      const auto& of_line = graph.curves[static_cast<std::size_t>(line.curve)].points;
+      for (std::size_t i = 0; i < stays.size(); ++i) {
+        const Vector2f& place = points[static_cast<std::size_t>(run.begin) + i].position;
+        if (std::any_of(of_line.begin() + line.begin, of_line.begin() + line.end,
+                        [&](const CurvePoint& p) { return is_next(place, run.label, p, line); }))
+          stays[i] = 0;
+      }
+    }
+    for_each_stretch(stays, [&](int begin, int end) {
+      const int first = run.begin + begin;
+      const int last = run.begin + end;
+      if (stays[static_cast<std::size_t>(begin)] != 0) {
+        runs.push_back({run.curve, first, last, run.label});
+      } else {
+        add_undecided({run.curve, first, last, UndecidedReason::kContradicted}, undecided);
+      }
+    });
+  }
+}
+
+}  // namespace pencilscan
