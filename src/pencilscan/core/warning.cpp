@@ -32,6 +32,8 @@ const char* to_string(WarningCode code) {
       return "not-closed";
     case WarningCode::kLittleMeasured:
       return "little-measured";
+    case WarningCode::kViewsDisagree:
+      return "views-disagree";
     case WarningCode::kMotion:
       return "motion";
   }

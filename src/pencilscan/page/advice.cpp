@@ -18,7 +18,7 @@ struct Known {
 };
 
 /// What to do about warnings, by their code (core/warning.h).
-constexpr std::array<Known, 11> kKnown = {{
+constexpr std::array<Known, 12> kKnown = {{
     {"saturated",
      "Close the aperture or shorten the exposure until the brightest lines stay below "
      "full scale, and capture again."},
@@ -37,6 +37,9 @@ constexpr std::array<Known, 11> kKnown = {{
     {"rig-is-off",
      "Run reconstruct with --refine-rig, or calibrate again if devices were "
      "moved."},
+    {"views-disagree",
+     "Compare the cameras' pictures below with where the cameras stand; if they are right, check "
+     "the calibration (rig check)."},
     {"curves-only",
      "Look at the hole map of each camera below: it says what kept "
      "depth from being found between the curves."},

@@ -114,6 +114,17 @@ TEST_F(PictureCheck, CamerasThatAreExchangedWhereTheRingRepeatsItselfAreNamed) {
                       "camera cam4: its picture is that of camera cam2"});
 }
 
+// A ball nearly in the middle looks alike from there, so that no line is named another one's. Its
+// depths lie apart by a fraction of a line spacing, and that is many deviations.
+TEST_F(PictureCheck, CamerasThatAreExchangedBeforeABallInTheMiddleDisagree) {
+  const auto disagree =
+      testing::Contains(testing::Field(&Warning::code, WarningCode::kViewsDisagree));
+  Frame frame = frame_of(make_sphere(85, 48, {3, 2, 0}));
+  EXPECT_THAT(reconstruct_frame(*rig_, frame).points.warnings, IsEmpty());
+  std::swap(frame.images[2], frame.images[4]);
+  EXPECT_THAT(reconstruct_frame(*rig_, frame).points.warnings, disagree);
+}
+
 /// What is said where projectors a and b show each other's patterns.
 std::string refusal_of(Rig rig, const Frame& frame, std::size_t a, std::size_t b) {
   std::swap(rig.projectors[a].patterns, rig.projectors[b].patterns);
