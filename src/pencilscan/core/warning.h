@@ -22,7 +22,7 @@ enum class WarningCode {
   kCurvesOnly,      ///< dense depth found too little
   kNotClosed,       ///< figures "boundary", "non_manifold": edges of the surface
   kLittleMeasured,  ///< figure "share": of the closed surface
-  kViewsDisagree,   ///< figures "deviations", "contradicted": of depths of different cameras
+  kViewsDisagree,   ///< figure "deviations": of depths of different cameras
   kMotion,          ///< within the exposure; figures "way_mm", "way_sigma_mm"
 };
 

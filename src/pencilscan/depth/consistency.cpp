@@ -318,8 +318,7 @@ ConsistencyReport check_consistency(const Rig& rig, std::span<const int> pattern
     ++report.contradicted;
   }
   report.sigma_scale = sigma_scale(links);
-  report.sigma_factor =
-      kUnseenErrors * std::clamp(report.sigma_scale, 1 / kUnseenErrors, kLargestSigmaScale);
+  report.sigma_factor = kUnseenErrors * std::clamp(report.sigma_scale, 1 / kUnseenErrors, 4.0);
   scale_sigma(report.sigma_factor, maps);
   for (DepthMap& map : maps) {
     report.unconfirmed += drop_lone_nodes(map);

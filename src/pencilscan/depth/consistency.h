@@ -17,10 +17,6 @@ struct ConsistencyOptions {
   int min_component = 12;  ///< nodes; smaller unsupported islands are dropped
 };
 
-/// Sigma is scaled by no more. Beyond, cameras do not see the same surface at the same place:
-/// rendered scenes have .8 to 2.1.
-inline constexpr double kLargestSigmaScale = 4;
-
 struct ConsistencyReport {
   double sigma_scale = 1;        ///< by which the cameras' disagreement exceeds what sigma says
   double sigma_factor = 1;       ///< by which sigma was widened: errors that all share, too

@@ -4,6 +4,8 @@
 
 #include "pencilscan/core/median.h"
 #include "pencilscan/pipeline/frame.h"
+#include "pencilscan/pipeline/frame_warnings.h"
+#include "pencilscan/pipeline/view_agreement.h"
 #include "pencilscan/points/surface_check.h"
 
 // Of a frame's way: from the lines to points, and to points on the dense surface.
@@ -69,7 +71,12 @@ PointResult place_points(const Rig& rig, PointResult lines, const PointOptions& 
     }
     result.points = triangulate(rig, result.graphs, result.labeling, triangulation);
     if (result.corrected) surfaces = local_surfaces(rig, result.points, options.guided.surface);
-    if (is_guided) result.points = settle_points(rig, std::move(result.points), surfaces, settle);
+    if (!is_guided) return;
+    result.points = settle_points(rig, std::move(result.points), surfaces, settle);
+    const auto apart = views_apart(rig, result.points, surfaces);
+    // Where the rig is off, that was said.
+    if (!result.corrected && apart.value_or(0) > kMostApart)
+      result.warnings.push_back(views_warning(*apart));
   });
   return result;
 }

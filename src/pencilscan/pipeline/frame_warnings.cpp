@@ -1,6 +1,5 @@
 #include "pencilscan/pipeline/frame_warnings.h"
 
-#include <algorithm>
 #include <cmath>
 #include <string>
 
@@ -113,26 +112,14 @@ Warning rig_warning(const CrossingDisagreement& crossings, bool is_corrected) {
           {{"median_px", crossings.median_px}, {"expected_px", crossings.expected_px}}};
 }
 
-std::optional<Warning> views_warning(const DepthReport& depth) {
-  constexpr double kMostContradicted = 0.1;  // rendered scenes have .027 at most
-  constexpr std::size_t kEnough = 200;       // nodes
-  std::size_t measured = depth.consistency.contradicted;
-  for (const CameraDepthReport& camera : depth.cameras) measured += camera.measured;
-  const double deviations = depth.consistency.sigma_scale;
-  const double contradicted = static_cast<double>(depth.consistency.contradicted) /
-                              static_cast<double>(std::max<std::size_t>(1, measured));
-  const bool is_far = deviations > kLargestSigmaScale;
-  if (measured < kEnough || !(is_far || contradicted > kMostContradicted)) return std::nullopt;
-  return Warning{
-      WarningCode::kViewsDisagree,
-      (is_far ? "what the cameras see lies apart by " + formatted(deviations, "%.1f") +
-                    " times as much as their pictures explain"
-              : formatted(100 * contradicted, "%.0f") +
-                    " % of what the cameras see stands in the way of another camera's view") +
-          ": pictures of two cameras that see the projectors alike may be exchanged, a device was "
-          "moved, or the object moved between the pictures",
-      {},
-      {{"deviations", deviations}, {"contradicted", contradicted}}};
+Warning views_warning(double deviations) {
+  return {WarningCode::kViewsDisagree,
+          "what the cameras see lies apart by " + formatted(deviations, "%.1f") +
+              " times as much as their pictures explain: pictures of two cameras that see the "
+              "projectors alike may be exchanged, a device was moved, or the object moved between "
+              "the pictures",
+          {},
+          {{"deviations", deviations}}};
 }
 
 Warning motion_warning(const ExposureMotion& motion) {

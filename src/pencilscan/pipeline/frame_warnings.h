@@ -27,8 +27,8 @@ namespace pencilscan {
 /// as the frame corrects them.
 [[nodiscard]] Warning rig_warning(const CrossingDisagreement& crossings, bool is_corrected);
 
-/// That depths of different cameras are not those of one surface, as far as pictures can explain.
-[[nodiscard]] std::optional<Warning> views_warning(const DepthReport& depth);
+/// That depths of different cameras are not those of one surface, by so many deviations.
+[[nodiscard]] Warning views_warning(double deviations);
 
 /// That the object moved while the shutters were open; lengths in the rig's unit.
 [[nodiscard]] Warning motion_warning(const ExposureMotion& motion);

@@ -6,6 +6,7 @@
 #include <optional>
 #include <utility>
 
+#include "pencilscan/core/median.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/rig/object_space.h"
 
@@ -121,6 +122,34 @@ std::vector<std::size_t> ViewAgreement::doubtful_cameras() const {
     if (is_doubtful) cameras.push_back(a);
   }
   return cameras;
+}
+
+std::optional<double> views_apart(const Rig& rig, std::span<const MeasuredPoint> points,
+                                  std::span<const LocalSurface> surfaces) {
+  constexpr std::size_t kEvery = 3;     // neighbours on a line say the same
+  constexpr std::size_t kEnough = 100;  // the median is known to an eighth
+  constexpr double kSameSurface = 0.5;  // line spacings
+  constexpr float kOneSided = 0.5F;     // of a patch: beyond, it is continued, not measured
+  const double reach = kSameSurface * line_spacing(rig);
+  std::vector<float> ratios;
+  for (std::size_t i = 0; i < points.size(); i += kEvery) {
+    const MeasuredPoint& p = points[i];
+    for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
+      const Camera& camera = rig.cameras[c];
+      const auto pixel = camera.project(position_of(p));
+      if (c == p.camera || !pixel || !camera.contains(*pixel)) continue;
+      const Eigen::Vector2f at = pixel->cast<float>();
+      const SurfacePatch* patch = surfaces[c].nearest(at);
+      if (patch == nullptr || patch->one_sidedness > kOneSided) continue;
+      const double depth = 1 / double{patch->inverse_depth(at)};
+      const double apart = std::abs(depth - (camera.device_from_world * position_of(p)).z());
+      if (!(apart < reach)) continue;
+      ratios.push_back(
+          static_cast<float>(apart / std::hypot(double{p.sigma}, double{patch->sigma} * depth)));
+    }
+  }
+  if (ratios.size() < kEnough) return std::nullopt;
+  return kDeviationPerMedian * static_cast<double>(upper_median(std::move(ratios)));
 }
 
 }  // namespace pencilscan

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include "pencilscan/core/random.h"
+#include "pencilscan/points/settle.h"
 #include "pencilscan/rig/object_space.h"
 #include "pencilscan/rig/sample_devices.h"
 
@@ -51,6 +53,31 @@ TEST(ViewAgreement, CamerasThatSeeOneBallAgreeAndThoseThatSeeTwoDoNot) {
   // What is far apart says nothing.
   const PairAgreement none = agreement(rig, {0, 0, 0}, {0, 0, 2.5 * kBallSeen});
   EXPECT_LT(none.same, one.same / 10);
+}
+
+TEST(ViewAgreement, TwoBallsAFractionOfALineApartLieManyDeviationsApart) {
+  const Rig rig = sample::small_rig(480, 360, 110);
+  constexpr float kSigma = 0.05F;
+  const auto apart = [&](double lines) {
+    Random random(3);
+    std::vector<MeasuredPoint> points;
+    for (std::uint8_t c = 0; c < 2; ++c) {
+      const Camera& camera = rig.cameras[c];
+      for (MeasuredPoint p : seen_points(camera, {c == 0 ? lines * line_spacing(rig) : 0, 0, 0})) {
+        const Vec3 way = (position_of(p) - camera.center()).normalized();
+        set_position(position_of(p) + random.normal(0, kSigma) * way, p);
+        p.camera = c;
+        p.sigma = kSigma;
+        points.push_back(p);
+      }
+    }
+    return views_apart(rig, points, local_surfaces(rig, points, {}));
+  };
+  EXPECT_LT(apart(0).value(), 1.2);
+  EXPECT_GT(apart(0.2).value(), kMostApart);
+  // Out of each other's sight nothing can be said.
+  const std::vector<MeasuredPoint> of_one = seen_points(rig.cameras[0], Vec3::Zero());
+  EXPECT_FALSE(views_apart(rig, of_one, local_surfaces(rig, of_one, {})).has_value());
 }
 
 TEST(ViewAgreement, NamesTheCamerasOfDoubtfulPairs) {
