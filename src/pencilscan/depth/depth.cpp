@@ -52,16 +52,12 @@ DepthResult measure_depth(const Rig& rig, const std::vector<ColorFamily>& famili
     const std::size_t c = cameras[i];
     const Camera& camera = rig.cameras[c];
     const Unmixing& unmixing = detections[c].unmixing;
-    const cv::Mat rgb = projector_light(camera, linear_light(camera, images[c]), unmixing);
-    std::vector<cv::Mat> presence;
     std::vector<cv::Mat> sampled;
-    for (const ColorFamily& family : families) {
-      presence.push_back(presence_image(rgb, family));
+    for (const ColorFamily& family : families)
       sampled.push_back(presence_samples(camera, unmixing, family));
-    }
     CameraLight& light = result.lights[i];
     light.camera = &camera;
-    light.families = std::move(presence);
+    light.families = detections[c].presence;
     light.sampled = std::move(sampled);
     light.valid = unsaturated(images[c]);
     light.of_mosaic = camera.mosaic || detections[c].is_filled_in;

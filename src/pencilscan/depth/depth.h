@@ -45,7 +45,8 @@ struct DepthResult {
 /// Dense depth of one frame. Around each node of a pixel grid, inverse depth is a quadric that is
 /// fitted to the image of all lit projectors at once (window_fit.h), started from labelled curve
 /// points or from solved neighbours; then the cameras check each other (consistency.h). `images` as
-/// read, one per camera of the rig (empty: missing); `detections` of them.
+/// read, one per camera of the rig (empty: missing); `detections` of them, whose presence images
+/// the maps' lights share.
 [[nodiscard]] DepthResult measure_depth(const Rig& rig, const std::vector<ColorFamily>& families,
                                         std::span<const cv::Mat> images,
                                         std::span<const CameraDetection> detections,

@@ -10,6 +10,7 @@
 #include "pencilscan/core/random.h"
 #include "pencilscan/depth/depth_image.h"
 #include "pencilscan/depth/seeds.h"
+#include "pencilscan/rig/camera_light.h"
 #include "pencilscan/rig/sample_devices.h"
 #include "pencilscan/simulation/panel_light.h"
 #include "pencilscan/simulation/render.h"
@@ -44,6 +45,19 @@ struct BallScene {
       add_points(c, random);
     }
     detections.resize(rig.cameras.size());
+    see();
+  }
+
+  /// The light of the families in the pictures.
+  void see() {
+    for (std::size_t c = 0; c < images.size(); ++c) {
+      const Camera& camera = rig.cameras[c];
+      detections[c].presence.clear();
+      const cv::Mat light =
+          projector_light(camera, linear_light(camera, images[c]), detections[c].unmixing);
+      for (const ColorFamily& family : families)
+        detections[c].presence.push_back(presence_image(light, family));
+    }
   }
 
   /// Every pixel within half a pixel of a line.
