@@ -74,6 +74,8 @@ struct FrameLinks {
   std::function<std::shared_ptr<const TrackedSurface>()> before;
   /// Hears of this moment's surface as soon as it is there; nobody: it is not kept.
   std::function<void(std::shared_ptr<const TrackedSurface>)> hand_on;
+  /// Nobody reads the result: the frame is left as soon as its surface is handed on.
+  bool only_hands_on = false;
 };
 
 /// Labelled points of one frame and everything that led to them. Each stage fills in its part.

@@ -194,12 +194,15 @@ ShapeResult measure_shape(const Rig& rig, const Frame& frame, const PointResult&
   ShapeResult result;
   if (options.depth.enabled) {
     clock("depth", [&] { result.depth = depth_of(rig, frame, points, options.depth); });
-    clock("motion", [&] { result.motion = motion_in_exposure(rig, options.depth, result.depth); });
+    if (!links.only_hands_on)
+      clock("motion",
+            [&] { result.motion = motion_in_exposure(rig, options.depth, result.depth); });
     std::vector<ColorView> views;
     clock("surface", [&] {
       views = color_views(rig, frame, points, result.depth.report);
       fuse(rig, points, views, options, links, result);
     });
+    if (links.only_hands_on) return result;
     if (result.surface.report.status != SurfaceStatus::kTooFewPoints) {
       clock("holes", [&] { mark_holes(rig, result); });
       clock("color", [&] { result.surface.mesh.color = vertex_colors(rig, *result.scene, views); });

@@ -36,7 +36,8 @@ constexpr const char* kRefinementFile = "refinement.json";
 
 /// A frame that is there, or of the chunk before: its surface goes on, nothing is written.
 void pass_frame(const Rig& rig, const FrameSource& frames, std::size_t index,
-                const OutputOptions& options, const FrameLinks& links) {
+                const OutputOptions& options, FrameLinks links) {
+  links.only_hands_on = true;
   static_cast<void>(reconstruct_frame(rig, frames.read(rig, index), options.frame, links));
 }
 
