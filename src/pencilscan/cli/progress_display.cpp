@@ -45,19 +45,23 @@ std::string time_left(double seconds) {
 std::array<std::array<char, 400>, 2> last_lines{};
 std::atomic<const char*> last_line{nullptr};
 
-/// Prints the line that the display has ready, and lets the signal end the program as ever.
+std::atomic_flag is_ending = ATOMIC_FLAG_INIT;
+
+/// Prints the line that the display has ready, and lets the signal end the program as ever. A
+/// second signal, which another thread may take meanwhile (timeout sends two), waits for that.
 extern "C" void end_with_last_line(int signal) {
+  if (is_ending.test_and_set()) return;
   if (const char* line = last_line.load()) {
     const ssize_t written = ::write(STDERR_FILENO, line, std::strlen(line));
     static_cast<void>(written);
   }
-  ::raise(signal);  // taken by default once this handler, which is taken once, has ended
+  ::signal(signal, SIG_DFL);
+  ::raise(signal);  // taken once this handler has ended
 }
 
 void catch_interruptions() {
   struct sigaction action {};
   action.sa_handler = end_with_last_line;
-  action.sa_flags = static_cast<int>(SA_RESETHAND);
   for (const int signal : {SIGINT, SIGTERM}) {
     struct sigaction earlier {};
     ::sigaction(signal, nullptr, &earlier);
