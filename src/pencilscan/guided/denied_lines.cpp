@@ -11,16 +11,18 @@ namespace {
 
 using Eigen::Vector2f;
 
-/// True where a label lies beside a point of a denied line, and is the next line.
-bool is_next(const Vector2f& place, const CurveLabel& label, const CurvePoint& point,
+/// True where a label lies beside a point of a denied line, and is the next line or the second.
+bool is_near(const Vector2f& place, const CurveLabel& label, const CurvePoint& point,
              const DeniedRun& denied) {
-  // Of the spacing: the second line is 2 away; and along a line, names change with the surface.
-  constexpr float kNext = 1.5F;
+  constexpr int kLines = 2;
+  // Of the spacing; along a line, names change with the surface.
+  constexpr float kAcross = 0.5F + kLines;
   constexpr float kAlong = 0.5F;
-  if (!(label.pattern == denied.pattern) || std::abs(label.line - denied.line) != 1) return false;
+  const int lines = std::abs(label.line - denied.line);
+  if (!(label.pattern == denied.pattern) || lines == 0 || lines > kLines) return false;
   const Vector2f way = place - point.position;
   const float along = way.x() * point.normal.y() - way.y() * point.normal.x();
-  return std::abs(way.dot(point.normal)) < kNext * denied.spacing_px &&
+  return std::abs(way.dot(point.normal)) < kAcross * denied.spacing_px &&
          std::abs(along) < kAlong * denied.spacing_px;
 }
 
@@ -38,7 +40,7 @@ void drop_beside_denied(const GridGraph& graph, std::span<const DeniedRun> denie
       for (std::size_t i = 0; i < stays.size(); ++i) {
         const Vector2f& place = points[static_cast<std::size_t>(run.begin) + i].position;
         if (std::any_of(of_line.begin() + line.begin, of_line.begin() + line.end,
-                        [&](const CurvePoint& p) { return is_next(place, run.label, p, line); }))
+                        [&](const CurvePoint& p) { return is_near(place, run.label, p, line); }))
           stays[i] = 0;
       }
     }

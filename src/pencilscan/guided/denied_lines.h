@@ -8,12 +8,12 @@
 
 namespace pencilscan {
 
-/// Takes back the labels next to denied lines. A surface that is wrong by whole lines fits the
-/// places of all of them, and only the code tells: the picture shows the next line in another
-/// colour. For a label speak its own colour and that of the next line on the other side, which a
-/// wrong name has by chance every second time; against it, a colour that a right one has once in a
-/// hundred times (GuidedMatchingOptions::confidence). What is taken back is undecided, with the
-/// reason kContradicted.
+/// Takes back the labels of the two lines on either side of denied ones, beside them. A surface
+/// that is wrong by whole lines fits the places of all of them, and only the code tells: the
+/// picture shows a line near by in another colour. That happens once in a hundred times beside a
+/// right label (GuidedMatchingOptions::confidence), and outweighs the colours of six lines that
+/// agree, which a wrong surface has by chance every second time: a label two lines away has four
+/// such neighbours at most. What is taken back is undecided, with the reason kContradicted.
 void drop_beside_denied(const GridGraph& graph, std::span<const DeniedRun> denied,
                         std::vector<LabeledRun>& runs, std::vector<UndecidedRun>& undecided);
 

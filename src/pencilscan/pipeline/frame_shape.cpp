@@ -16,9 +16,18 @@
 namespace pencilscan {
 namespace {
 
-/// `linear` with NaN where the image as read is overexposed.
+/// `linear` with NaN where the image as read is overexposed. Where nothing is, they share pixels.
 cv::Mat without_overexposed(const cv::Mat& linear, const cv::Mat& values) {
+  const cv::Mat mask = overexposed(values);
+  if (cv::countNonZero(mask) == 0) return linear;
   cv::Mat image = linear.clone();
+  image.setTo(cv::Scalar::all(std::nan("")), mask);
+  return image;
+}
+
+/// The light of the projectors in a picture, with NaN where it is overexposed.
+cv::Mat lit_image(const Camera& camera, const cv::Mat& values, const Unmixing& unmixing) {
+  cv::Mat image = projector_light(camera, linear_light(camera, values), unmixing);
   image.setTo(cv::Scalar::all(std::nan("")), overexposed(values));
   return image;
 }
@@ -31,10 +40,10 @@ ColorView lit_view(const Rig& rig, const Frame& frame, std::size_t c, const Poin
   ColorView view;
   view.camera = static_cast<int>(c);
   view.is_plain = camera.sees_texture_only;
-  const cv::Mat linear = linear_light(camera, frame.images[c]);
-  view.image = view.is_plain ? registered(camera, linear)
-                             : projector_light(camera, linear, points.detections[c].unmixing);
-  view.image = without_overexposed(view.image, frame.images[c]);
+  const cv::Mat& values = frame.images[c];
+  view.image = view.is_plain
+                   ? without_overexposed(registered(camera, linear_light(camera, values)), values)
+                   : lit_image(camera, values, points.detections[c].unmixing);
   for (const CameraDepthReport& of_camera : depth.cameras) {
     if (of_camera.camera == view.camera) view.blur_px = of_camera.blur_px;
   }
