@@ -126,13 +126,15 @@ std::vector<std::size_t> ViewAgreement::doubtful_cameras() const {
 
 std::optional<double> views_apart(const Rig& rig, std::span<const MeasuredPoint> points,
                                   std::span<const LocalSurface> surfaces) {
-  constexpr std::size_t kEvery = 3;     // neighbours on a line say the same
+  constexpr std::size_t kNext = 3;      // neighbours on a line say the same
+  constexpr std::size_t kMost = 4000;   // points: the median of as many is known to a fiftieth
   constexpr std::size_t kEnough = 100;  // the median is known to an eighth
   constexpr double kSameSurface = 0.5;  // line spacings
   constexpr float kOneSided = 0.5F;     // of a patch: beyond, it is continued, not measured
   const double reach = kSameSurface * line_spacing(rig);
   std::vector<float> ratios;
-  for (std::size_t i = 0; i < points.size(); i += kEvery) {
+  const std::size_t step = std::max(kNext, points.size() / kMost);
+  for (std::size_t i = 0; i < points.size(); i += step) {
     const MeasuredPoint& p = points[i];
     for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
       const Camera& camera = rig.cameras[c];
