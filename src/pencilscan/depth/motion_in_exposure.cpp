@@ -87,6 +87,21 @@ double window_overlap(const DepthMap& map, int half, int stride) {
   return std::max(1.0, weights / (map.stride * stride * map.stride * stride));
 }
 
+namespace {
+
+/// Colours at half the resolution, as behind a mosaic or in a JPEG, filled in by lines between
+/// them: a triangle of two pixels to either side, along rows and columns, adds so much. (Pictures
+/// of a mosaic itself are fitted where it has samples.)
+double unknown_blur_px2(std::span<const CameraLight> lights) {
+  constexpr double kFilledIn = 2 * 2 / 6.0;
+  const bool any = std::any_of(lights.begin(), lights.end(), [](const CameraLight& light) {
+    return light.of_mosaic && !light.camera->mosaic;
+  });
+  return any ? kFilledIn : 0;
+}
+
+}  // namespace
+
 ExposureMotion motion_in_exposure(const Rig& rig, const DepthStageOptions& options,
                                   const DepthResult& result) {
   // Windows are 11 px wide, nodes a few: of many nodes, this number in even rows and columns tell
@@ -118,7 +133,7 @@ ExposureMotion motion_in_exposure(const Rig& rig, const DepthStageOptions& optio
     }
     std::vector<double> expected;
     motion = exposure_motion(all, window_overlap(result.maps.front(), options.depth.half, stride),
-                             round == 0 ? &expected : nullptr);
+                             unknown_blur_px2(result.lights), round == 0 ? &expected : nullptr);
     if (expected.empty()) break;
     std::size_t next = 0;
     for (auto& of_camera : lines) {

@@ -155,7 +155,7 @@ double jackknife(const std::vector<BlurEquations>& equations, const Twist& m, bo
 
 }  // namespace
 
-ExposureMotion exposure_motion(std::span<const LineBlur> lines, double overlap,
+ExposureMotion exposure_motion(std::span<const LineBlur> lines, double overlap, double unknown_px2,
                                std::vector<double>* expected) {
   ExposureMotion motion;
   if (lines.size() < kLeastLines) return motion;
@@ -170,9 +170,9 @@ ExposureMotion exposure_motion(std::span<const LineBlur> lines, double overlap,
   }
   // What an error of the baseline, a share of the blur, looks like.
   const double g = median_of(lines, &LineBlur::px_per_length);
+  const double blur_px2 = std::max(0.0, median_of(lines, &LineBlur::variance_px2));
   const double unsure =
-      std::sqrt(12 * kBaselineError * std::max(0.0, median_of(lines, &LineBlur::variance_px2))) /
-      std::max(std::abs(g), 1e-9);
+      std::sqrt(12 * (kBaselineError * blur_px2 + unknown_px2)) / std::max(std::abs(g), 1e-9);
   motion.at_most = std::hypot(motion.at_most, unsure);
   const BlurColumns& columns = fit.columns();
   Twist m = best_shift(all);

@@ -55,11 +55,14 @@ struct ExposureMotion {
 };
 
 /// Robust least squares over the lines' variances. `overlap`: how many of them see the same pixel,
-/// >= 1, as which they count once. `expected`, if given, becomes the variance that the fit has at
-/// each place. Motion counts as seen where it makes the fit better than chance does, is several
-/// deviations long by a jackknife over pairs of camera and projector, and adds more than a share of
-/// the blur itself, as which the baseline is not believed. A turn is taken in where it is needed.
+/// >= 1, as which they count once. `unknown_px2`: variance that pictures may have along some of
+/// their directions beyond the baseline. `expected`, if given, becomes the variance that the fit
+/// has at each place. Motion counts as seen where it makes the fit better than chance does, is
+/// several deviations long by a jackknife over pairs of camera and projector, and adds more than a
+/// share of the blur itself, as which the baseline is not believed. A turn is taken in where it is
+/// needed.
 [[nodiscard]] ExposureMotion exposure_motion(std::span<const LineBlur> lines, double overlap,
+                                             double unknown_px2 = 0,
                                              std::vector<double>* expected = nullptr);
 
 /// What motion adds to the deviation of a place that goes `way` within the exposure: along its

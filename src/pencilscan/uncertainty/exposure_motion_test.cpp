@@ -82,6 +82,15 @@ TEST(ExposureMotion, AShiftIsFoundWithItsDirection) {
   }
 }
 
+TEST(ExposureMotion, WhatThePicturesMayHaveThemselvesIsNoMotion) {
+  const std::vector<LineBlur> lines = lines_of(Vec3(2, 0, 0), Vec3::Zero(), kNoise, 3);
+  constexpr double kUnknownPx2 = 2.0;
+  const ExposureMotion motion = exposure_motion(lines, 1, kUnknownPx2);
+  EXPECT_FALSE(motion.is_seen);
+  EXPECT_GT(motion.at_most, 2);
+  EXPECT_TRUE(exposure_motion(lines, 1, kUnknownPx2 / 100).is_seen);
+}
+
 TEST(ExposureMotion, ATurnIsFoundWithItsAxis) {
   const Vec3 turn(0, 0.01, 0.04);  // rad: 3.3 at the rim of the ball
   const ExposureMotion motion = exposure_motion(lines_of(Vec3(1, 0, 0), turn, kNoise, 4), 1);
@@ -95,7 +104,7 @@ TEST(ExposureMotion, ATurnIsFoundWithItsAxis) {
 TEST(ExposureMotion, TheFitSaysWhatVarianceToExpect) {
   const std::vector<LineBlur> lines = lines_of(Vec3(2, 1, 0), Vec3::Zero(), kNoise, 5);
   std::vector<double> expected;
-  static_cast<void>(exposure_motion(lines, 1, &expected));
+  static_cast<void>(exposure_motion(lines, 1, 0, &expected));
   ASSERT_EQ(expected.size(), lines.size());
   std::size_t near = 0;
   for (std::size_t i = 0; i < lines.size(); ++i)
