@@ -67,6 +67,17 @@ void add_lines(const Rig& rig, const CameraLight& light, const DepthMap& map, st
   }
 }
 
+/// Colours at half the resolution, as behind a mosaic or in a JPEG, filled in by lines between
+/// them: a triangle of two pixels to either side, along rows and columns, adds so much. (Pictures
+/// of a mosaic itself are fitted where it has samples.)
+double unknown_blur_px2(std::span<const CameraLight> lights) {
+  constexpr double kFilledIn = 2 * 2 / 6.0;
+  const bool any = std::any_of(lights.begin(), lights.end(), [](const CameraLight& light) {
+    return light.of_mosaic && !light.camera->mosaic;
+  });
+  return any ? kFilledIn : 0;
+}
+
 }  // namespace
 
 std::vector<NodeLines> lines_at_nodes(const Rig& rig, const CameraLight& light, const DepthMap& map,
@@ -86,21 +97,6 @@ double window_overlap(const DepthMap& map, int half, int stride) {
   for (const float weight : grid.taper) weights += static_cast<double>(weight);
   return std::max(1.0, weights / (map.stride * stride * map.stride * stride));
 }
-
-namespace {
-
-/// Colours at half the resolution, as behind a mosaic or in a JPEG, filled in by lines between
-/// them: a triangle of two pixels to either side, along rows and columns, adds so much. (Pictures
-/// of a mosaic itself are fitted where it has samples.)
-double unknown_blur_px2(std::span<const CameraLight> lights) {
-  constexpr double kFilledIn = 2 * 2 / 6.0;
-  const bool any = std::any_of(lights.begin(), lights.end(), [](const CameraLight& light) {
-    return light.of_mosaic && !light.camera->mosaic;
-  });
-  return any ? kFilledIn : 0;
-}
-
-}  // namespace
 
 ExposureMotion motion_in_exposure(const Rig& rig, const DepthStageOptions& options,
                                   const DepthResult& result) {

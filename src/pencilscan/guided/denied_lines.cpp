@@ -11,19 +11,23 @@ namespace {
 
 using Eigen::Vector2f;
 
-/// True where a label lies beside a point of a denied line, and is the next line or the second.
-bool is_near(const Vector2f& place, const CurveLabel& label, const CurvePoint& point,
-             const DeniedRun& denied) {
-  constexpr int kLines = 2;
+constexpr int kLines = 2;  // to either side
+
+/// True where a colour that denies one line speaks against the other.
+bool speaks_against(const CurveLabel& denied, const CurveLabel& label) {
+  const int lines = std::abs(label.line - denied.line);
+  return label.pattern == denied.pattern && lines > 0 && lines <= kLines;
+}
+
+/// True where a place lies beside a point of a line that is denied.
+bool is_beside(const Vector2f& place, const CurvePoint& point, float spacing_px) {
   // Of the spacing; along a line, names change with the surface.
   constexpr float kAcross = 0.5F + kLines;
   constexpr float kAlong = 0.5F;
-  const int lines = std::abs(label.line - denied.line);
-  if (!(label.pattern == denied.pattern) || lines == 0 || lines > kLines) return false;
   const Vector2f way = place - point.position;
   const float along = way.x() * point.normal.y() - way.y() * point.normal.x();
-  return std::abs(way.dot(point.normal)) < kAcross * denied.spacing_px &&
-         std::abs(along) < kAlong * denied.spacing_px;
+  return std::abs(way.dot(point.normal)) < kAcross * spacing_px &&
+         std::abs(along) < kAlong * spacing_px;
 }
 
 }  // namespace
@@ -35,12 +39,15 @@ void drop_beside_denied(const GridGraph& graph, std::span<const DeniedRun> denie
   for (const LabeledRun& run : all) {
     const auto& points = graph.curves[static_cast<std::size_t>(run.curve)].points;
     stays.assign(static_cast<std::size_t>(run.end - run.begin), 1);
-    for (const DeniedRun& line : denied) {
+    for (const auto& [line, spacing_px] : denied) {
+      if (!speaks_against(line.label, run.label)) continue;
       const auto& of_line = graph.curves[static_cast<std::size_t>(line.curve)].points;
       for (std::size_t i = 0; i < stays.size(); ++i) {
         const Vector2f& place = points[static_cast<std::size_t>(run.begin) + i].position;
         if (std::any_of(of_line.begin() + line.begin, of_line.begin() + line.end,
-                        [&](const CurvePoint& p) { return is_near(place, run.label, p, line); }))
+                        [&, spacing = spacing_px](const CurvePoint& p) {
+                          return is_beside(place, p, spacing);
+                        }))
           stays[i] = 0;
       }
     }

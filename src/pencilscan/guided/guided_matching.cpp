@@ -375,7 +375,7 @@ void CameraMatching::adopt_curves() {
       if (!name || !is_long_enough(decided[c], begin, end)) return;
       const float margin = color_margin(curve, begin, end, *name);
       if (margin < -certainty && has_dense_ && end - begin >= options_.min_adopted)
-        denied_.push_back({static_cast<int>(c), begin, end, name->pattern, name->line,
+        denied_.push_back({run_of(static_cast<int>(c), begin, end, *name),
                            spacings[static_cast<std::size_t>((begin + end) / 2)]});
       if (margin > -certainty && is_supported(curve, begin, end, *name, margin))
         adopted.push_back(run_of(static_cast<int>(c), begin, end, *name));

@@ -234,8 +234,8 @@ TEST_F(LabeledScene, OnADenseSurfaceALineOfTheOtherColorTakesTheLabelsOfTheLines
   match_guided(rig, families, no_images, {&graph_, 1}, labeling, {}, dense);
   ASSERT_FALSE(labeling.denied[0].empty());
   for (const DeniedRun& denied : labeling.denied[0]) {
-    EXPECT_EQ(denied.curve, static_cast<int>(curve));
-    EXPECT_EQ(denied.line, line);
+    EXPECT_EQ(denied.predicted.curve, static_cast<int>(curve));
+    EXPECT_EQ(denied.predicted.label.line, line);
   }
   for (const int next : {line - 2, line - 1, line + 1, line + 2}) {
     // At its rim the surface predicts nothing.

@@ -61,11 +61,7 @@ struct UndecidedRun {
 
 /// A stretch of a curve that lies where a surface predicts a line, and has another line's colour.
 struct DeniedRun {
-  int curve = 0;
-  int begin = 0;  ///< first point
-  int end = 0;    ///< one past the last
-  PatternRef pattern;
-  int line = 0;          ///< that the surface predicts
+  LabeledRun predicted;  ///< the stretch, as the surface would have it
   float spacing_px = 0;  ///< of the lines there, in the picture
 };
 

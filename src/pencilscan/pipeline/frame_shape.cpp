@@ -16,20 +16,14 @@
 namespace pencilscan {
 namespace {
 
-/// `linear` with NaN where the image as read is overexposed. Where nothing is, they share pixels.
-cv::Mat without_overexposed(const cv::Mat& linear, const cv::Mat& values) {
-  const cv::Mat mask = overexposed(values);
-  if (cv::countNonZero(mask) == 0) return linear;
-  cv::Mat image = linear.clone();
-  image.setTo(cv::Scalar::all(std::nan("")), mask);
+/// An image of linear light that nobody else holds, with NaN where it is overexposed as read.
+cv::Mat without_overexposed(cv::Mat image, const cv::Mat& values) {
+  image.setTo(cv::Scalar::all(std::nan("")), overexposed(values));
   return image;
 }
 
-/// The light of the projectors in a picture, with NaN where it is overexposed.
-cv::Mat lit_image(const Camera& camera, const cv::Mat& values, const Unmixing& unmixing) {
-  cv::Mat image = projector_light(camera, linear_light(camera, values), unmixing);
-  image.setTo(cv::Scalar::all(std::nan("")), overexposed(values));
-  return image;
+cv::Mat plain_light(const Camera& camera, const cv::Mat& values) {
+  return without_overexposed(registered(camera, linear_light(camera, values)).clone(), values);
 }
 
 /// What camera c sees in the light of the projectors, or in plain light where it is a texture
@@ -42,8 +36,10 @@ ColorView lit_view(const Rig& rig, const Frame& frame, std::size_t c, const Poin
   view.is_plain = camera.sees_texture_only;
   const cv::Mat& values = frame.images[c];
   view.image = view.is_plain
-                   ? without_overexposed(registered(camera, linear_light(camera, values)), values)
-                   : lit_image(camera, values, points.detections[c].unmixing);
+                   ? plain_light(camera, values)
+                   : without_overexposed(projector_light(camera, linear_light(camera, values),
+                                                         points.detections[c].unmixing),
+                                         values);
   for (const CameraDepthReport& of_camera : depth.cameras) {
     if (of_camera.camera == view.camera) view.blur_px = of_camera.blur_px;
   }
@@ -55,8 +51,7 @@ ColorView plain_view(const Rig& rig, const Frame& frame, std::size_t c) {
   ColorView view;
   view.camera = static_cast<int>(c);
   view.is_plain = true;
-  view.image =
-      without_overexposed(registered(camera, linear_light(camera, frame.plain[c])), frame.plain[c]);
+  view.image = plain_light(camera, frame.plain[c]);
   return view;
 }
 
@@ -163,11 +158,7 @@ std::vector<MeasuredPoint> denied_places(const Rig& rig, const PointResult& poin
   Labeling labeling;
   for (const auto& denied : points.labeling.denied) {
     auto& runs = labeling.runs.emplace_back();
-    for (const DeniedRun& run : denied)
-      runs.push_back({run.curve,
-                      run.begin,
-                      run.end,
-                      {run.pattern, run.line, static_cast<double>(run.line), 1}});
+    for (const DeniedRun& run : denied) runs.push_back(run.predicted);
   }
   labeling.runs.resize(rig.cameras.size());
   return triangulate(rig, points.graphs, labeling, {});

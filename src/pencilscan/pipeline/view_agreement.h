@@ -46,14 +46,14 @@ class ViewAgreement {
   std::vector<PairAgreement> pairs_;
 };
 
-/// Views that are farther apart are not those of one object.
+/// Views that are farther apart are not those of one object: rendered scenes have .4 to 1.0, two
+/// cameras exchanged before a ball 11 and more.
 inline constexpr double kMostApart = 3;
 
 /// By how much more the depths of different cameras lie apart than their deviations explain (1.48
 /// times the median of the normalised differences); nothing where they hardly overlap. `surfaces`:
 /// what each camera's points show. What lies farther apart than half a line spacing is another
 /// surface.
-/// Rendered scenes have .4 to 1.0, two cameras exchanged before a ball 11 and more.
 [[nodiscard]] std::optional<double> views_apart(const Rig& rig,
                                                 std::span<const MeasuredPoint> points,
                                                 std::span<const LocalSurface> surfaces);

@@ -7,7 +7,6 @@
 #include "pencilscan/surface/point_grid.h"
 
 namespace pencilscan {
-
 namespace {
 
 std::vector<Vec3> places_of(std::span<const MeasuredPoint> points) {
