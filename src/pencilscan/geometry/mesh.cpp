@@ -60,6 +60,42 @@ Vec3 face_normal(const TriangleMesh& mesh, std::size_t face) {
   return doubled_area_vector(mesh, mesh.faces[face]).stableNormalized();
 }
 
+std::vector<double> mean_bows(const TriangleMesh& mesh) {
+  std::vector<double> areas(mesh.faces.size());
+  std::vector<double> bows(mesh.faces.size());
+  const auto around_vertices = [&] {
+    std::vector<double> sum(mesh.vertices.size(), 0);
+    std::vector<double> area(mesh.vertices.size(), 0);
+    for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
+      for (const int v : mesh.faces[f]) {
+        sum[static_cast<std::size_t>(v)] += areas[f] * bows[f];
+        area[static_cast<std::size_t>(v)] += areas[f];
+      }
+    }
+    for (std::size_t v = 0; v < sum.size(); ++v) sum[v] = area[v] > 0 ? sum[v] / area[v] : 0;
+    return sum;
+  };
+  // A parabola from a to b turns by its curvature times their distance, and rises over the middle
+  // of its chord by an eighth of that times the distance. A quadratic function that is zero at a
+  // triangle's corners has the mean of its values at the sides' middles as its mean.
+  const std::vector<Vec3> normals = vertex_normals(mesh);
+  for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
+    const auto& face = mesh.faces[f];
+    for (std::size_t k = 0; k < 3; ++k) {
+      const auto a = static_cast<std::size_t>(face[k]);
+      const auto b = static_cast<std::size_t>(face[(k + 1) % 3]);
+      bows[f] += (mesh.vertices[b] - mesh.vertices[a]).dot(normals[b] - normals[a]) / 24;
+    }
+    areas[f] = doubled_area_vector(mesh, face).norm();
+  }
+  const std::vector<double> near = around_vertices();
+  for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
+    bows[f] = 0;
+    for (const int v : mesh.faces[f]) bows[f] += near[static_cast<std::size_t>(v)] / 3;
+  }
+  return around_vertices();
+}
+
 EdgeCounts count_edges(const TriangleMesh& mesh) {
   EdgeCounts counts;
   for_each_edge(sides_by_edge(mesh), [&](std::span<const FaceSide> sides) {

@@ -30,6 +30,10 @@ struct BoundingBox {
 /// Area-weighted unit normals per vertex (zero for a vertex without area).
 [[nodiscard]] std::vector<Vec3> vertex_normals(const TriangleMesh& mesh);
 [[nodiscard]] Vec3 face_normal(const TriangleMesh& mesh, std::size_t face);  ///< unit, or zero
+/// How high a smooth surface through the vertices, with the mesh's vertex normals, stands over the
+/// faces around each vertex, mm, > 0 where it is convex: the mean over the areas of these faces and
+/// of their neighbours.
+[[nodiscard]] std::vector<double> mean_bows(const TriangleMesh& mesh);
 /// Number of undirected edges that have one face (boundary) and more than two (non-manifold).
 struct EdgeCounts {
   std::size_t boundary = 0;

@@ -28,6 +28,28 @@ TEST(TriangleMesh, BoxAndSphereAreClosedOutwardAndOfTheRightVolume) {
   EXPECT_EQ(count_edges(sphere).non_manifold, 0U);
 }
 
+TEST(MeanBows, AreWhatFacesOfABallMiss) {
+  constexpr double kBall = 10;
+  const TriangleMesh sphere = make_sphere(kBall, 32);
+  const std::vector<double> bows = mean_bows(sphere);
+  double missing = 0;
+  double expected = 0;
+  for (std::size_t f = 0; f < sphere.faces.size(); ++f) {
+    const auto corner = [&](std::size_t k) {
+      return sphere.vertices[static_cast<std::size_t>(sphere.faces[f][k])];
+    };
+    const double area = (corner(1) - corner(0)).cross(corner(2) - corner(0)).norm();
+    // Exact for quadratic functions: the middles of the sides.
+    for (std::size_t k = 0; k < 3; ++k) {
+      missing += area / 3 * (kBall - 0.5 * (corner(k) + corner((k + 1) % 3)).norm());
+      expected += area / 3 * bows[static_cast<std::size_t>(sphere.faces[f][k])];
+    }
+  }
+  EXPECT_NEAR(expected, missing, 0.02 * missing);
+  const std::vector<double> of_box = mean_bows(make_box({1, 2, 3}));
+  for (const double bow : of_box) EXPECT_GT(bow, 0);
+}
+
 TEST(MeshSides, AreThoseOfASort) {
   Random random(11);
   TriangleMesh mesh;

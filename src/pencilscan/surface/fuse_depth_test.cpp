@@ -40,6 +40,32 @@ TEST(FuseDepth, BallIsClosedAndAccurate) {
   EXPECT_GT(result.report.points_used, points.size() * 9 / 10);
 }
 
+TEST(FuseDepth, FacesLieAsMuchOutsideAsInside) {
+  const Rig rig = ball_rig();
+  FusionOptions options;
+  options.cell_spacings = 4;  // coarse: faces miss much
+  options.subdivisions = 0;
+  const TriangleMesh mesh = surface_of(rig, {}, ball_maps(rig, 0), options).mesh;
+  double inside = 0;
+  double least = kRadius;
+  double area = 0;
+  for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
+    const auto corner = [&](std::size_t k) {
+      return mesh.vertices[static_cast<std::size_t>(mesh.faces[f][k])];
+    };
+    const double of_face = (corner(1) - corner(0)).cross(corner(2) - corner(0)).norm();
+    area += of_face;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const double r = 0.5 * (corner(k) + corner((k + 1) % 3)).norm();
+      inside += of_face / 3 * (kRadius - r);
+      least = std::min(least, r);
+    }
+  }
+  // Vertices on the ball would leave all of it inside.
+  EXPECT_GT(kRadius - least, 0.05);
+  EXPECT_LT(std::abs(inside / area), 0.2 * (kRadius - least));
+}
+
 TEST(FollowNodes, VerticesReachACurvedSurface) {
   const Rig rig = ball_rig();
   TriangleMesh mesh = make_sphere(kRadius + 0.5, 24);

@@ -242,8 +242,8 @@ void fade_out(const TriangleMesh& mesh, std::vector<char> moved, std::vector<Vec
 
 }  // namespace
 
-void follow_nodes(const Rig& rig, std::span<const DepthMap> maps, const FollowOptions& options,
-                  TriangleMesh& mesh) {
+std::vector<char> follow_nodes(const Rig& rig, std::span<const DepthMap> maps,
+                               const FollowOptions& options, TriangleMesh& mesh) {
   PENCILSCAN_CHECK(options.width_nodes > 0 && options.robust > 0 && options.least_weight > 0);
   PENCILSCAN_CHECK(options.width_nodes <= kMostWidth);
   std::vector<std::optional<NodeView>> views(maps.size());
@@ -271,6 +271,7 @@ void follow_nodes(const Rig& rig, std::span<const DepthMap> maps, const FollowOp
   for (std::size_t v = 0; v < start.size(); ++v) moves[v] = mesh.vertices[v] - start[v];
   fade_out(mesh, moved, moves);
   for (std::size_t v = 0; v < start.size(); ++v) mesh.vertices[v] = start[v] + moves[v];
+  return moved;
 }
 
 }  // namespace pencilscan

@@ -21,8 +21,9 @@ struct FollowOptions {
 /// surface is. Every node predicts it with its own quadric of inverse depth: a mean of such
 /// predictions keeps the curvature that a fit to the nodes' positions flattens. Predictions weigh
 /// by their variance and by a bell over the distance in the image. Vertices without depth follow
-/// their neighbours, less with every edge, so that no step remains where depth ends.
-void follow_nodes(const Rig& rig, std::span<const DepthMap> maps, const FollowOptions& options,
-                  TriangleMesh& mesh);
+/// their neighbours, less with every edge, so that no step remains where depth ends. Returns which
+/// vertices have depth.
+std::vector<char> follow_nodes(const Rig& rig, std::span<const DepthMap> maps,
+                               const FollowOptions& options, TriangleMesh& mesh);
 
 }  // namespace pencilscan

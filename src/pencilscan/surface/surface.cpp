@@ -114,6 +114,16 @@ void finish(double least_island, SurfaceResult& result) {
   note_quality(result);
 }
 
+/// Vertices with depth go out by the bows around, so that the faces between lie as much outside of
+/// the surface as inside.
+void lift_over_bows(std::span<const double> bows, std::span<const char> has_depth,
+                    TriangleMesh& mesh) {
+  const std::vector<Vec3> normals = vertex_normals(mesh);
+  for (std::size_t v = 0; v < bows.size(); ++v) {
+    if (has_depth[v] != 0) mesh.vertices[v] += bows[v] * normals[v];
+  }
+}
+
 void take(ClosedSurface closed, SurfaceResult& result) {
   result.mesh = std::move(closed.mesh);
   result.report.depth = closed.depth;
@@ -235,15 +245,21 @@ void follow_depth(const Rig& rig, std::span<const DepthMap> maps, const FusionOp
   std::vector<Vec3> closed = result.mesh.vertices;
   FollowOptions once = options.follow;  // normals have settled on the coarse mesh
   once.rounds = 1;
-  follow_nodes(rig, maps, options.follow, result.mesh);
+  std::vector<char> has_depth = follow_nodes(rig, maps, options.follow, result.mesh);
+  std::vector<double> bows = mean_bows(result.mesh);
   std::vector<std::array<int, 2>> middles;
   for (int i = 0; i < options.subdivisions; ++i) {
     result.mesh = subdivided(result.mesh, &middles);
-    for (const auto& [a, b] : middles)
-      closed.push_back(0.5 *
-                       (closed[static_cast<std::size_t>(a)] + closed[static_cast<std::size_t>(b)]));
-    follow_nodes(rig, maps, once, result.mesh);
+    for (double& bow : bows) bow /= 4;  // sides half as long
+    for (const auto& [first, second] : middles) {
+      const auto a = static_cast<std::size_t>(first);
+      const auto b = static_cast<std::size_t>(second);
+      closed.push_back(0.5 * (closed[a] + closed[b]));
+      bows.push_back(0.5 * (bows[a] + bows[b]));
+    }
+    has_depth = follow_nodes(rig, maps, once, result.mesh);
   }
+  lift_over_bows(bows, has_depth, result.mesh);
   report.self_intersections = untangle(closed, result.mesh);
   result.evidence =
       attribute_vertices(samples, options.reach_spacings, report.spacing_mm, result.mesh, middles);
