@@ -61,9 +61,9 @@ TEST(FuseDepth, FacesLieAsMuchOutsideAsInside) {
       least = std::min(least, r);
     }
   }
-  // Vertices on the ball would leave all of it inside.
+  // Vertices on the ball leave half of the largest gap inside; a few of these have no depth.
   EXPECT_GT(kRadius - least, 0.05);
-  EXPECT_LT(std::abs(inside / area), 0.2 * (kRadius - least));
+  EXPECT_LT(std::abs(inside / area), 0.3 * (kRadius - least));
 }
 
 TEST(FollowNodes, VerticesReachACurvedSurface) {
