@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "pencilscan/core/parallel.h"
+#include "pencilscan/pipeline/coarse_view.h"
 #include "pencilscan/pipeline/frame_warnings.h"
 #include "pencilscan/surface/manifold.h"
 
@@ -27,11 +28,6 @@ std::string why_nothing(const PointResult& result) {
   return why;
 }
 
-void scale(double factor, TriangleMesh& mesh) {
-  for (Vec3& x : mesh.vertices) x *= factor;
-  for (float& sigma : mesh.sigma) sigma *= static_cast<float>(factor);
-}
-
 }  // namespace
 
 FrameResult reconstruct_frame(const Rig& stated, const Frame& frame, const FrameOptions& options,
@@ -42,11 +38,16 @@ FrameResult reconstruct_frame(const Rig& stated, const Frame& frame, const Frame
   }
   std::vector<StageTime> times;
   const StageClock clock(links.progress, times);
-  const Rig rig = in_footprints(stated);
-  PointResult curves = detect_frame(rig, frame, options.points, clock);
-  curves = check_pictures(rig, frame, std::move(curves));
-  PointResult lines = solve_frame(rig, frame, std::move(curves), options.points, clock);
-  FrameResult result = measure_frame(rig, frame, std::move(lines), options, links, clock);
+  const Rig fine = in_footprints(stated);
+  const auto coarse = coarse_view(fine, frame, options);
+  const Rig& rig = coarse ? coarse->rig : fine;
+  const Frame& seen = coarse ? coarse->frame : frame;
+  const FrameOptions& how = coarse ? coarse->options : options;
+  PointResult curves = detect_frame(rig, seen, how.points, clock);
+  curves = check_pictures(rig, seen, std::move(curves));
+  PointResult lines = solve_frame(rig, seen, std::move(curves), how.points, clock);
+  FrameResult result = measure_frame(rig, seen, std::move(lines), how, links, clock);
+  if (coarse) result = in_fine_pixels(*coarse, std::move(result));
   result.times = std::move(times);
   return in_unit(footprint(stated), std::move(result));
 }
@@ -116,23 +117,8 @@ FrameResult in_unit(double unit, FrameResult result) {
     for (float* length : {&p.x, &p.y, &p.z, &p.sigma}) *length *= f;
   }
   ShapeResult& shape = result.shape;
-  scale(unit, shape.surface.mesh);
-  scale(unit, shape.surface.measured);
-  shape.surface.report.spacing_mm *= unit;
-  for (double& area : shape.holes.area_mm2) area *= unit * unit;
-  for (CameraDepthReport& camera : shape.depth.report.cameras) camera.sigma_median_mm *= unit;
-  for (DepthMap& map : shape.depth.maps) {
-    for (DepthNode& node : map.nodes) {
-      for (float* inverse : {&node.w, &node.wx, &node.wy, &node.wxx, &node.wxy, &node.wyy})
-        *inverse /= f;
-      node.sigma *= f;
-    }
-  }
-  ExposureMotion& motion = shape.motion;
-  motion.shift *= unit;
-  motion.pivot *= unit;
-  for (double* length : {&motion.way, &motion.way_deviation, &motion.at_most}) *length *= unit;
-  if (motion.is_seen) result.points.warnings.push_back(motion_warning(motion));
+  scale_lengths(unit, shape);
+  if (shape.motion.is_seen) result.points.warnings.push_back(motion_warning(shape.motion));
   // Scaling and files round: what lay apart may lie at one place.
   separate_vertices(shape.surface.mesh);
   separate_vertices(shape.surface.measured);
