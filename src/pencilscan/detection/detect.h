@@ -27,6 +27,7 @@ struct CameraDetection {
   Unmixing unmixing;
   std::vector<cv::Mat> presence;  ///< per family: how bright its lines are, CV_32FC1
   std::size_t saturated_pixels = 0;
+  int joined_pixels = 1;      ///< along a row, to one that the stages saw (pipeline/coarse_view.h)
   bool is_filled_in = false;  ///< its colours, behind a mosaic (mosaic_trace.h)
 };
 

@@ -114,7 +114,6 @@ void to_fine(int n, Run& run) {
 void to_fine(int n, std::size_t camera, PointResult& result) {
   result.detections[camera].presence.clear();
   if (n == 1) return;
-  result.detections[camera].saturated_pixels *= static_cast<std::size_t>(n * n);
   const auto f = static_cast<float>(n);
   GridGraph& graph = result.graphs[camera];
   for (Curve& curve : graph.curves) curve = fine_curve(curve, n);
@@ -253,9 +252,13 @@ std::optional<CoarseView> coarse_view(const Rig& rig, const Frame& frame,
     view.binning.push_back(camera.sees_texture_only
                                ? 1
                                : binning_of((camera.center() - center).norm() / camera.focal_px()));
+  view.overexposed_pixels.resize(rig.cameras.size());
   parallel_for(rig.cameras.size(), [&](std::size_t c) {
     const int n = view.binning[c];
     if (n == 1) return;
+    if (!frame.images[c].empty())
+      view.overexposed_pixels[c] =
+          static_cast<std::size_t>(cv::countNonZero(overexposed(frame.images[c])));
     view.rig.cameras[c] = binned(view.rig.cameras[c], n);
     for (auto* images : {&view.frame.images, &view.frame.plain}) {
       if (c < images->size() && !(*images)[c].empty())
@@ -286,7 +289,12 @@ void scale_lengths(double factor, ShapeResult& shape) {
 }
 
 FrameResult in_fine_pixels(const CoarseView& view, FrameResult result) {
-  for (std::size_t c = 0; c < view.binning.size(); ++c) to_fine(view.binning[c], c, result.points);
+  for (std::size_t c = 0; c < view.binning.size(); ++c) {
+    CameraDetection& detection = result.points.detections[c];
+    detection.joined_pixels = view.binning[c];
+    if (view.binning[c] > 1) detection.saturated_pixels = view.overexposed_pixels[c];
+    to_fine(view.binning[c], c, result.points);
+  }
   refine_points(view, result.points, result.shape.surface.used);
   to_fine(view, result.points);
   scale_lengths(view.unit, result.shape);

@@ -19,6 +19,7 @@ struct CoarseView {
   FrameOptions options;
   double unit = 1;           ///< footprints of the rig seen, in one of this one's
   std::vector<int> binning;  ///< per camera: pixels along a row that are one
+  std::vector<std::size_t> overexposed_pixels;  ///< per camera, before they were joined
 };
 
 /// Nothing where lines are not that far apart. `rig` in footprints.

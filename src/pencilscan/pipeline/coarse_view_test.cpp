@@ -14,7 +14,7 @@
 namespace pencilscan {
 namespace {
 
-constexpr double kRadius = 95;
+constexpr double kBall = 95;
 
 /// Red, green and blue that change evenly over the image.
 cv::Mat ramp(int width, int height) {
@@ -57,7 +57,7 @@ struct Scene {
       camera.width = (camera.width - 1) * n + 1;
       camera.height = (camera.height - 1) * n + 1;
     }
-    const SimulatedObject object(make_sphere(kRadius, 96));
+    const SimulatedObject object(make_sphere(kBall, 96));
     const auto lights = line_lights(rig);
     for (std::size_t c = 0; c < rig.cameras.size(); ++c)
       frame.images.push_back(cv::min(render_camera(rig, c, object, lights), 1.0));
@@ -76,7 +76,7 @@ struct Scene {
 double distance_median(const FrameResult& result) {
   std::vector<double> off;
   for (const MeasuredPoint& p : result.points.points)
-    off.push_back(std::abs(position_of(p).norm() - kRadius));
+    off.push_back(std::abs(position_of(p).norm() - kBall));
   return upper_median(std::move(off));
 }
 

@@ -91,6 +91,8 @@ ordered_json camera_report(const Rig& rig, const Frame& frame, const PointResult
                                   {"outside_volume", points[3]}};
   }
   report["saturated_pixels"] = result.detections[c].saturated_pixels;
+  if (result.detections[c].joined_pixels > 1)
+    report["joined_pixels"] = result.detections[c].joined_pixels;
   report["crosstalk_estimated"] = result.detections[c].unmixing.estimated;
   return report;
 }
