@@ -235,11 +235,12 @@ Camera binned(Camera camera, int binning) {
 
 std::optional<CoarseView> coarse_view(const Rig& rig, const Frame& frame,
                                       const FrameOptions& options) {
-  const double window_px = width_px(options.shape.depth.depth.half);
+  // Lines about as far apart as windows are wide: these are 11 px, and 9 px on joined pixels.
+  constexpr double kSpacingPx = 10;
   const double spacing = line_spacing(rig);
   const Vec3 center = working_volume(rig).center;
   const auto binning_of = [&](double footprint) {
-    return std::max(1, static_cast<int>(std::lround(spacing / footprint / window_px)));
+    return std::max(1, static_cast<int>(std::lround(spacing / footprint / kSpacingPx)));
   };
   CoarseView view;
   view.unit = binning_of(footprint(rig));
