@@ -47,6 +47,7 @@ void reconstruct(const ReconstructOptions& options) {
   sequence.plain_frames = options.plain_frames;
   sequence.output.refine_rig = options.refine_rig;
   frame.meshes = !options.no_mesh;
+  frame.joined_pixels = options.join_pixels;
   sequence.output.tracks = !options.independent;
   sequence.output.pictures = !options.no_pictures;
   sequence.output.depth_maps = options.depth_maps;
@@ -121,6 +122,11 @@ void add_reconstruct_options(CLI::App& command, ReconstructOptions& options) {
   command.add_flag("--no-depth", options.no_depth,
                    "surface from the labelled curves alone, without depth between them");
   command.add_flag("--no-mesh", options.no_mesh, "labelled points alone, without a surface");
+  command
+      .add_option("--join-pixels", options.join_pixels,
+                  "N: join N x N pixels to one, for a quicker, coarser look")
+      ->check(CLI::Range(1, 16))
+      ->capture_default_str();
   command.add_flag("--depth-maps", options.depth_maps,
                    "depth and its deviation per camera: float TIFF and 16-bit PNG");
   command

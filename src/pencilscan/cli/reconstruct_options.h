@@ -19,6 +19,7 @@ struct ReconstructOptions {
   bool no_pictures = false;
   bool no_depth = false;
   bool no_mesh = false;
+  int join_pixels = 1;
   bool independent = false;
   bool depth_maps = false;
   std::vector<std::string> mesh_formats;

@@ -241,33 +241,10 @@ void measure_light(const Rig& rig, int camera, const std::vector<ColorFamily>& f
   }
 }
 
-DepthMap dense_depth(const CameraLight& light, int camera, std::span<const MeasuredPoint> points,
-                     const ObjectSpace& space, const DepthOptions& options) {
-  DepthMap map;
-  map.camera = camera;
-  map.stride = options.stride;
-  map.columns = (light.camera->width - 1) / options.stride + 1;
-  map.rows = (light.camera->height - 1) / options.stride + 1;
-  map.nodes.resize(static_cast<std::size_t>(map.columns) * static_cast<std::size_t>(map.rows));
-  const CurveSeeds seeds(*light.camera, camera, points);
+void grow(const CameraLight& light, const ObjectSpace& space, const DepthOptions& options,
+          DepthMap& map) {
   WindowFitter fitter(light, options.half);
   const FloorView floor(light, space);
-  // Nodes near labelled curves.
-  for (std::size_t i = 0; i < map.nodes.size(); ++i) {
-    const Vec2 pixel = map.pixel(i);
-    std::optional<WindowFit> best;
-    for (const Quadric& start : seeds.planes(pixel, options.seed_radius_px, options.half)) {
-      const auto fit = fitter.fit(pixel, start, 5);
-      if (fit && acceptable(light, pixel, *fit, space, options.half, options) &&
-          (!best || cost(*fit) < cost(*best))) {
-        best = fit;
-      }
-    }
-    if (!best || floor.shows(pixel, *best, fitter)) continue;
-    map.nodes[i] = node_of(*best, options.half);
-    map.nodes[i].seeded = true;
-  }
-  // Outwards from solved nodes, in rounds.
   std::vector<std::size_t> front;
   for (std::size_t i = 0; i < map.nodes.size(); ++i)
     if (map.nodes[i].measured()) front.push_back(i);
@@ -309,6 +286,35 @@ DepthMap dense_depth(const CameraLight& light, int camera, std::span<const Measu
       front.push_back(j);
     }
   }
+}
+
+DepthMap dense_depth(const CameraLight& light, int camera, std::span<const MeasuredPoint> points,
+                     const ObjectSpace& space, const DepthOptions& options) {
+  DepthMap map;
+  map.camera = camera;
+  map.stride = options.stride;
+  map.columns = (light.camera->width - 1) / options.stride + 1;
+  map.rows = (light.camera->height - 1) / options.stride + 1;
+  map.nodes.resize(static_cast<std::size_t>(map.columns) * static_cast<std::size_t>(map.rows));
+  const CurveSeeds seeds(*light.camera, camera, points);
+  WindowFitter fitter(light, options.half);
+  const FloorView floor(light, space);
+  // Nodes near labelled curves.
+  for (std::size_t i = 0; i < map.nodes.size(); ++i) {
+    const Vec2 pixel = map.pixel(i);
+    std::optional<WindowFit> best;
+    for (const Quadric& start : seeds.planes(pixel, options.seed_radius_px, options.half)) {
+      const auto fit = fitter.fit(pixel, start, 5);
+      if (fit && acceptable(light, pixel, *fit, space, options.half, options) &&
+          (!best || cost(*fit) < cost(*best))) {
+        best = fit;
+      }
+    }
+    if (!best || floor.shows(pixel, *best, fitter)) continue;
+    map.nodes[i] = node_of(*best, options.half);
+    map.nodes[i].seeded = true;
+  }
+  grow(light, space, options, map);
   mark_saturated(light, options.half, map);
   return map;
 }

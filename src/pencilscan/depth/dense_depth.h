@@ -36,6 +36,10 @@ void measure_light(const Rig& rig, int camera, const std::vector<ColorFamily>& f
                                    std::span<const MeasuredPoint> points, const ObjectSpace& space,
                                    const DepthOptions& options);
 
+/// Outwards from nodes with depth, in rounds: the windows of their neighbours start from them.
+void grow(const CameraLight& light, const ObjectSpace& space, const DepthOptions& options,
+          DepthMap& map);
+
 /// Fits the windows of nodes without depth whose rays meet `surface`. Each fit starts from the
 /// surface's tangent plane. It is kept if it ends near the surface; a fit that is off by a line
 /// does not end there. sigma is multiplied by `sigma_factor`. Returns the number of nodes that got

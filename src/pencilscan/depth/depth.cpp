@@ -7,6 +7,7 @@
 #include "pencilscan/core/median.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/core/stopwatch.h"
+#include "pencilscan/depth/wide_windows.h"
 #include "pencilscan/rig/camera_light.h"
 
 namespace pencilscan {
@@ -30,6 +31,12 @@ CameraDepthReport camera_report(const DepthMap& map, double blur_px) {
   report.measured = sigmas.size();
   report.sigma_median_mm = static_cast<double>(upper_median(std::move(sigmas)));
   return report;
+}
+
+/// How far apart lines are where a camera sees the volume's centre.
+double spacing_px(const Rig& rig, const Camera& camera) {
+  const double distance = (camera.center() - working_volume(rig).center).norm();
+  return line_spacing(rig) * camera.focal_px() / distance;
 }
 
 }  // namespace
@@ -64,6 +71,8 @@ DepthResult measure_depth(const Rig& rig, const std::vector<ColorFamily>& famili
     const DepthOptions depth = options_for(light, options.depth);
     measure_light(rig, static_cast<int>(c), families, points, depth, light);
     result.maps[i] = dense_depth(light, static_cast<int>(c), points, space, depth);
+    with_wider_windows(light, spacing_px(rig, camera), depth, result.maps[i],
+                       [&](const CameraLight& wide, DepthMap& map) { grow(wide, space, depth, map); });
   });
   result.report.seconds_depth = watch.seconds();
 
@@ -87,9 +96,13 @@ void guided_depth(const Rig& rig, const RayScene& surface, const DepthStageOptio
   const ObjectSpace space(rig);
   std::vector<std::size_t> found(result.maps.size());
   parallel_for(result.maps.size(), [&](std::size_t i) {
-    found[i] =
-        complete_map(result.lights[i], surface, space, result.report.consistency.sigma_factor,
-                     options_for(result.lights[i], options.depth), result.maps[i]);
+    const CameraLight& light = result.lights[i];
+    const DepthOptions depth = options_for(light, options.depth);
+    const auto complete = [&](const CameraLight& seen, DepthMap& map) {
+      found[i] += complete_map(seen, surface, space, result.report.consistency.sigma_factor, depth, map);
+    };
+    complete(light, result.maps[i]);
+    with_wider_windows(light, spacing_px(rig, *light.camera), depth, result.maps[i], complete);
   });
   for (std::size_t i = 0; i < found.size(); ++i) {
     result.report.completed += found[i];

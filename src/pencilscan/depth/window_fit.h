@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <memory>
 #include <opencv2/core.hpp>
 #include <optional>
 #include <span>
@@ -25,6 +26,7 @@ struct NoiseModel {
 /// What one camera sees, as the photometric fit needs it.
 struct CameraLight {
   const Camera* camera = nullptr;
+  std::shared_ptr<const Camera> own_camera;  ///< `camera`, where the rig has no such one
   std::vector<PatternView> patterns;  ///< of all families
   std::vector<cv::Mat> families;      ///< per family: presence channel, CV_32FC1, linear
   /// Per family: CV_8U, 0 where a mosaic has no sample of its presence; empty: all pixels have.

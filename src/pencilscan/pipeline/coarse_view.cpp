@@ -3,15 +3,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <opencv2/imgproc.hpp>
 #include <utility>
 
 #include "pencilscan/core/check.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/io/linear_light.h"
 #include "pencilscan/pipeline/frame_warnings.h"
+#include "pencilscan/rig/binning.h"
 #include "pencilscan/rig/camera_light.h"
-#include "pencilscan/rig/object_space.h"
 
 namespace pencilscan {
 namespace {
@@ -200,59 +199,18 @@ void refine_points(const CoarseView& view, PointResult& result, std::vector<char
 
 }  // namespace
 
-cv::Mat binned(const cv::Mat& image, int binning) {
-  PENCILSCAN_CHECK(binning >= 1 && image.depth() == CV_32F);
-  if (binning == 1) return image;
-  const int reach = binning / 2;
-  cv::Mat kernel(1, 2 * reach + 1, CV_32F, cv::Scalar(1.0 / binning));
-  if (binning % 2 == 0)
-    kernel.at<float>(0) = kernel.at<float>(2 * reach) = 0.5F / static_cast<float>(binning);
-  cv::Mat mean;
-  cv::sepFilter2D(image, mean, -1, kernel, kernel, {-1, -1}, 0, cv::BORDER_REFLECT_101);
-  cv::Mat result((image.rows - 1) / binning + 1, (image.cols - 1) / binning + 1, image.type());
-  const std::size_t pixel = image.elemSize();
-  for (int v = 0; v < result.rows; ++v) {
-    const auto* in = mean.ptr(v * binning);
-    auto* out = result.ptr(v);
-    for (int u = 0; u < result.cols; ++u)
-      std::copy_n(in + static_cast<std::size_t>(u * binning) * pixel, pixel,
-                  out + static_cast<std::size_t>(u) * pixel);
-  }
-  return result;
-}
-
-Camera binned(Camera camera, int binning) {
-  if (binning == 1) return camera;
-  camera.K.topRows<2>() /= binning;
-  camera.width = (camera.width - 1) / binning + 1;
-  camera.height = (camera.height - 1) / binning + 1;
-  camera.mosaic.reset();
-  camera.gamma = 1;
-  camera.black_level = 0;
-  for (ColorDisplacement& color : camera.color_registration.colors) color.shift_px /= binning;
-  return camera;
-}
-
 std::optional<CoarseView> coarse_view(const Rig& rig, const Frame& frame,
                                       const FrameOptions& options) {
-  // Lines about as far apart as windows are wide: these are 11 px, and 9 px on joined pixels.
-  constexpr double kSpacingPx = 10;
-  const double spacing = line_spacing(rig);
-  const Vec3 center = working_volume(rig).center;
-  const auto binning_of = [&](double footprint) {
-    return std::max(1, static_cast<int>(std::lround(spacing / footprint / kSpacingPx)));
-  };
+  if (options.joined_pixels == 1) return std::nullopt;
   CoarseView view;
-  view.unit = binning_of(footprint(rig));
-  if (view.unit == 1) return std::nullopt;
+  view.unit = options.joined_pixels;
   view.rig = scaled(rig, 1 / view.unit);
   view.frame = frame;
   view.options = options;
+  view.options.joined_pixels = 1;
   view.options.shape.depth.depth = of_joined(view.unit, options.shape.depth.depth);
   for (const Camera& camera : rig.cameras)
-    view.binning.push_back(camera.sees_texture_only
-                               ? 1
-                               : binning_of((camera.center() - center).norm() / camera.focal_px()));
+    view.binning.push_back(camera.sees_texture_only ? 1 : options.joined_pixels);
   view.overexposed_pixels.resize(rig.cameras.size());
   parallel_for(rig.cameras.size(), [&](std::size_t c) {
     const int n = view.binning[c];

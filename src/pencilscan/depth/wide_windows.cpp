@@ -1,0 +1,80 @@
+#include "pencilscan/depth/wide_windows.h"
+
+#include <cmath>
+#include <memory>
+
+#include "pencilscan/rig/binning.h"
+
+namespace pencilscan {
+namespace {
+
+/// A presence image; where a mosaic has samples of it (`sampled`), the means of these.
+cv::Mat binned_presence(const cv::Mat& presence, const cv::Mat& sampled, int binning) {
+  cv::Mat means = binned(presence, binning);
+  if (sampled.empty()) return means;
+  cv::Mat counted;
+  sampled.convertTo(counted, CV_32F, 1 / 255.0);
+  const cv::Mat count = binned(counted, binning);
+  cv::Mat(binned(presence.mul(counted), binning) / count).copyTo(means, count > 0);
+  return means;
+}
+
+/// Slopes and bends of all nodes, pixels becoming `factor` of what they were.
+void scale_pixels(float factor, DepthMap& map) {
+  for (DepthNode& node : map.nodes) {
+    for (float* slope : {&node.wx, &node.wy}) *slope *= factor;
+    for (float* bend : {&node.wxx, &node.wxy, &node.wyy}) *bend *= factor * factor;
+  }
+}
+
+}  // namespace
+
+CameraLight binned_light(const CameraLight& light, int binning) {
+  CameraLight result;
+  const auto camera = std::make_shared<const Camera>(binned(*light.camera, binning));
+  result.own_camera = camera;
+  result.camera = camera.get();
+  result.patterns = light.patterns;
+  for (std::size_t f = 0; f < light.families.size(); ++f) {
+    const cv::Mat sampled = f < light.sampled.size() ? light.sampled[f] : cv::Mat();
+    result.families.push_back(binned_presence(light.families[f], sampled, binning));
+  }
+  result.sampled.resize(light.sampled.size());
+  cv::Mat invalid;
+  light.valid.convertTo(invalid, CV_32F, -1, 1);
+  cv::bitwise_and(binned(invalid, binning) == 0, 1, result.valid);
+  result.of_mosaic = light.of_mosaic;
+  const auto blur2 = static_cast<double>(light.blur_px * light.blur_px);
+  result.blur_px = static_cast<float>(std::sqrt(blur2 + binning_blur_px2(binning)) / binning);
+  // Means that overlap share noise: over a window they are worth as many pixels as they count.
+  result.noise = light.noise;
+  for (NoiseModel& noise : result.noise) {
+    noise.offset /= static_cast<float>(binning * binning);
+    noise.slope /= static_cast<float>(binning * binning);
+  }
+  result.usual_residual = light.usual_residual;
+  return result;
+}
+
+void with_wider_windows(const CameraLight& light, double spacing_px, const DepthOptions& options,
+                        DepthMap& map,
+                        const std::function<void(const CameraLight&, DepthMap&)>& work) {
+  // Windows 11 px wide find less with wider ones beside them where lines are 11.3 px apart, and
+  // more where they are 15.1 px apart (docs/depth.md).
+  constexpr double kNarrow = 1.2;
+  const double width = 2 * options.half + 1;
+  CameraLight wide = light;
+  const int stride = map.stride;
+  int binning = 1;
+  while (kNarrow * binning * width < spacing_px && stride % (2 * binning) == 0) {
+    binning *= 2;
+    wide = binned_light(wide, 2);
+    scale_pixels(2, map);
+    map.stride = stride / binning;
+    work(wide, map);
+  }
+  scale_pixels(1.F / static_cast<float>(binning), map);
+  map.stride = stride;
+}
+
+}  // namespace pencilscan

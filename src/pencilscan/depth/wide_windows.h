@@ -1,0 +1,22 @@
+#pragma once
+
+#include <functional>
+
+#include "pencilscan/depth/dense_depth.h"
+
+namespace pencilscan {
+
+/// The light of a camera in pixels of which each is `binning` x `binning` (rig/binning.h): windows
+/// of as many pixels are wider. A mosaic's samples are joined alone. It points to the rig that the
+/// patterns point to, and holds its camera.
+[[nodiscard]] CameraLight binned_light(const CameraLight& light, int binning);
+
+/// Where lines lie farther apart than windows are wide, windows between two lines see none.
+/// Calls work(light, map) with the light in pixels of twice the size, then of four times, as long
+/// as windows before were clearly narrower than `spacing_px` and nodes lie whole pixels apart. The
+/// map is in those pixels meanwhile.
+void with_wider_windows(const CameraLight& light, double spacing_px, const DepthOptions& options,
+                        DepthMap& map,
+                        const std::function<void(const CameraLight&, DepthMap&)>& work);
+
+}  // namespace pencilscan

@@ -1,0 +1,19 @@
+#pragma once
+
+#include <opencv2/core.hpp>
+
+#include "pencilscan/rig/rig.h"
+
+namespace pencilscan {
+
+/// An image (of float) whose pixel (u, v) is the mean around pixel (n u, n v), n = binning >= 1: of
+/// n x n pixels where n is odd, else of n + 1 along a row and a column, the outer ones half.
+[[nodiscard]] cv::Mat binned(const cv::Mat& image, int binning);
+
+/// Variance that they add to a line's profile, along a row or a column, px^2 of the image joined.
+[[nodiscard]] double binning_blur_px2(int binning);
+
+/// The camera of such images, which are linear light.
+[[nodiscard]] Camera binned(Camera camera, int binning);
+
+}  // namespace pencilscan
