@@ -71,8 +71,9 @@ DepthResult measure_depth(const Rig& rig, const std::vector<ColorFamily>& famili
     const DepthOptions depth = options_for(light, options.depth);
     measure_light(rig, static_cast<int>(c), families, points, depth, light);
     result.maps[i] = dense_depth(light, static_cast<int>(c), points, space, depth);
-    with_wider_windows(light, spacing_px(rig, camera), depth, result.maps[i],
-                       [&](const CameraLight& wide, DepthMap& map) { grow(wide, space, depth, map); });
+    with_wider_windows(
+        light, spacing_px(rig, camera), depth, result.maps[i],
+        [&](const CameraLight& wide, DepthMap& map) { grow(wide, space, depth, map); });
   });
   result.report.seconds_depth = watch.seconds();
 
@@ -99,7 +100,8 @@ void guided_depth(const Rig& rig, const RayScene& surface, const DepthStageOptio
     const CameraLight& light = result.lights[i];
     const DepthOptions depth = options_for(light, options.depth);
     const auto complete = [&](const CameraLight& seen, DepthMap& map) {
-      found[i] += complete_map(seen, surface, space, result.report.consistency.sigma_factor, depth, map);
+      found[i] +=
+          complete_map(seen, surface, space, result.report.consistency.sigma_factor, depth, map);
     };
     complete(light, result.maps[i]);
     with_wider_windows(light, spacing_px(rig, *light.camera), depth, result.maps[i], complete);

@@ -27,8 +27,8 @@ struct NoiseModel {
 struct CameraLight {
   const Camera* camera = nullptr;
   std::shared_ptr<const Camera> own_camera;  ///< `camera`, where the rig has no such one
-  std::vector<PatternView> patterns;  ///< of all families
-  std::vector<cv::Mat> families;      ///< per family: presence channel, CV_32FC1, linear
+  std::vector<PatternView> patterns;         ///< of all families
+  std::vector<cv::Mat> families;             ///< per family: presence channel, CV_32FC1, linear
   /// Per family: CV_8U, 0 where a mosaic has no sample of its presence; empty: all pixels have.
   std::vector<cv::Mat> sampled;
   cv::Mat valid;                  ///< CV_8U, 0 where saturated

@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "pencilscan/core/median.h"
-#include "pencilscan/rig/object_space.h"
 #include "pencilscan/rig/sample_devices.h"
 #include "pencilscan/simulation/panel_light.h"
 #include "pencilscan/simulation/render.h"
@@ -25,28 +24,6 @@ cv::Mat ramp(int width, int height) {
                                    0.2F + 0.002F * static_cast<float>(u + v)};
   }
   return image;
-}
-
-TEST(Binned, PixelsStandForThoseAroundTheirPlace) {
-  const cv::Mat image = ramp(41, 31);
-  for (const int n : {2, 3, 4}) {
-    const cv::Mat means = binned(image, n);
-    ASSERT_EQ(means.size(), cv::Size(40 / n + 1, 30 / n + 1));
-    for (int v = 1; v < 30 / n; ++v) {
-      for (int u = 1; u < 40 / n; ++u)
-        EXPECT_LT(cv::norm(means.at<cv::Vec3f>(v, u) - image.at<cv::Vec3f>(n * v, n * u)), 1e-5);
-    }
-  }
-}
-
-TEST(Binned, ACameraSeesTheSamePlacesAtThem) {
-  Camera camera = sample::small_rig(640, 480, 110).cameras.front();
-  camera.color_registration.colors[0].shift_px = Vec2(0.6, -0.3);
-  const Camera coarse = binned(camera, 3);
-  EXPECT_EQ(coarse.width, 214);
-  const Vec3 place(10, -20, 30);
-  EXPECT_LT((3 * *coarse.project(place) - *camera.project(place)).norm(), 1e-9);
-  EXPECT_NEAR(coarse.color_registration.colors[0].shift_px.x(), 0.2, 1e-12);
 }
 
 /// A ball before cameras with `n` times the pixels along a row.
@@ -84,32 +61,30 @@ TEST(CoarseView, MosaicsAndOverexposedPixelsAreJoinedAsTheyAre) {
   Scene scene(4);
   scene.frame.images.front() = ramp(scene.rig.cameras[0].width, scene.rig.cameras[0].height) / 50;
   scene.frame.images.front().at<cv::Vec3f>(48, 96)[1] = 1;
-  const auto plain = coarse_view(in_footprints(scene.rig), scene.frame, {});
+  FrameOptions options;
+  options.joined_pixels = 4;
+  const auto plain = coarse_view(in_footprints(scene.rig), scene.frame, options);
   scene.take_mosaics();
-  const auto mosaic = coarse_view(in_footprints(scene.rig), scene.frame, {});
+  const auto mosaic = coarse_view(in_footprints(scene.rig), scene.frame, options);
   ASSERT_TRUE(plain && mosaic);
-  const int n = plain->binning.front();
-  ASSERT_TRUE(n == 3 || n == 4);
   EXPECT_FALSE(mosaic->rig.cameras.front().mosaic);
   const cv::Mat& of_plain = plain->frame.images.front();
   const cv::Mat& of_mosaic = mosaic->frame.images.front();
   for (const auto& [u, v] : {std::pair(3, 4), {10, 5}, {11, 20}})
     EXPECT_LT(cv::norm(of_plain.at<cv::Vec3f>(v, u) - of_mosaic.at<cv::Vec3f>(v, u)), 1e-5);
-  EXPECT_EQ(of_plain.at<cv::Vec3f>(48 / n, 96 / n)[0], 1);  // n divides both
+  EXPECT_EQ(of_plain.at<cv::Vec3f>(12, 24)[0], 1);
 }
 
-TEST(CoarseView, MorePixelsGiveTheSameShapeAndMorePoints) {
+TEST(CoarseView, JoinedPixelsGiveTheShapeOfLargerOnesAndMorePoints) {
   const Scene home(1);
-  ASSERT_FALSE(coarse_view(in_footprints(home.rig), home.frame, {}));
   Scene scene(4);
-  const auto view = coarse_view(in_footprints(scene.rig), scene.frame, {});
-  ASSERT_TRUE(view);
-  EXPECT_EQ(view->binning.front(),
-            std::lround(line_spacing(scene.rig) / footprint(scene.rig) / 10));
+  FrameOptions options;
+  ASSERT_FALSE(coarse_view(in_footprints(scene.rig), scene.frame, options));
+  options.joined_pixels = 4;
   const FrameResult few = reconstruct_frame(home.rig, home.frame);
   for (const bool is_mosaic : {false, true}) {
     if (is_mosaic) scene.take_mosaics();
-    const FrameResult many = reconstruct_frame(scene.rig, scene.frame);
+    const FrameResult many = reconstruct_frame(scene.rig, scene.frame, options);
     EXPECT_GT(many.points.points.size(), 3 * few.points.points.size());
     // Without noise, what a colour's samples miss is all that a mosaic adds.
     EXPECT_LT(distance_median(many), (is_mosaic ? 1.6 : 1.15) * distance_median(few));
@@ -139,6 +114,16 @@ TEST(CoarseView, MorePixelsGiveTheSameShapeAndMorePoints) {
     for (const DepthMap& map : many.shape.depth.maps)
       EXPECT_GE(map.stride * map.columns, scene.rig.cameras.front().width);
   }
+}
+
+TEST(WideWindows, FinerPixelsMeasureAsMuchOfTheSurface) {
+  const Scene home(1);
+  const Scene scene(3);  // lines 29 px apart
+  const FrameResult few = reconstruct_frame(home.rig, home.frame);
+  const FrameResult many = reconstruct_frame(scene.rig, scene.frame);
+  EXPECT_LT(distance_median(many), distance_median(few));
+  EXPECT_GT(many.shape.surface.report.measured_share,
+            few.shape.surface.report.measured_share - 0.02);
 }
 
 }  // namespace

@@ -64,7 +64,7 @@ struct ShapeOptions {
 struct FrameOptions {
   PointOptions points;
   ShapeOptions shape;
-  bool meshes = true;      ///< false: labelled points alone
+  bool meshes = true;     ///< false: labelled points alone
   int joined_pixels = 1;  ///< along a row, to one: a quicker, coarser look; in [1, 16]
 };
 
