@@ -13,7 +13,8 @@ cv::Mat weights_of(int binning) {
   PENCILSCAN_CHECK(binning >= 1);
   const int reach = binning / 2;
   cv::Mat weights(1, 2 * reach + 1, CV_32F, cv::Scalar(1.0 / binning));
-  if (binning % 2 == 0) weights.at<float>(0) = weights.at<float>(2 * reach) = 0.5F / binning;
+  if (binning % 2 == 0)
+    weights.at<float>(0) = weights.at<float>(2 * reach) = 0.5F / static_cast<float>(binning);
   return weights;
 }
 
