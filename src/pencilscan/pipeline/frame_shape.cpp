@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <opencv2/core/eigen.hpp>
 #include <span>
 
 #include "pencilscan/core/parallel.h"
@@ -16,42 +17,42 @@
 namespace pencilscan {
 namespace {
 
-/// An image of linear light that nobody else holds, with NaN where it is overexposed as read.
-cv::Mat without_overexposed(cv::Mat image, const cv::Mat& values) {
-  image.setTo(cv::Scalar::all(std::nan("")), overexposed(values));
-  return image;
-}
-
-cv::Mat plain_light(const Camera& camera, const cv::Mat& values) {
-  return without_overexposed(registered(camera, linear_light(camera, values)).clone(), values);
+/// Linear light as the camera has it: the image as read where that is all that there is to it.
+ColorView plain_view(const Rig& rig, std::size_t c, const cv::Mat& values) {
+  const Camera& camera = rig.cameras[c];
+  ColorView view;
+  view.camera = static_cast<int>(c);
+  view.is_plain = true;
+  const cv::Mat linear = linear_light(camera, values);
+  if (linear.data == values.data && camera.color_registration.none()) {
+    view.image = values;
+    view.full = kFullRange;
+  } else {
+    view.image = registered(camera, linear).clone();
+    view.image.setTo(cv::Scalar::all(std::nan("")), overexposed(values));
+  }
+  return view;
 }
 
 /// What camera c sees in the light of the projectors, or in plain light where it is a texture
 /// camera.
 ColorView lit_view(const Rig& rig, const Frame& frame, std::size_t c, const PointResult& points,
                    const DepthReport& depth) {
-  const Camera& camera = rig.cameras[c];
-  ColorView view;
-  view.camera = static_cast<int>(c);
-  view.is_plain = camera.sees_texture_only;
-  const cv::Mat& values = frame.images[c];
-  view.image = view.is_plain
-                   ? plain_light(camera, values)
-                   : without_overexposed(projector_light(camera, linear_light(camera, values),
-                                                         points.detections[c].unmixing),
-                                         values);
+  ColorView view = plain_view(rig, c, frame.images[c]);
   for (const CameraDepthReport& of_camera : depth.cameras) {
     if (of_camera.camera == view.camera) view.blur_px = of_camera.blur_px;
   }
-  return view;
-}
-
-ColorView plain_view(const Rig& rig, const Frame& frame, std::size_t c) {
   const Camera& camera = rig.cameras[c];
-  ColorView view;
-  view.camera = static_cast<int>(c);
-  view.is_plain = true;
-  view.image = plain_light(camera, frame.plain[c]);
+  if (camera.sees_texture_only) return view;
+  view.is_plain = false;
+  const Unmixing& unmixing = points.detections[c].unmixing;
+  if (camera.color_registration.none()) {
+    view.light_from_image = unmixing.projector_from_camera.cast<float>();
+  } else {  // colours are unmixed where the sensor has them
+    const cv::Mat& values = frame.images[c];
+    view.image = projector_light(camera, linear_light(camera, values), unmixing);
+    view.image.setTo(cv::Scalar::all(std::nan("")), overexposed(values));
+  }
   return view;
 }
 
@@ -64,11 +65,22 @@ std::vector<ColorView> color_views(const Rig& rig, const Frame& frame, const Poi
       makers.push_back([&, c] { return lit_view(rig, frame, c, points, depth); });
   }
   for (std::size_t c = 0; c < frame.plain.size(); ++c) {
-    if (!frame.plain[c].empty()) makers.push_back([&, c] { return plain_view(rig, frame, c); });
+    if (!frame.plain[c].empty())
+      makers.push_back([&, c] { return plain_view(rig, c, frame.plain[c]); });
   }
   std::vector<ColorView> views(makers.size());
   parallel_for(views.size(), [&](std::size_t i) { views[i] = makers[i](); });
   return views;
+}
+
+/// Light of the projectors in the whole image; NaN where overexposed.
+cv::Mat light_of(const ColorView& view) {
+  cv::Mat matrix;
+  cv::eigen2cv(view.light_from_image, matrix);
+  cv::Mat light;
+  cv::transform(view.image, light, matrix);
+  if (std::isfinite(view.full)) light.setTo(cv::Scalar::all(std::nan("")), overexposed(view.image));
+  return light;
 }
 
 /// Of the cameras that see the projectors' light.
@@ -80,7 +92,7 @@ std::vector<Silhouette> silhouettes_of(const Rig& rig, const std::vector<ColorVi
   std::vector<Silhouette> silhouettes(lit.size());
   parallel_for(lit.size(), [&](std::size_t i) {
     const Camera& camera = rig.camera(lit[i]->camera);
-    silhouettes[i] = silhouette(lit[i]->camera, lit[i]->image, line_reach_px(rig, camera));
+    silhouettes[i] = silhouette(lit[i]->camera, light_of(*lit[i]), line_reach_px(rig, camera));
   });
   return silhouettes;
 }

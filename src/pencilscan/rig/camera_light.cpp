@@ -59,7 +59,6 @@ cv::Mat linear_light(const Camera& camera, const cv::Mat& values) {
 }
 
 cv::Mat overexposed(const cv::Mat& values) {
-  constexpr float kFull = 0.998F;
   cv::Mat full(values.size(), CV_8UC1);
   const int channels = values.channels();
   for (int y = 0; y < values.rows; ++y) {
@@ -67,7 +66,7 @@ cv::Mat overexposed(const cv::Mat& values) {
     auto* out = full.ptr<std::uint8_t>(y);
     for (int x = 0; x < values.cols; ++x, in += channels) {
       bool any = false;
-      for (int k = 0; k < channels; ++k) any = any || in[k] >= kFull;
+      for (int k = 0; k < channels; ++k) any = any || in[k] >= kFullRange;
       out[x] = any ? 255 : 0;
     }
   }

@@ -23,6 +23,9 @@ void check_camera_image(const Camera& camera, const std::filesystem::path& path)
 /// a mosaic leaves out interpolated (io/mosaic.h).
 [[nodiscard]] cv::Mat linear_light(const Camera& camera, const cv::Mat& values);
 
+/// camera_values() from here on are at the top of the range.
+inline constexpr float kFullRange = 0.998F;
+
 /// Where camera_values() are at the top of the range, CV_8UC1: 255. For a mosaic, every pixel whose
 /// interpolated colours have such a sample in them.
 [[nodiscard]] cv::Mat overexposed(const cv::Mat& values);

@@ -128,7 +128,8 @@ Samples collect(const Rig& rig, const RayScene& surface, std::span<const ColorVi
       if (!pixel || !camera.contains(*pixel) || !light.sees(camera.center(), x, normals[v]))
         continue;
       Sample sample;
-      sample.image = sample_color(views[k].image, pixel->x(), pixel->y());
+      sample.image = views[k].light_from_image *
+                     sample_color(views[k].image, pixel->x(), pixel->y(), views[k].full).matrix();
       if (!sample.image.isFinite().all()) continue;
       sample.weight = static_cast<float>((camera.center() - x).normalized().dot(normals[v]));
       sample.vertex = static_cast<std::uint32_t>(v);

@@ -20,9 +20,12 @@ struct ColorOptions {
 /// One camera's image as colour needs it.
 struct ColorView {
   int camera = 0;
-  /// CV_32FC3, linear: projector RGB of an image with patterns, camera RGB of a plain one; NaN
-  /// where overexposed.
+  /// CV_32FC3, linear, RGB of the camera; NaN or `full` and more where overexposed. It may share
+  /// its pixels with the image as read.
   cv::Mat image;
+  float full = std::numeric_limits<float>::infinity();
+  /// Projector RGB of an image with patterns.
+  Eigen::Matrix3f light_from_image = Eigen::Matrix3f::Identity();
   double blur_px = 0.8;   ///< of camera and projector together
   bool is_plain = false;  ///< no patterns in the image: taken without them, or by a texture camera
 };
