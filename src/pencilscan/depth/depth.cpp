@@ -72,7 +72,7 @@ DepthResult measure_depth(const Rig& rig, const std::vector<ColorFamily>& famili
     measure_light(rig, static_cast<int>(c), families, points, depth, light);
     result.maps[i] = dense_depth(light, static_cast<int>(c), points, space, depth);
     with_wider_windows(
-        light, spacing_px(rig, camera), depth, result.maps[i],
+        light, binning_for(spacing_px(rig, camera), depth), result.maps[i],
         [&](const CameraLight& wide, DepthMap& map) { grow(wide, space, depth, map); });
   });
   result.report.seconds_depth = watch.seconds();
@@ -104,7 +104,9 @@ void guided_depth(const Rig& rig, const RayScene& surface, const DepthStageOptio
           complete_map(seen, surface, space, result.report.consistency.sigma_factor, depth, map);
     };
     complete(light, result.maps[i]);
-    with_wider_windows(light, spacing_px(rig, *light.camera), depth, result.maps[i], complete);
+    // Where a surface turns from its projector, lines lie farther apart.
+    const int widest = std::max(2, binning_for(spacing_px(rig, *light.camera), depth));
+    with_wider_windows(light, widest, result.maps[i], complete);
   });
   for (std::size_t i = 0; i < found.size(); ++i) {
     result.report.completed += found[i];

@@ -35,9 +35,15 @@ CameraLight binned_light(const CameraLight& light, int binning) {
   result.own_camera = camera;
   result.camera = camera.get();
   result.patterns = light.patterns;
+  result.noise = light.noise;
   for (std::size_t f = 0; f < light.families.size(); ++f) {
     const cv::Mat sampled = f < light.sampled.size() ? light.sampled[f] : cv::Mat();
     result.families.push_back(binned_presence(light.families[f], sampled, binning));
+    // Means that overlap share noise: over a window they are worth as many samples as they count.
+    const double share = sampled.empty() ? 1 : cv::mean(sampled)[0] / 255;
+    const auto samples = static_cast<float>(binning * binning * share);
+    result.noise[f].offset /= samples;
+    result.noise[f].slope /= samples;
   }
   result.sampled.resize(light.sampled.size());
   cv::Mat invalid;
@@ -46,34 +52,32 @@ CameraLight binned_light(const CameraLight& light, int binning) {
   result.of_mosaic = light.of_mosaic;
   const auto blur2 = static_cast<double>(light.blur_px * light.blur_px);
   result.blur_px = static_cast<float>(std::sqrt(blur2 + binning_blur_px2(binning)) / binning);
-  // Means that overlap share noise: over a window they are worth as many pixels as they count.
-  result.noise = light.noise;
-  for (NoiseModel& noise : result.noise) {
-    noise.offset /= static_cast<float>(binning * binning);
-    noise.slope /= static_cast<float>(binning * binning);
-  }
   result.usual_residual = light.usual_residual;
   return result;
 }
 
-void with_wider_windows(const CameraLight& light, double spacing_px, const DepthOptions& options,
-                        DepthMap& map,
-                        const std::function<void(const CameraLight&, DepthMap&)>& work) {
+int binning_for(double spacing_px, const DepthOptions& options) {
   // Windows 11 px wide find less with wider ones beside them where lines are 11.3 px apart, and
   // more where they are 15.1 px apart (docs/depth.md).
   constexpr double kNarrow = 1.2;
   const double width = 2 * options.half + 1;
+  int binning = 1;
+  while (kNarrow * binning * width < spacing_px) binning *= 2;
+  return binning;
+}
+
+void with_wider_windows(const CameraLight& light, int widest, DepthMap& map,
+                        const std::function<void(const CameraLight&, DepthMap&)>& work) {
   CameraLight wide = light;
   const int stride = map.stride;
-  int binning = 1;
-  while (kNarrow * binning * width < spacing_px && stride % (2 * binning) == 0) {
-    binning *= 2;
+  int binning = 2;
+  for (; binning <= widest && stride % binning == 0; binning *= 2) {
     wide = binned_light(wide, 2);
     scale_pixels(2, map);
     map.stride = stride / binning;
     work(wide, map);
   }
-  scale_pixels(1.F / static_cast<float>(binning), map);
+  scale_pixels(2.F / static_cast<float>(binning), map);
   map.stride = stride;
 }
 

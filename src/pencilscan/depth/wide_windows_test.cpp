@@ -33,8 +33,10 @@ TEST(WideWindows, LightIsJoinedWithItsNoiseAndBlur) {
   EXPECT_EQ(wide.camera->width, 32);
   EXPECT_EQ(wide.camera, wide.own_camera.get());
   EXPECT_FLOAT_EQ(wide.families[0].at<float>(5, 9), 0.25F);
-  EXPECT_FLOAT_EQ(wide.noise[0].offset, 0.0025F);
-  EXPECT_FLOAT_EQ(wide.noise[0].slope, 0.005F);
+  EXPECT_FLOAT_EQ(wide.noise[0].offset, 0.01F);  // one sample of four pixels
+  EXPECT_FLOAT_EQ(wide.noise[0].slope, 0.02F);
+  light.sampled[0] = cv::Mat();
+  EXPECT_FLOAT_EQ(binned_light(light, 2).noise[0].offset, 0.0025F);
   EXPECT_FLOAT_EQ(wide.blur_px, std::sqrt(1.5F) / 2);
   EXPECT_EQ(wide.valid.at<std::uint8_t>(10, 15), 0);
   EXPECT_EQ(wide.valid.at<std::uint8_t>(10, 17), 1);
@@ -55,7 +57,8 @@ TEST(WideWindows, GoAsFarAsLinesLieApartAndLeaveTheMapInItsPixels) {
   node.wxy = 1e-6F;
   const auto widths_at = [&](double spacing_px) {
     std::vector<int> widths;
-    with_wider_windows(light, spacing_px, options, map, [&](const CameraLight& wide, DepthMap& m) {
+    const int widest = binning_for(spacing_px, options);
+    with_wider_windows(light, widest, map, [&](const CameraLight& wide, DepthMap& m) {
       widths.push_back(wide.camera->width);
       const int n = 64 / wide.camera->width;
       EXPECT_EQ(n * m.pixel(m.index(3, 5)), Vec2(20, 12));
