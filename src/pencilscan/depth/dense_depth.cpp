@@ -20,12 +20,19 @@ double incidence(const CameraLight& light, const Vec2& pixel, const Quadric& q, 
   return -normal.dot(m.homogeneous().normalized());
 }
 
+/// What a fit leaves of the light. Windows behind a mosaic are as wide as their noise makes best
+/// (options_for()): what noise explains, 1 / misfit of the variance, is no misfit there.
+double relative_residual(const CameraLight& light, const WindowFit& fit) {
+  const auto residual = static_cast<double>(fit.relative_residual);
+  if (!light.of_mosaic) return residual;
+  return residual * std::sqrt(std::max(0.0, 1 - 1 / static_cast<double>(fit.misfit)));
+}
+
 bool acceptable(const CameraLight& light, const Vec2& pixel, const WindowFit& fit,
                 const ObjectSpace& space, int half, const DepthOptions& options) {
   if (fit.misfit > options.max_misfit) return false;
   const auto usual = static_cast<double>(light.usual_residual);
-  if (static_cast<double>(fit.relative_residual) >
-      std::max(options.max_relative_residual, 2 * usual))
+  if (relative_residual(light, fit) > std::max(options.max_relative_residual, 2 * usual))
     return false;
   if (std::sqrt(fit.variance) * static_cast<double>(fit.lines_per_w) > options.max_sigma_lines)
     return false;

@@ -365,7 +365,6 @@ std::optional<WindowFit> WindowFitter::finish(const Quadric& q, bool cut) {
   if (fit.lit.none() || !(fit.variance > 0)) return std::nullopt;
   float residual = 0;
   for (const Seen& seen : seen_) residual = std::max(residual, seen.variance);
-  residual *= std::max(0.F, 1 - 1 / fit.misfit);  // noise explains the rest
   fit.relative_residual = std::sqrt(residual) / fit.amplitude;
   return fit;
 }
