@@ -10,24 +10,20 @@ namespace {
 
 /// A presence image; where a mosaic has samples of it (`sampled`), the means of these.
 cv::Mat binned_presence(const cv::Mat& presence, const cv::Mat& sampled, int binning) {
-  cv::Mat means = binned(presence, binning);
-  if (sampled.empty()) return means;
+  if (sampled.empty()) return binned(presence, binning);
   cv::Mat counted;
   sampled.convertTo(counted, CV_32F, 1 / 255.0);
-  const cv::Mat count = binned(counted, binning);
-  cv::Mat(binned(presence.mul(counted), binning) / count).copyTo(means, count > 0);
-  return means;
-}
-
-/// Slopes and bends of all nodes, pixels becoming `factor` of what they were.
-void scale_pixels(float factor, DepthMap& map) {
-  for (DepthNode& node : map.nodes) {
-    for (float* slope : {&node.wx, &node.wy}) *slope *= factor;
-    for (float* bend : {&node.wxx, &node.wxy, &node.wyy}) *bend *= factor * factor;
-  }
+  return binned(presence, counted, binning);
 }
 
 }  // namespace
+
+void scale_pixels(float size, DepthMap& map) {
+  for (DepthNode& node : map.nodes) {
+    for (float* slope : {&node.wx, &node.wy}) *slope *= size;
+    for (float* bend : {&node.wxx, &node.wxy, &node.wyy}) *bend *= size * size;
+  }
+}
 
 CameraLight binned_light(const CameraLight& light, int binning) {
   CameraLight result;

@@ -11,6 +11,9 @@ namespace pencilscan {
 /// patterns point to, and holds its camera.
 [[nodiscard]] CameraLight binned_light(const CameraLight& light, int binning);
 
+/// Slopes and bends of a map's nodes where pixels have become `size` times as large.
+void scale_pixels(float size, DepthMap& map);
+
 /// Where lines lie farther apart than windows are wide, windows between two lines see none: by how
 /// much pixels have to be joined (1, 2, 4 ...) until windows are about as wide as lines are apart.
 [[nodiscard]] int binning_for(double spacing_px, const DepthOptions& options);

@@ -7,6 +7,7 @@
 
 #include "pencilscan/core/check.h"
 #include "pencilscan/core/parallel.h"
+#include "pencilscan/depth/wide_windows.h"
 #include "pencilscan/io/linear_light.h"
 #include "pencilscan/pipeline/frame_warnings.h"
 #include "pencilscan/rig/binning.h"
@@ -30,8 +31,7 @@ cv::Mat binned_samples(const cv::Mat& light, const Mosaic& mosaic, int binning) 
       auto* row = is_sample.ptr<float>(y);
       for (int x = 0; x < light.cols; ++x) row[x] = mosaic.color(x, y) == k ? 1.F : 0.F;
     }
-    colors[static_cast<std::size_t>(k)] =
-        binned(light.mul(is_sample), binning) / binned(is_sample, binning);
+    colors[static_cast<std::size_t>(k)] = binned(light, is_sample, binning);
   }
   cv::Mat result;
   cv::merge(colors.data(), colors.size(), result);
@@ -61,15 +61,6 @@ DepthOptions of_joined(double n, DepthOptions options) {
   options.stride =
       std::max(1, static_cast<int>(std::lround(options.stride * width_px(options.half) / before)));
   return options;
-}
-
-void scale_pixels(int binning, DepthMap& map) {
-  const auto n = static_cast<float>(binning);
-  map.stride *= binning;
-  for (DepthNode& node : map.nodes) {
-    for (float* slope : {&node.wx, &node.wy}) *slope /= n;
-    for (float* bend : {&node.wxx, &node.wxy, &node.wyy}) *bend /= n * n;
-  }
 }
 
 /// `whole` and `part` of the way from one point to the next.
@@ -257,8 +248,11 @@ FrameResult in_fine_pixels(const CoarseView& view, FrameResult result) {
   refine_points(view, result.points, result.shape.surface.used);
   to_fine(view, result.points);
   scale_lengths(view.unit, result.shape);
-  for (DepthMap& map : result.shape.depth.maps)
-    scale_pixels(view.binning[static_cast<std::size_t>(map.camera)], map);
+  for (DepthMap& map : result.shape.depth.maps) {
+    const int binning = view.binning[static_cast<std::size_t>(map.camera)];
+    map.stride *= binning;
+    scale_pixels(1.F / static_cast<float>(binning), map);
+  }
   for (CameraDepthReport& camera : result.shape.depth.report.cameras)
     camera.blur_px *= view.binning[static_cast<std::size_t>(camera.camera)];
   return result;

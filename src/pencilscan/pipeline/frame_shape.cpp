@@ -17,41 +17,36 @@
 namespace pencilscan {
 namespace {
 
-/// Linear light as the camera has it: the image as read where that is all that there is to it.
-ColorView plain_view(const Rig& rig, std::size_t c, const cv::Mat& values) {
+/// What camera c sees, linear: the image as read where that is all that there is to it. `unmixing`:
+/// of an image with patterns.
+ColorView view_of(const Rig& rig, std::size_t c, const cv::Mat& values, const Unmixing* unmixing) {
   const Camera& camera = rig.cameras[c];
   ColorView view;
   view.camera = static_cast<int>(c);
-  view.is_plain = true;
-  const cv::Mat linear = linear_light(camera, values);
-  if (linear.data == values.data && camera.color_registration.none()) {
-    view.image = values;
+  view.is_plain = unmixing == nullptr;
+  view.image = linear_light(camera, values);
+  if (!camera.color_registration.none()) {  // colours are unmixed where the sensor has them
+    view.image = unmixing != nullptr ? projector_light(camera, view.image, *unmixing)
+                                     : registered(camera, view.image);
+  } else if (unmixing != nullptr) {
+    view.light_from_image = unmixing->projector_from_camera.cast<float>();
+  }
+  if (view.image.data == values.data) {
     view.full = kFullRange;
   } else {
-    view.image = registered(camera, linear).clone();
     view.image.setTo(cv::Scalar::all(std::nan("")), overexposed(values));
   }
   return view;
 }
 
-/// What camera c sees in the light of the projectors, or in plain light where it is a texture
-/// camera.
+/// The same in the light of the projectors, or in plain light where it is a texture camera.
 ColorView lit_view(const Rig& rig, const Frame& frame, std::size_t c, const PointResult& points,
                    const DepthReport& depth) {
-  ColorView view = plain_view(rig, c, frame.images[c]);
+  const bool is_plain = rig.cameras[c].sees_texture_only;
+  ColorView view =
+      view_of(rig, c, frame.images[c], is_plain ? nullptr : &points.detections[c].unmixing);
   for (const CameraDepthReport& of_camera : depth.cameras) {
     if (of_camera.camera == view.camera) view.blur_px = of_camera.blur_px;
-  }
-  const Camera& camera = rig.cameras[c];
-  if (camera.sees_texture_only) return view;
-  view.is_plain = false;
-  const Unmixing& unmixing = points.detections[c].unmixing;
-  if (camera.color_registration.none()) {
-    view.light_from_image = unmixing.projector_from_camera.cast<float>();
-  } else {  // colours are unmixed where the sensor has them
-    const cv::Mat& values = frame.images[c];
-    view.image = projector_light(camera, linear_light(camera, values), unmixing);
-    view.image.setTo(cv::Scalar::all(std::nan("")), overexposed(values));
   }
   return view;
 }
@@ -66,7 +61,7 @@ std::vector<ColorView> color_views(const Rig& rig, const Frame& frame, const Poi
   }
   for (std::size_t c = 0; c < frame.plain.size(); ++c) {
     if (!frame.plain[c].empty())
-      makers.push_back([&, c] { return plain_view(rig, c, frame.plain[c]); });
+      makers.push_back([&, c] { return view_of(rig, c, frame.plain[c], nullptr); });
   }
   std::vector<ColorView> views(makers.size());
   parallel_for(views.size(), [&](std::size_t i) { views[i] = makers[i](); });

@@ -38,6 +38,14 @@ cv::Mat binned(const cv::Mat& image, int binning) {
   return result;
 }
 
+cv::Mat binned(const cv::Mat& image, const cv::Mat& counted, int binning) {
+  const cv::Mat count = binned(counted, binning);
+  cv::Mat means = binned(image.mul(counted), binning) / count;
+  const cv::Mat none = count == 0;
+  if (cv::countNonZero(none) > 0) binned(image, binning).copyTo(means, none);
+  return means;
+}
+
 double binning_blur_px2(int binning) {
   const cv::Mat weights = weights_of(binning);
   double variance = 0;

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <array>
+#include <limits>
 #include <opencv2/core.hpp>
 #include <span>
 #include <vector>
