@@ -187,7 +187,7 @@ class Comparison {
       z_of[i] = static_cast<float>((projector.device_from_world * nodes_[i].x).z());
     });
     for (std::size_t i = 0; i < nodes_.size(); ++i) {
-      if (cell_of[i] < 0 || (node(i).lit & own).none()) continue;
+      if (cell_of[i] < 0 || (maps_[nodes_[i].map].lit(node(i)) & own).none()) continue;
       Lit& lit = farthest[static_cast<std::size_t>(cell_of[i])];
       if (z_of[i] > lit.farthest) {
         lit = {lit.farthest, lit.farthest_node, z_of[i], static_cast<std::int32_t>(i)};

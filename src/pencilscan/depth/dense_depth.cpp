@@ -41,7 +41,7 @@ bool acceptable(const CameraLight& light, const Vec2& pixel, const WindowFit& fi
   return space.holds(x);
 }
 
-DepthNode node_of(const WindowFit& fit, int half) {
+DepthNode node_of(const WindowFit& fit, int half, LitSets& lit_sets) {
   DepthNode node;
   const double h = half;
   node.w = static_cast<float>(fit.q[0]);
@@ -52,7 +52,7 @@ DepthNode node_of(const WindowFit& fit, int half) {
   node.wyy = static_cast<float>(2 * fit.q[5] / (h * h));
   node.sigma = static_cast<float>(std::sqrt(fit.variance) / (fit.q[0] * fit.q[0]));
   node.misfit = fit.misfit;
-  node.lit = fit.lit;
+  node.lit = lit_sets.place_of(fit.lit);
   node.reason = HoleReason::kMeasured;
   return node;
 }
@@ -286,7 +286,7 @@ void grow(const CameraLight& light, const ObjectSpace& space, const DepthOptions
         }
       }
       if (best && !floor.shows(map.pixel(j), *best, fitter))
-        found.emplace_back(j, node_of(*best, options.half));
+        found.emplace_back(j, node_of(*best, options.half, map.lit_sets));
     }
     for (const auto& [j, node] : found) {
       map.nodes[j] = node;
@@ -318,7 +318,7 @@ DepthMap dense_depth(const CameraLight& light, int camera, std::span<const Measu
       }
     }
     if (!best || floor.shows(pixel, *best, fitter)) continue;
-    map.nodes[i] = node_of(*best, options.half);
+    map.nodes[i] = node_of(*best, options.half, map.lit_sets);
     map.nodes[i].seeded = true;
   }
   grow(light, space, options, map);
@@ -346,7 +346,7 @@ std::size_t complete_map(const CameraLight& light, const RayScene& surface,
     if (!fit || !acceptable(light, pixel, *fit, space, options.half, options)) continue;
     const double move = (camera.point_at_depth(pixel, 1 / fit->q[0]) - hit->point).norm();
     if (move > options.max_move || floor.shows(pixel, *fit, fitter)) continue;
-    map.nodes[i] = node_of(*fit, options.half);
+    map.nodes[i] = node_of(*fit, options.half, map.lit_sets);
     map.nodes[i].sigma *= static_cast<float>(kHardPlaces * sigma_factor);
     map.nodes[i].confidence = kConfidence;
     ++found;

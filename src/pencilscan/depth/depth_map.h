@@ -3,6 +3,7 @@
 #include <array>
 #include <bitset>
 #include <cstdint>
+#include <unordered_map>
 #include <vector>
 
 #include "pencilscan/geometry/types.h"
@@ -27,18 +28,34 @@ inline constexpr std::size_t kHoleReasons = 9;
 /// One bit per pattern of the rig, in the order of the families.
 using LitPatterns = std::bitset<kMostPatterns>;
 
+/// Sets of patterns, each kept once: the nodes of a map are lit by few different ones.
+class LitSets {
+ public:
+  /// Where a set is kept, from now on if it was not.
+  [[nodiscard]] std::uint32_t place_of(const LitPatterns& set) {
+    const auto [at, is_new] = places_.try_emplace(set, static_cast<std::uint32_t>(sets_.size()));
+    if (is_new) sets_.push_back(set);
+    return at->second;
+  }
+  [[nodiscard]] const LitPatterns& operator[](std::uint32_t place) const { return sets_[place]; }
+
+ private:
+  std::vector<LitPatterns> sets_ = {LitPatterns()};
+  std::unordered_map<LitPatterns, std::uint32_t> places_ = {{LitPatterns(), 0}};
+};
+
 /// One measured pixel: inverse depth and its first derivatives, w(u + dx, v + dy) =
 /// w + wx dx + wy dy + (wxx dx^2 + 2 wxy dx dy + wyy dy^2) / 2.
 struct DepthNode {
   float w = 0;  ///< 1 / camera z, 1/mm; 0: no depth
   float wx = 0, wy = 0, wxx = 0, wxy = 0, wyy = 0;
-  float sigma = 0;    ///< mm of camera z, one standard deviation
-  float misfit = 0;   ///< residual over what noise explains (1 = only noise)
-  LitPatterns lit;    ///< whose light was found
-  float support = 0;  ///< number of other cameras that agree, each by its own confidence
-  bool seeded =
-      false;  ///< started from a labelled curve of a pattern found here, not from neighbours
-  float confidence = 0;  ///< 0..1: what the other views say
+  float sigma = 0;        ///< mm of camera z, one standard deviation
+  float misfit = 0;       ///< residual over what noise explains (1 = only noise)
+  float support = 0;      ///< number of other cameras that agree, each by its own confidence
+  float confidence = 0;   ///< 0..1: what the other views say
+  std::uint32_t lit = 0;  ///< whose light was found: place in the map's sets
+  /// Started from a labelled curve of a pattern found here, not from neighbours.
+  bool seeded = false;
   HoleReason reason = HoleReason::kBackground;
 
   [[nodiscard]] bool measured() const { return w > 0; }
@@ -51,7 +68,9 @@ struct DepthMap {
   int columns = 0;
   int rows = 0;
   std::vector<DepthNode> nodes;  ///< rows x columns
+  LitSets lit_sets;
 
+  [[nodiscard]] const LitPatterns& lit(const DepthNode& node) const { return lit_sets[node.lit]; }
   [[nodiscard]] std::size_t index(int row, int column) const {
     return static_cast<std::size_t>(row) * static_cast<std::size_t>(columns) +
            static_cast<std::size_t>(column);

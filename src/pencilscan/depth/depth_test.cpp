@@ -367,7 +367,7 @@ std::pair<std::size_t, std::size_t> kept_of_patch(Change change) {
     DepthNode& node = maps[0].nodes[i];
     if (!node.measured()) continue;
     const bool is_around = (maps[0].pixel(i) - Vec2(125, 100)).norm() <= 20;
-    change(node, is_around);
+    change(maps[0], node, is_around);
     if (is_around) patch.push_back(i);
   }
   const std::vector<int> projectors = {0, 1};
@@ -382,8 +382,8 @@ std::pair<std::size_t, std::size_t> kept_of_patch(Change change) {
 template <class Change>
 void expect_only_a_seeded_patch_stays(Change change) {
   for (const bool seeded : {true, false}) {
-    const auto [left, size] = kept_of_patch([&](DepthNode& node, bool is_around) {
-      change(node, is_around);
+    const auto [left, size] = kept_of_patch([&](DepthMap& map, DepthNode& node, bool is_around) {
+      change(map, node, is_around);
       if (is_around) node.seeded = seeded;
     });
     ASSERT_GT(size, 30u);
@@ -397,15 +397,16 @@ void expect_only_a_seeded_patch_stays(Change change) {
 
 TEST(Consistency, IslandsThatOnlyGrewAreRemoved) {
   // 6 mm behind the rest: a surface of its own.
-  expect_only_a_seeded_patch_stays([](DepthNode& node, bool is_around) {
+  expect_only_a_seeded_patch_stays([](DepthMap&, DepthNode& node, bool is_around) {
     if (is_around) node.w = static_cast<float>(1 / (1 / static_cast<double>(node.w) + 6));
   });
 }
 
 TEST(Consistency, PatchesOfOneProjectorNeedACurveOrAnotherView) {
   // It continues the rest, but shows the lines of one projector only.
-  expect_only_a_seeded_patch_stays(
-      [](DepthNode& node, bool is_around) { node.lit = is_around ? 1 : 3; });
+  expect_only_a_seeded_patch_stays([](DepthMap& map, DepthNode& node, bool is_around) {
+    node.lit = map.lit_sets.place_of(is_around ? 1 : 3);
+  });
 }
 
 }  // namespace

@@ -39,9 +39,11 @@ class LineBlurTest : public testing::Test {
                                    inverse_depth(pixel - Vec2(0.5, 0), 0));
       node.wy = static_cast<float>(inverse_depth(pixel + Vec2(0, 0.5), 0) -
                                    inverse_depth(pixel - Vec2(0, 0.5), 0));
+      LitPatterns lit;
       for (std::size_t k = 0; k < light_.patterns.size(); ++k) {
-        if (light_.patterns[k].projector() == 0) node.lit.set(k);
+        if (light_.patterns[k].projector() == 0) lit.set(k);
       }
+      node.lit = map_.lit_sets.place_of(lit);
     }
   }
 

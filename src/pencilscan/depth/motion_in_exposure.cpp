@@ -46,7 +46,7 @@ void add_lines(const Rig& rig, const CameraLight& light, const DepthMap& map, st
   blur.deviation_px2 = std::numeric_limits<double>::infinity();
   const std::size_t before = lines.size();
   for (std::size_t k = 0; k < light.patterns.size(); ++k) {
-    if (!node.lit.test(k)) continue;
+    if (!map.lit(node).test(k)) continue;
     const PatternView& view = light.patterns[k];
     bool ok = false;
     const WindowLines at = view.lines(m, jacobian, w, ok);

@@ -9,8 +9,8 @@ namespace pencilscan {
 namespace {
 
 /// Lit by one projector and confirmed by no camera.
-bool is_unconfirmed(const DepthNode& n) {
-  return n.measured() && n.lit.count() <= 1 && n.support <= 0.01F;
+bool is_unconfirmed(const DepthMap& map, const DepthNode& n) {
+  return n.measured() && map.lit(n).count() <= 1 && n.support <= 0.01F;
 }
 
 /// Removes nodes of a map; returns how many.
@@ -50,7 +50,7 @@ std::size_t drop_lone_nodes(DepthMap& map) {
   std::vector<char> is_lone(map.nodes.size(), 0);
   parallel_chunks(is_lone.size(), [&](std::size_t i) {
     const DepthNode& n = map.nodes[i];
-    if (!is_unconfirmed(n)) return;
+    if (!is_unconfirmed(map, n)) return;
     int neighbors = 0;
     for_each_neighbor(map, i, 1, [&](std::size_t) { ++neighbors; });
     const int least = n.seeded ? kLeastNeighbors : kLeastNeighborsGrown;
@@ -67,7 +67,8 @@ std::size_t drop_unconfirmed_patches(DepthMap& map) {
   constexpr double kLeastSeeded = 0.02;      // share of the nodes
   constexpr double kLeastConfidence = 0.75;  // mean
   std::size_t dropped = 0;
-  for_each_patch(map, is_unconfirmed, [&](std::span<const std::size_t> patch) {
+  const auto is_member = [&](const DepthNode& n) { return is_unconfirmed(map, n); };
+  for_each_patch(map, is_member, [&](std::span<const std::size_t> patch) {
     double seeds = 0;
     double confidence = 0;
     for (const std::size_t k : patch) {

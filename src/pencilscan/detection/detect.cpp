@@ -42,10 +42,11 @@ CameraDetection detect_curves(const Camera& camera, const Rig& rig,
                               const DetectionOptions& options) {
   CameraDetection result;
   // Unmix the colour families where there is light.
-  const cv::Mat whole = linear_light(camera, image);
+  const cv::Mat values = camera_values(camera, image);
+  const cv::Mat whole = linear_light(camera, values);
   const cv::Rect area = lit_area(whole);
   const cv::Mat linear = whole(area);
-  result.is_filled_in = !camera.mosaic && looks_interpolated(image);
+  result.is_filled_in = !camera.mosaic && looks_interpolated(values);
   result.saturated_pixels = static_cast<std::size_t>(cv::countNonZero(overexposed(image(area))));
   result.unmixing = estimate_unmixing(camera, rig, families, registered(camera, linear, area.tl()));
   const cv::Mat rgb = projector_light(camera, linear, result.unmixing, area.tl());

@@ -10,6 +10,8 @@
 #include "pencilscan/detection/detect.h"
 #include "pencilscan/detection/ghosts.h"
 #include "pencilscan/detection/mosaic_trace.h"
+#include "pencilscan/io/image.h"
+#include "pencilscan/view/sample_color.h"
 
 namespace pencilscan {
 namespace {
@@ -174,6 +176,21 @@ TEST(LooksInterpolated, TellsFilledInColoursFromThreeChannels) {
   EXPECT_FALSE(looks_interpolated(rgb));
   const Mosaic mosaic = *Mosaic::from_name("GRBG");
   EXPECT_TRUE(looks_interpolated(demosaiced(sampled(rgb, mosaic), mosaic)));
+}
+
+TEST(SampleColor, OfAStoredImageIsThatOfItsValues) {
+  for (const int type : {CV_8UC3, CV_16UC3, CV_8UC1, CV_16UC1}) {
+    cv::Mat stored(20, 30, type);
+    cv::RNG random(3);
+    random.fill(stored, cv::RNG::UNIFORM, 0, stored.depth() == CV_8U ? 250 : 64000);
+    const cv::Mat values = unit_image(stored);
+    for (const double x : {0.0, 3.25, 28.9}) {
+      for (const double y : {0.0, 7.5, 18.3})
+        EXPECT_TRUE((sample_color(stored, x, y) == sample_color(values, x, y)).all());
+    }
+    EXPECT_FALSE(sample_color(stored, 29.1, 5).isFinite().any());
+    EXPECT_FALSE(sample_color(stored, 3.5, 3.5, 0.001F).isFinite().any());
+  }
 }
 
 TEST(DetectCurves, CodeTellsBlueFromCyanUnderCrossingLines) {

@@ -83,7 +83,9 @@ CapturePair capture_pair(const fs::path& folder, const Projector& projector) {
 }  // namespace
 
 cv::Mat read_color_image(const fs::path& path, const Camera& camera) {
-  cv::Mat color = camera_values(camera, read_stored_image(path), path);
+  const cv::Mat stored = read_stored_image(path);
+  check_channels(camera, stored, path);
+  cv::Mat color = camera_values(camera, stored);
   if (color.cols != camera.width || color.rows != camera.height) {
     throw InputError(path.string(), "size",
                      std::to_string(color.cols) + " x " + std::to_string(color.rows),

@@ -39,7 +39,8 @@ cv::Mat binned_samples(const cv::Mat& light, const Mosaic& mosaic, int binning) 
 }
 
 /// Linear light, of the full range where any of the pixels is overexposed.
-cv::Mat binned_light(const Camera& camera, const cv::Mat& values, int binning) {
+cv::Mat binned_light(const Camera& camera, const cv::Mat& stored, int binning) {
+  const cv::Mat values = camera_values(camera, stored);
   cv::Mat light = camera.mosaic
                       ? binned_samples(linearized(values, camera.gamma, camera.black_level),
                                        *camera.mosaic, binning)

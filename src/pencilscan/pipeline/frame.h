@@ -37,7 +37,7 @@ struct FrameTiming {
 /// One moment seen by all cameras.
 struct Frame {
   std::string name;
-  std::vector<cv::Mat> images;  ///< one per camera: camera_values(); empty: missing
+  std::vector<cv::Mat> images;  ///< one per camera, as stored; empty: missing
   /// The same moment in plain light, for colour: as `images`, or nothing at all.
   std::vector<cv::Mat> plain;
   std::optional<FrameTiming> timing;  ///< where the pictures have time stamps

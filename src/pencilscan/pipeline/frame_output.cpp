@@ -27,7 +27,8 @@ ordered_json number(double value) {
 }
 
 /// Mean over all pixels and channels, of values in [0, 1].
-double level_of(const cv::Mat& image) {
+double level_of(const Camera& camera, const cv::Mat& stored) {
+  const cv::Mat image = camera_values(camera, stored);
   const cv::Scalar mean = cv::mean(image);
   double sum = 0;
   for (int k = 0; k < image.channels(); ++k) sum += mean[k];
@@ -78,7 +79,8 @@ ordered_json camera_report(const Rig& rig, const Frame& frame, const PointResult
     report["curve_width_median_px"] = number(upper_median(std::move(widths)));
     report["curve_height_median"] = number(upper_median(std::move(heights)));
   }
-  if (!frame.images[c].empty()) report["image_level"] = number(level_of(frame.images[c]));
+  if (!frame.images[c].empty())
+    report["image_level"] = number(level_of(rig.cameras[c], frame.images[c]));
   if (frame.timing) {
     report["time_offset_us"] = number(frame.timing->offset_us[c]);
     report["late"] = static_cast<bool>(frame.timing->is_late[c]);
@@ -283,21 +285,21 @@ void write_frame_pictures(const std::filesystem::path& folder, const Rig& rig, c
   for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
     if (!frame.images[c].empty()) cameras.push_back(c);
   }
-  std::vector<Picture> overlays(2 * cameras.size());
-  parallel_for(overlays.size(), [&](std::size_t i) {
+  parallel_for(2 * cameras.size(), [&](std::size_t i) {
     const std::size_t c = cameras[i / 2];
     const OverlayKey key = i % 2 == 0 ? OverlayKey::kLocalId : OverlayKey::kProjector;
     OverlayOptions options;
     options.key_name = key == OverlayKey::kLocalId ? "local ID" : "projector";
     // Raw samples have no colours to draw on.
     const Camera& camera = rig.cameras[c];
-    const cv::Mat shown = camera.mosaic ? linear_light(camera, frame.images[c]) : frame.images[c];
-    overlays[i] = {
+    const cv::Mat shown = camera.mosaic ? linear_light(camera, frame.images[c])
+                                        : camera_values(camera, frame.images[c]);
+    const Picture overlay = {
         rig.cameras[c].name + (i % 2 == 0 ? "_local_id" : "_projector"),
         draw_overlay(shown, overlay_curves(rig, points.graphs[c], points.labeling.runs[c], key),
                      options)};
+    write_pictures(folder, {&overlay, 1});
   });
-  write_pictures(folder, overlays);
   FrameResults results{.rig = rig};
   results.points = points.points;
   results.used = shape.surface.used;

@@ -5,6 +5,7 @@
 #include <span>
 
 #include "pencilscan/core/parallel.h"
+#include "pencilscan/io/image.h"
 #include "pencilscan/pipeline/frame.h"
 #include "pencilscan/rig/camera_light.h"
 #include "pencilscan/rig/object_space.h"
@@ -17,24 +18,26 @@
 namespace pencilscan {
 namespace {
 
-/// What camera c sees, linear: the image as read where that is all that there is to it. `unmixing`:
-/// of an image with patterns.
-ColorView view_of(const Rig& rig, std::size_t c, const cv::Mat& values, const Unmixing* unmixing) {
+/// What camera c sees, linear: the image as stored where that is all that there is to it.
+/// `unmixing`: of an image with patterns.
+ColorView view_of(const Rig& rig, std::size_t c, const cv::Mat& stored, const Unmixing* unmixing) {
   const Camera& camera = rig.cameras[c];
+  const bool is_registered = !camera.color_registration.none();
   ColorView view;
   view.camera = static_cast<int>(c);
   view.is_plain = unmixing == nullptr;
-  view.image = linear_light(camera, values);
-  if (!camera.color_registration.none()) {  // colours are unmixed where the sensor has them
+  const bool is_linear = camera.gamma == 1 && camera.black_level == 0 && !camera.mosaic;
+  view.image = is_linear && !is_registered ? stored : linear_light(camera, stored);
+  if (is_registered) {  // colours are unmixed where the sensor has them
     view.image = unmixing != nullptr ? projector_light(camera, view.image, *unmixing)
                                      : registered(camera, view.image);
   } else if (unmixing != nullptr) {
     view.light_from_image = unmixing->projector_from_camera.cast<float>();
   }
-  if (view.image.data == values.data) {
+  if (view.image.data == stored.data) {
     view.full = kFullRange;
   } else {
-    view.image.setTo(cv::Scalar::all(std::nan("")), overexposed(values));
+    view.image.setTo(cv::Scalar::all(std::nan("")), overexposed(stored));
   }
   return view;
 }
@@ -73,7 +76,7 @@ cv::Mat light_of(const ColorView& view) {
   cv::Mat matrix;
   cv::eigen2cv(view.light_from_image, matrix);
   cv::Mat light;
-  cv::transform(view.image, light, matrix);
+  cv::transform(unit_image(view.image), light, matrix);
   if (std::isfinite(view.full)) light.setTo(cv::Scalar::all(std::nan("")), overexposed(view.image));
   return light;
 }

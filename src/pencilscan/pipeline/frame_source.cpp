@@ -60,9 +60,9 @@ struct FrameSource::Recorded : Storage {
     for (std::size_t c = 0; c < result.size(); ++c) {
       const auto at = row(frame, c);
       if (!at) continue;
-      const cv::Mat stored = recording.read(*at, *camera_of[c]);
-      if (stored.empty()) continue;
-      result[c] = camera_values(rig.cameras[c], stored, recording.picture_file(*at, *camera_of[c]));
+      result[c] = recording.read(*at, *camera_of[c]);
+      if (!result[c].empty())
+        check_channels(rig.cameras[c], result[c], recording.picture_file(*at, *camera_of[c]));
     }
     return result;
   }

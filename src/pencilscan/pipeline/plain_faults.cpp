@@ -4,6 +4,7 @@
 
 #include "pencilscan/core/median.h"
 #include "pencilscan/pipeline/picture_check.h"
+#include "pencilscan/rig/camera_light.h"
 
 namespace pencilscan {
 namespace {
@@ -82,8 +83,9 @@ std::vector<PictureFinding> plain_faults(const Rig& rig, const Frame& frame) {
     findings.push_back({fault, static_cast<int>(c), other});
   };
   for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
-    const cv::Mat& picture = frame.images[c];
-    if (picture.empty() || rig.cameras[c].sees_texture_only) continue;
+    const cv::Mat& stored = frame.images[c];
+    if (stored.empty() || rig.cameras[c].sees_texture_only) continue;
+    const cv::Mat picture = camera_values(rig.cameras[c], stored);
     if (is_black(picture)) {
       find(PictureFault::kBlack, c);
       continue;
@@ -94,7 +96,7 @@ std::vector<PictureFinding> plain_faults(const Rig& rig, const Frame& frame) {
     }
     // A copy of a picture says nothing of which camera took it: both are left out.
     for (std::size_t other = 0; other < c; ++other) {
-      if (frame.images[other].empty() || !is_same(picture, frame.images[other])) continue;
+      if (frame.images[other].empty() || !is_same(stored, frame.images[other])) continue;
       if (!faulty[other]) find(PictureFault::kRepeated, other, static_cast<int>(c));
       find(PictureFault::kRepeated, c, static_cast<int>(other));
       break;

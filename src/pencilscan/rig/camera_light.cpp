@@ -29,15 +29,14 @@ void check_size(const Camera& camera, int width, int height, const std::filesyst
 
 }  // namespace
 
-cv::Mat camera_values(const Camera& camera, const cv::Mat& stored,
-                      const std::filesystem::path& path) {
-  if (!camera.mosaic) return stored.type() == CV_32FC3 ? stored : unit_image(stored);
+void check_channels(const Camera& camera, const cv::Mat& stored,
+                    const std::filesystem::path& path) {
   check_channels(camera, stored.channels(), path);
-  return stored.type() == CV_32FC1 ? stored : unit_values(stored);
 }
 
 cv::Mat read_camera_image(const Camera& camera, const std::filesystem::path& path) {
-  const cv::Mat image = camera_values(camera, read_stored_image(path), path);
+  cv::Mat image = read_stored_image(path);
+  check_channels(camera, image, path);
   check_size(camera, image.cols, image.rows, path);
   return image;
 }
@@ -52,19 +51,28 @@ void check_camera_image(const Camera& camera, const std::filesystem::path& path)
   check_size(camera, shape->width, shape->height, path);
 }
 
-cv::Mat linear_light(const Camera& camera, const cv::Mat& values) {
-  PENCILSCAN_CHECK(values.type() == (camera.mosaic ? CV_32FC1 : CV_32FC3));
-  const cv::Mat linear = linearized(values, camera.gamma, camera.black_level);
+cv::Mat camera_values(const Camera& camera, const cv::Mat& stored) {
+  if (!camera.mosaic) return stored.type() == CV_32FC3 ? stored : unit_image(stored);
+  PENCILSCAN_CHECK(stored.channels() == 1);
+  return stored.type() == CV_32FC1 ? stored : unit_values(stored);
+}
+
+cv::Mat linear_light(const Camera& camera, const cv::Mat& stored) {
+  const cv::Mat linear =
+      linearized(camera_values(camera, stored), camera.gamma, camera.black_level);
   return camera.mosaic ? demosaiced(linear, *camera.mosaic) : linear;
 }
 
-cv::Mat overexposed(const cv::Mat& values) {
-  cv::Mat full(values.size(), CV_8UC1);
-  const int channels = values.channels();
-  for (int y = 0; y < values.rows; ++y) {
-    const float* in = values.ptr<float>(y);
+cv::Mat overexposed(const cv::Mat& stored) {
+  cv::Mat full(stored.size(), CV_8UC1);
+  const int channels = stored.channels();
+  cv::Mat values;
+  for (int y = 0; y < stored.rows; ++y) {
+    values = stored.row(y);
+    if (stored.depth() != CV_32F) values = unit_values(values);
+    const float* in = values.ptr<float>();
     auto* out = full.ptr<std::uint8_t>(y);
-    for (int x = 0; x < values.cols; ++x, in += channels) {
+    for (int x = 0; x < stored.cols; ++x, in += channels) {
       bool any = false;
       for (int k = 0; k < channels; ++k) any = any || in[k] >= kFullRange;
       out[x] = any ? 255 : 0;

@@ -22,8 +22,8 @@ struct ColorOptions {
 /// One camera's image as colour needs it.
 struct ColorView {
   int camera = 0;
-  /// CV_32FC3, linear, RGB of the camera; NaN or `full` and more where overexposed. It may share
-  /// its pixels with the image as read.
+  /// Linear, RGB of the camera, of any depth, one channel where all are alike; NaN or, in [0, 1],
+  /// `full` and more where overexposed. It may share its pixels with the image as stored.
   cv::Mat image;
   float full = std::numeric_limits<float>::infinity();
   /// Projector RGB of an image with patterns.

@@ -1,0 +1,41 @@
+#include "pencilscan/rig/camera_light.h"
+
+#include <gtest/gtest.h>
+
+#include "pencilscan/io/image.h"
+#include "pencilscan/rig/sample_devices.h"
+
+namespace pencilscan {
+namespace {
+
+/// Random samples, some of them at the top of the range.
+cv::Mat stored_image(int type, const cv::Size& size) {
+  cv::Mat image(size, type);
+  const double top = image.depth() == CV_8U ? 255 : 65535;
+  cv::RNG random(7);
+  random.fill(image, cv::RNG::UNIFORM, 0, 1.05 * top);  // cut at the top
+  return image;
+}
+
+class StoredImages : public testing::TestWithParam<int> {};
+
+TEST_P(StoredImages, AreLightLikeTheirValues) {
+  Camera camera = sample::small_rig(64, 48, 11).cameras.front();
+  camera.gamma = 2.2;
+  camera.black_level = 0.02;
+  if (CV_MAT_CN(GetParam()) == 1) camera.mosaic = Mosaic::from_name("RGGB");
+  const cv::Mat stored = stored_image(GetParam(), {camera.width, camera.height});
+  const cv::Mat values = camera_values(camera, stored);
+  EXPECT_EQ(values.depth(), CV_32F);
+  EXPECT_EQ(cv::norm(linear_light(camera, stored), linear_light(camera, values), cv::NORM_INF), 0);
+  const cv::Mat full = overexposed(stored);
+  EXPECT_GT(cv::countNonZero(full), 0);
+  EXPECT_LT(cv::countNonZero(full), static_cast<int>(full.total()));
+  EXPECT_EQ(cv::norm(full, overexposed(values), cv::NORM_INF), 0);
+}
+
+INSTANTIATE_TEST_SUITE_P(Types, StoredImages,
+                         testing::Values(CV_8UC3, CV_16UC3, CV_8UC1, CV_16UC1));
+
+}  // namespace
+}  // namespace pencilscan
