@@ -50,13 +50,15 @@ void add_lines(const Rig& rig, const CameraLight& light, const DepthMap& map, st
     const PatternView& view = light.patterns[k];
     bool ok = false;
     const WindowLines at = view.lines(m, jacobian, w, ok);
-    const double spacing = 1 / static_cast<double>(at.gradient(node.w, node.wx, node.wy).norm());
+    const Eigen::Vector2f slope = at.gradient(node.w, node.wx, node.wy);
+    const double spacing = 1 / static_cast<double>(slope.norm());
     if (!ok || !(spacing > kLeastBlurSpacingPx)) {
       lines.resize(before);
       return;
     }
     const Projector& projector = rig.projector(view.projector());
     blur.projector = view.projector();
+    blur.direction = static_cast<double>(std::atan2(slope[1], slope[0]));
     blur.px_per_line = spacing;
     // The plane omega . x = 1 moved by d along its normal: w changes by w d / (n . x).
     blur.px_per_length =

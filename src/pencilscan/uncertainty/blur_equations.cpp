@@ -13,6 +13,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
+constexpr Index kShared = 6;  // unknowns of the baseline that all devices share
 constexpr std::size_t kLeastOfPair = 30;
 constexpr double kLeastDeviationPx2 = 0.02;  // relief and unmixing: no window is surer than this
 constexpr double kHuber = 1.5;               // deviations
@@ -62,7 +63,7 @@ BlurColumns::BlurColumns(std::span<const LineBlur> lines)
   double square = 0;
   for (const LineBlur& line : lines) square += (line.point - pivot_).squaredNorm();
   reach_ = std::max(std::sqrt(square / static_cast<double>(lines.size())), 1e-9);
-  baseline_ = static_cast<Index>(2 * cameras_.size() + 2 * projectors_.size()) + 5;
+  baseline_ = static_cast<Index>(2 * cameras_.size() + 2 * projectors_.size()) + kShared;
 }
 
 void BlurColumns::row(std::size_t i, VectorXd& values) const {
@@ -77,8 +78,8 @@ void BlurColumns::row(std::size_t i, VectorXd& values) const {
   values[projector] = spacing2;
   values[projector + 1] = spacing2 * (line.projector_depth - projector_depth_) / reach_;
   const double g2 = line.px_per_length * line.px_per_length;
-  values.segment<5>(baseline_ - 5) << 1 / spacing2, 1 / (spacing2 * spacing2), g2,
-      line.camera_cosine, line.projector_cosine;
+  values.segment<kShared>(baseline_ - kShared) << 1 / spacing2, 1 / (spacing2 * spacing2), g2,
+      line.camera_cosine, line.projector_cosine, std::cos(4 * line.direction);
   Twist g;
   g << line.normal, (line.point - pivot_).cross(line.normal) / reach_;
   Products q = products(line.px_per_length * g);
@@ -130,22 +131,29 @@ BlurFit::BlurFit(std::span<const LineBlur> lines, double overlap) : lines_(lines
   weight_ /= overlap;
 }
 
-std::vector<BlurEquations> BlurFit::equations() const {
+MotionEquations BlurFit::equations() const {
   std::map<std::pair<int, int>, std::vector<Index>> members;
   for (std::size_t i = 0; i < lines_.size(); ++i)
     members[{lines_[i].camera, lines_[i].projector}].push_back(static_cast<Index>(i));
-  std::vector<BlurEquations> pairs;
+  std::array<std::map<int, BlurEquations>, 3> parts;
   BlurEquations all(columns_.count());
   for (const auto& [pair, rows] : members) {
     if (rows.size() < kLeastOfPair) continue;
-    pairs.push_back(sum(rows));
-    all += pairs.back();
+    const BlurEquations of_pair = sum(rows);
+    const std::array<int, 3> key = {static_cast<int>(parts[0].size()), pair.first, pair.second};
+    for (std::size_t kind = 0; kind < parts.size(); ++kind)
+      parts[kind].try_emplace(key[kind], columns_.count()).first->second += of_pair;
+    all += of_pair;
   }
-  std::vector<BlurEquations> result = {all.without_first(columns_.baseline())};
-  for (const BlurEquations& pair : pairs) {
-    BlurEquations rest = all;
-    rest -= pair;
-    result.push_back(rest.without_first(columns_.baseline()));
+  const Index baseline = columns_.baseline();
+  MotionEquations result = {all.without_first(baseline), parts[0].size(), {}};
+  for (std::size_t kind = 0; kind < parts.size(); ++kind) {
+    if (parts[kind].size() == 1) continue;
+    for (const auto& [key, part] : parts[kind]) {
+      BlurEquations rest = all;
+      rest -= part;
+      result.without[kind].push_back(rest.without_first(baseline));
+    }
   }
   return result;
 }

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
+#include <cstddef>
 #include <map>
 #include <span>
 #include <vector>
@@ -57,6 +59,15 @@ struct BlurEquations {
   [[nodiscard]] BlurEquations without_first(Eigen::Index n) const;
 };
 
+/// Equations of the products alone, the baseline eliminated.
+struct MotionEquations {
+  BlurEquations all;
+  std::size_t pairs = 0;  ///< of camera and projector
+  /// Without each pair, each camera and each projector: what they have in common may be no motion.
+  /// Nothing of a kind of which there is one.
+  std::array<std::vector<BlurEquations>, 3> without;
+};
+
 /// The variances of all lines over their deviations, with weights against outliers. `overlap`: how
 /// many windows see a pixel.
 class BlurFit {
@@ -65,8 +76,7 @@ class BlurFit {
 
   [[nodiscard]] const BlurColumns& columns() const { return columns_; }
 
-  /// Of the products alone: of all lines, then without each pair of camera and projector.
-  [[nodiscard]] std::vector<BlurEquations> equations() const;
+  [[nodiscard]] MotionEquations equations() const;
 
   /// Variances, px^2, that the baseline with this motion has.
   [[nodiscard]] std::vector<double> expected(const Twist& m) const;

@@ -12,11 +12,15 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 
-// Of sixteen frames of resting objects (docs/sequences.md) some reach a gain of 60, some eight
-// deviations of the jackknife, some 1 % of the blur; none reaches all of them.
-constexpr double kLeastGain = 30;        // of the squared deviations
-constexpr double kLeastDeviations = 8;   // by the jackknife, of the best of all directions
+// Of resting objects (docs/sequences.md) some frames reach gains of hundreds, some eight deviations
+// of a jackknife, some the errors of the baseline; of 84 before few devices two reach all of them,
+// both without any blur of a lens. Few pairs of camera and projector do not know their deviation:
+// chance makes as much of it once in a hundred thousand frames.
+constexpr double kLeastGain = 50;        // of the squared deviations
+constexpr double kLeastDeviations = 8;   // by the jackknives, of the best of all directions
+constexpr double kChance = 1e-5;         // of Student's t, as many degrees as pairs but one
 constexpr double kBaselineError = 0.01;  // share of the blur's variance
+constexpr double kPixelError = 0.05;     // share of a pixel's own: its shape is no Gaussian's
 constexpr std::size_t kLeastLines = 500;
 constexpr std::size_t kLeastPairs = 6;
 // Of the way: beside what profiles know of their noise, errors of bunny, cat and knot that go 2 to
@@ -135,13 +139,13 @@ double way_of(std::span<const LineBlur> lines, const BlurColumns& columns, const
 }
 
 /// Deviation of the length of `m` along itself, or of its part from `first` on, by leaving out one
-/// pair after the other.
-double jackknife(const std::vector<BlurEquations>& equations, const Twist& m, bool may_turn,
+/// part of the lines after the other.
+double jackknife(const std::vector<BlurEquations>& without, const Twist& m, bool may_turn,
                  Index first, Index count) {
   const auto along = m.segment(first, count).normalized();
   std::vector<double> lengths;
-  for (std::size_t k = 1; k < equations.size(); ++k) {
-    Twist other = best_motion(equations[k], m, may_turn);
+  for (const BlurEquations& rest : without) {
+    Twist other = best_motion(rest, m, may_turn);
     if (other.dot(m) < 0) other = -other;
     lengths.push_back(along.dot(other.segment(first, count)));
   }
@@ -153,6 +157,36 @@ double jackknife(const std::vector<BlurEquations>& equations, const Twist& m, bo
   return std::sqrt((n - 1) / n * square);
 }
 
+/// How often chance makes |t| larger (M. Abramowitz and I. Stegun, Handbook of Mathematical
+/// Functions, 1964, 26.7.3 and 26.7.4).
+double student_tail(double t, int degrees) {
+  const double angle = std::atan(t / std::sqrt(static_cast<double>(degrees)));
+  const double cosine2 = std::cos(angle) * std::cos(angle);
+  const bool is_odd = degrees % 2 == 1;
+  double term = is_odd ? std::cos(angle) : 1;
+  double sum = 0;
+  for (int k = is_odd ? 1 : 0; k + 1 < degrees; k += 2) {
+    sum += term;
+    term *= cosine2 * (k + 1) / (k + 2);
+  }
+  const double inside = std::sin(angle) * sum;
+  return 1 - (is_odd ? 2 / M_PI * (angle + inside) : inside);
+}
+
+/// Whether `m`, or its part from `first` on, is far beyond what any pair, camera or projector makes
+/// of it.
+bool is_beyond_doubt(const MotionEquations& equations, const Twist& m, bool may_turn, Index first,
+                     Index count) {
+  const double length = m.segment(first, count).norm();
+  const double deviation = jackknife(equations.without[0], m, may_turn, first, count);
+  if (student_tail(length / deviation, static_cast<int>(equations.pairs) - 1) > kChance)
+    return false;
+  return std::all_of(equations.without.begin(), equations.without.end(), [&](const auto& without) {
+    return without.empty() ||
+           length > kLeastDeviations * jackknife(without, m, may_turn, first, count);
+  });
+}
+
 }  // namespace
 
 ExposureMotion exposure_motion(std::span<const LineBlur> lines, double overlap, double unknown_px2,
@@ -160,10 +194,10 @@ ExposureMotion exposure_motion(std::span<const LineBlur> lines, double overlap, 
   ExposureMotion motion;
   if (lines.size() < kLeastLines) return motion;
   const BlurFit fit(lines, overlap);
-  const std::vector<BlurEquations> equations = fit.equations();
-  if (equations.size() < kLeastPairs + 1) return motion;
+  const MotionEquations equations = fit.equations();
+  if (equations.pairs < kLeastPairs) return motion;
   motion.is_judged = true;
-  const BlurEquations& all = equations.front();
+  const BlurEquations& all = equations.all;
   for (const Vec3& direction : directions()) {
     const auto [square, deviation] = square_along(all, direction);
     motion.at_most = std::max(motion.at_most, std::sqrt(std::max(0.0, square + 2 * deviation)));
@@ -171,23 +205,23 @@ ExposureMotion exposure_motion(std::span<const LineBlur> lines, double overlap, 
   // What an error of the baseline, a share of the blur, looks like.
   const double g = median_of(lines, &LineBlur::px_per_length);
   const double blur_px2 = std::max(0.0, median_of(lines, &LineBlur::variance_px2));
-  const double unsure =
-      std::sqrt(12 * (kBaselineError * blur_px2 + unknown_px2)) / std::max(std::abs(g), 1e-9);
+  const double unsure = std::sqrt(12 * (kBaselineError * blur_px2 + unknown_px2) + kPixelError) /
+                        std::max(std::abs(g), 1e-9);
   motion.at_most = std::hypot(motion.at_most, unsure);
   const BlurColumns& columns = fit.columns();
   Twist m = best_shift(all);
   bool may_turn = false;
   const Twist turned = best_with_turn(all, m, unsure);
   if (gain(all, turned) - gain(all, m) > kLeastGain &&
-      turned.tail<3>().norm() > kLeastDeviations * jackknife(equations, turned, true, 3, 3)) {
+      is_beyond_doubt(equations, turned, true, 3, 3)) {
     m = turned;
     may_turn = true;
   }
   motion.way = way_of(lines, columns, m);
-  const double deviation = jackknife(equations, m, may_turn, 0, kTwist);
+  const double deviation = jackknife(equations.without[0], m, may_turn, 0, kTwist);
   motion.way_deviation = m.isZero() ? 0 : deviation * motion.way / m.norm();
   motion.is_seen = gain(all, m) > kLeastGain && motion.way > unsure &&
-                   motion.way > kLeastDeviations * motion.way_deviation;
+                   is_beyond_doubt(equations, m, may_turn, 0, kTwist);
   if (expected != nullptr) *expected = fit.expected(m);
   if (!motion.is_seen) return motion;
   motion.at_most = std::max(motion.at_most, motion.way + 2 * motion.way_deviation);

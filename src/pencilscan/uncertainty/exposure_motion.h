@@ -19,8 +19,10 @@ namespace pencilscan {
 // turn w about p. What cameras, projectors and surface blur by themselves is a baseline, linear in
 // unknowns that have nothing of the direction of normals: per camera a constant and a slope in
 // depth (lens, its defocus), per projector the same times the squared px per line, and shared ones
-// of the line spacing (two powers), the cosines of incidence, and g^2 (relief within a window moves
-// lines whichever way it faces). So the variances of all lines give s s', s w' and w w': the sign
+// of the line spacing (two powers), the cosines of incidence, g^2 (relief within a window moves
+// lines whichever way it faces), and the cosine of four times the lines' direction: a pixel is a
+// square, whose fourth cumulant along a direction t is -(3 + cos 4t) / 480, and a Gaussian takes it
+// for variance. So the variances of all lines give s s', s w' and w w': the sign
 // of the motion stays unknown.
 
 /// How blurred the lines of one pattern are around one place of the surface. Lengths: any unit.
@@ -29,7 +31,8 @@ struct LineBlur {
   int projector = 0;
   Vec3 point = Vec3::Zero();
   Vec3 normal = Vec3::UnitZ();  ///< unit
-  double px_per_line = 1;       ///< spacing of the lines in the picture
+  double direction = 0;         ///< across the lines in the picture, rad from a row
+  double px_per_line = 1;       ///< their spacing there
   double px_per_length = 0;     ///< g
   double camera_cosine = 1;     ///< of the incidence
   double projector_cosine = 1;  ///< likewise

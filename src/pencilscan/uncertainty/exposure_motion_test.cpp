@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "pencilscan/core/random.h"
+#include "pencilscan/uncertainty/blur_equations.h"
 
 namespace pencilscan {
 namespace {
@@ -67,6 +68,43 @@ TEST(ExposureMotion, WhatRestsIsNotSeenToMove) {
     EXPECT_FALSE(motion.is_seen) << seed;
     EXPECT_LT(motion.at_most, 1.2) << seed;
   }
+}
+
+/// What a square pixel does to the width of lines, here where lines run as the surface turns.
+void add_pixel_shape(std::vector<LineBlur>& lines) {
+  for (LineBlur& line : lines) {
+    const double x2 = line.normal.x() * line.normal.x();
+    line.direction = std::acos(2 * x2 - 1) / 4;
+    line.variance_px2 += 0.05 * std::cos(4 * line.direction);
+  }
+}
+
+TEST(ExposureMotion, ThePixelsShapeIsNoMotion) {
+  constexpr double kLittle = 0.01;
+  for (const double shift : {0.0, 2.0}) {
+    std::vector<LineBlur> lines = lines_of(Vec3(shift, 0, 0), Vec3::Zero(), kLittle, 7);
+    add_pixel_shape(lines);
+    const ExposureMotion motion = exposure_motion(lines, 1);
+    EXPECT_EQ(motion.is_seen, shift > 0);
+    if (motion.is_seen) {
+      EXPECT_NEAR(motion.way, shift, 4 * motion.way_deviation + 0.1);
+    }
+  }
+}
+
+TEST(BlurFit, LeavesOutEachPairEachCameraAndEachProjector) {
+  std::vector<LineBlur> lines = lines_of(Vec3(2, 0, 0), Vec3::Zero(), kNoise, 8);
+  const MotionEquations ring = BlurFit(lines, 1).equations();
+  EXPECT_EQ(ring.pairs, 12U);
+  EXPECT_EQ(ring.without[0].size(), 12U);
+  EXPECT_EQ(ring.without[1].size(), 6U);
+  EXPECT_EQ(ring.without[2].size(), 6U);
+  // Less is known without a camera, which sees two of the pairs, than without one of them.
+  const double all = ring.all.S.trace();
+  EXPECT_LT(ring.without[1].front().S.trace(), ring.without[0].front().S.trace());
+  EXPECT_LT(ring.without[0].front().S.trace(), all);
+  std::erase_if(lines, [](const LineBlur& line) { return line.camera != 2; });
+  EXPECT_TRUE(BlurFit(lines, 1).equations().without[1].empty());
 }
 
 TEST(ExposureMotion, AShiftIsFoundWithItsDirection) {
