@@ -178,8 +178,9 @@ std::vector<MeasuredPoint> denied_places(const Rig& rig, const PointResult& poin
 void leave_unsupported(const Rig& rig, const PointResult& points, ShapeResult& result) {
   constexpr double kReach = 2;  // line spacings
   TriangleMesh& mesh = result.surface.mesh;
-  const std::vector<char> unsupported = unsupported_vertices(
-      mesh, points.points, denied_places(rig, points), kReach * line_spacing(rig));
+  const std::vector<char> unsupported =
+      unsupported_vertices(rig, mesh, result.depth.maps, points.points, denied_places(rig, points),
+                           kReach * line_spacing(rig));
   if (std::find(unsupported.begin(), unsupported.end(), 1) == unsupported.end()) return;
   contradict_vertices(mesh, unsupported, result.holes);
   for (std::size_t v = 0; v < unsupported.size(); ++v) {

@@ -9,38 +9,92 @@
 namespace pencilscan {
 namespace {
 
-std::vector<Vec3> places_of(std::span<const MeasuredPoint> points) {
-  constexpr std::size_t kEvery = 4;  // points follow each other by a pixel
-  std::vector<Vec3> places;
-  for (std::size_t i = 0; i < points.size(); i += kEvery) places.push_back(position_of(points[i]));
-  return places;
-}
+/// Some of the points, and whose camera saw each.
+class Places {
+ public:
+  Places(std::span<const MeasuredPoint> points, double cell)
+      : points_(some_of(points)), grid_(positions_of(points_), cell) {}
 
-/// Squared distance to the nearest place within `radius`; `none` where there is none below that.
-double nearest2(const PointGrid& grid, const Vec3& x, double radius, double none) {
-  double nearest = none;
-  grid.for_each_within(x, radius, [&](std::size_t, double d2) { nearest = std::min(nearest, d2); });
-  return nearest;
+  /// Squared distance to the nearest place within `radius` whose camera `is_faced`; `none` where
+  /// there is none below that.
+  [[nodiscard]] double nearest2(const Vec3& x, const std::vector<char>& is_faced, double radius,
+                                double none) const {
+    double nearest = none;
+    grid_.for_each_within(x, radius, [&](std::size_t k, double d2) {
+      if (d2 < nearest && is_faced[points_[k].camera] != 0) nearest = d2;
+    });
+    return nearest;
+  }
+
+ private:
+  static std::vector<MeasuredPoint> some_of(std::span<const MeasuredPoint> points) {
+    constexpr std::size_t kEvery = 4;  // points follow each other by a pixel
+    std::vector<MeasuredPoint> some;
+    for (std::size_t i = 0; i < points.size(); i += kEvery) some.push_back(points[i]);
+    return some;
+  }
+  static std::vector<Vec3> positions_of(std::span<const MeasuredPoint> points) {
+    std::vector<Vec3> places;
+    for (const MeasuredPoint& point : points) places.push_back(position_of(point));
+    return places;
+  }
+
+  std::vector<MeasuredPoint> points_;
+  PointGrid grid_;
+};
+
+/// The camera that alone has depth where a place is; -1 where none or several have.
+int only_camera(const Rig& rig, std::span<const DepthMap> maps, const Vec3& x) {
+  constexpr double kOff = 2;  // node spacings, along a ray that meets the surface at 60 degrees
+  int only = -1;
+  for (const DepthMap& map : maps) {
+    const Camera& camera = rig.camera(map.camera);
+    const auto pixel = camera.project(x);
+    if (!pixel || !camera.contains(*pixel)) continue;
+    const auto node = [&](double px) { return static_cast<int>(std::lround(px / map.stride)); };
+    const int row = std::min(node((*pixel)[1]), map.rows - 1);
+    const int column = std::min(node((*pixel)[0]), map.columns - 1);
+    const DepthNode& n = map.nodes[map.index(row, column)];
+    const double z = (camera.device_from_world * x).z();
+    const double off = kOff * map.stride * z / camera.focal_px();
+    if (!n.measured() || std::abs(1 / static_cast<double>(n.w) - z) > off) continue;
+    if (only >= 0) return -1;
+    only = map.camera;
+  }
+  return only;
 }
 
 }  // namespace
 
-std::vector<char> unsupported_vertices(const TriangleMesh& mesh,
+std::vector<char> unsupported_vertices(const Rig& rig, const TriangleMesh& mesh,
+                                       std::span<const DepthMap> maps,
                                        std::span<const MeasuredPoint> points,
                                        std::span<const MeasuredPoint> denied, double reach) {
-  const std::vector<Vec3> places = places_of(points);
-  const std::vector<Vec3> denied_places = places_of(denied);
   // Nearly every vertex has a point much nearer, which takes few looks to find.
-  const PointGrid grid(places, 0.25 * reach);
-  const PointGrid denied_grid(denied_places, 0.25 * reach);
+  const Places places(points, 0.25 * reach);
+  const Places denied_places(denied, 0.25 * reach);
+  const std::vector<Vec3> normals = vertex_normals(mesh);
+  const double far = reach * reach;
   std::vector<char> unsupported(mesh.vertices.size(), 0);
   parallel_chunks(mesh.vertices.size(), [&](std::size_t v) {
     const Vec3& x = mesh.vertices[v];
     if (!(mesh.confidence[v] > 0)) return;
-    const double far = reach * reach;
-    double nearest = nearest2(grid, x, 0.25 * reach, far);
-    if (nearest == far) nearest = nearest2(grid, x, reach, far);
-    if (nearest == far || nearest2(denied_grid, x, std::sqrt(nearest), nearest) < nearest)
+    thread_local std::vector<char> is_faced;
+    is_faced.clear();
+    for (const Camera& camera : rig.cameras)
+      is_faced.push_back(normals[v].dot(camera.center() - x) > 0 ? 1 : 0);
+    double nearest = places.nearest2(x, is_faced, 0.25 * reach, far);
+    if (nearest == far) nearest = places.nearest2(x, is_faced, reach, far);
+    bool is_supported = nearest < far;
+    if (is_supported && nearest > far / 16) {
+      const int only = only_camera(rig, maps, x);
+      if (only >= 0) {
+        std::vector<char> alone(is_faced.size(), 0);
+        alone[static_cast<std::size_t>(only)] = 1;
+        is_supported = places.nearest2(x, alone, 2 * reach, 4 * far) < 4 * far;
+      }
+    }
+    if (!is_supported || denied_places.nearest2(x, is_faced, std::sqrt(nearest), nearest) < nearest)
       unsupported[v] = 1;
   });
   return unsupported;
