@@ -26,14 +26,21 @@ cv::Mat ramp(int width, int height) {
   return image;
 }
 
-/// A ball before cameras with `n` times the pixels along a row.
+/// Cameras with `n` times the pixels along a row.
+Rig fine_rig(int n) {
+  Rig rig = sample::small_rig(480, 360, 110);
+  for (Camera& camera : rig.cameras) {
+    camera.K.topRows<2>() *= n;
+    camera.width = (camera.width - 1) * n + 1;
+    camera.height = (camera.height - 1) * n + 1;
+  }
+  return rig;
+}
+
 struct Scene {
-  explicit Scene(int n) : rig(sample::small_rig(480, 360, 110)) {
-    for (Camera& camera : rig.cameras) {
-      camera.K.topRows<2>() *= n;
-      camera.width = (camera.width - 1) * n + 1;
-      camera.height = (camera.height - 1) * n + 1;
-    }
+  explicit Scene(const Rig& fine) : rig(fine) {}
+  /// A ball before such cameras.
+  explicit Scene(int n) : rig(fine_rig(n)) {
     const SimulatedObject object(make_sphere(kBall, 96));
     const auto lights = line_lights(rig);
     for (std::size_t c = 0; c < rig.cameras.size(); ++c)
@@ -58,8 +65,9 @@ double distance_median(const FrameResult& result) {
 }
 
 TEST(CoarseView, MosaicsAndOverexposedPixelsAreJoinedAsTheyAre) {
-  Scene scene(4);
-  scene.frame.images.front() = ramp(scene.rig.cameras[0].width, scene.rig.cameras[0].height) / 50;
+  Scene scene(fine_rig(4));
+  const Camera& camera = scene.rig.cameras.front();
+  scene.frame.images.assign(2, ramp(camera.width, camera.height) / 50);
   scene.frame.images.front().at<cv::Vec3f>(48, 96)[1] = 1;
   FrameOptions options;
   options.joined_pixels = 4;
