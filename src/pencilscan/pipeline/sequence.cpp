@@ -245,7 +245,8 @@ std::vector<FrameOutcome> make_frames(const Run& run, const std::vector<std::siz
 }  // namespace
 
 std::size_t frames_at_once(const Rig& rig) {
-  // .45 GB for six pictures of 1280 x 960 (docs/performance.md), two thirds more for cluttered ones.
+  // .45 GB for six pictures of 1280 x 960 (docs/performance.md), two thirds more for cluttered
+  // ones.
   constexpr double kBytesPerPixel = 100;
   double pixels = 0;
   for (const Camera& camera : rig.cameras)
