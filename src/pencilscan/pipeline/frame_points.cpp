@@ -91,6 +91,7 @@ FrameResult match_on_surface(const Rig& rig, FrameResult result, const PointOpti
   GuidedMatchingOptions guided = options.guided;
   if (guided.passes > 0) guided.passes = guided.passes_on_surface;
   clock("guided matching on the surface", [&] {
+    points.points = {};  // made anew
     points.contradicted = drop_contradicted(rig, *shape.scene, points.graphs, points.labeling);
     const std::vector<LocalSurface> surfaces =
         match_guided(rig, points.families, presence_images(points.detections), points.graphs,
