@@ -9,11 +9,19 @@
 namespace pencilscan {
 namespace {
 
-/// Some of the points, and whose camera saw each.
+constexpr std::size_t kEvery = 4;  // points follow each other by a pixel
+
+std::vector<Vec3> places_of(std::span<const MeasuredPoint> points) {
+  std::vector<Vec3> places;
+  for (std::size_t i = 0; i < points.size(); i += kEvery) places.push_back(position_of(points[i]));
+  return places;
+}
+
+/// Places of some of the points, and whose camera saw each.
 class Places {
  public:
   Places(std::span<const MeasuredPoint> points, double cell)
-      : points_(some_of(points)), grid_(positions_of(points_), cell) {}
+      : points_(points), grid_(places_of(points), cell) {}
 
   /// Squared distance to the nearest place within `radius` whose camera `is_faced`; `none` where
   /// there is none below that.
@@ -21,25 +29,13 @@ class Places {
                                 double none) const {
     double nearest = none;
     grid_.for_each_within(x, radius, [&](std::size_t k, double d2) {
-      if (d2 < nearest && is_faced[points_[k].camera] != 0) nearest = d2;
+      if (d2 < nearest && is_faced[points_[kEvery * k].camera] != 0) nearest = d2;
     });
     return nearest;
   }
 
  private:
-  static std::vector<MeasuredPoint> some_of(std::span<const MeasuredPoint> points) {
-    constexpr std::size_t kEvery = 4;  // points follow each other by a pixel
-    std::vector<MeasuredPoint> some;
-    for (std::size_t i = 0; i < points.size(); i += kEvery) some.push_back(points[i]);
-    return some;
-  }
-  static std::vector<Vec3> positions_of(std::span<const MeasuredPoint> points) {
-    std::vector<Vec3> places;
-    for (const MeasuredPoint& point : points) places.push_back(position_of(point));
-    return places;
-  }
-
-  std::vector<MeasuredPoint> points_;
+  std::span<const MeasuredPoint> points_;
   PointGrid grid_;
 };
 
@@ -71,8 +67,9 @@ std::vector<char> unsupported_vertices(const Rig& rig, const TriangleMesh& mesh,
                                        std::span<const MeasuredPoint> points,
                                        std::span<const MeasuredPoint> denied, double reach) {
   // Nearly every vertex has a point much nearer, which takes few looks to find.
-  const Places places(points, 0.25 * reach);
-  const Places denied_places(denied, 0.25 * reach);
+  const double near = 0.25 * reach;
+  const Places places(points, near);
+  const Places denied_places(denied, near);
   const std::vector<Vec3> normals = vertex_normals(mesh);
   const double far = reach * reach;
   std::vector<char> unsupported(mesh.vertices.size(), 0);
@@ -83,10 +80,10 @@ std::vector<char> unsupported_vertices(const Rig& rig, const TriangleMesh& mesh,
     is_faced.clear();
     for (const Camera& camera : rig.cameras)
       is_faced.push_back(normals[v].dot(camera.center() - x) > 0 ? 1 : 0);
-    double nearest = places.nearest2(x, is_faced, 0.25 * reach, far);
+    double nearest = places.nearest2(x, is_faced, near, far);
     if (nearest == far) nearest = places.nearest2(x, is_faced, reach, far);
     bool is_supported = nearest < far;
-    if (is_supported && nearest > far / 16) {
+    if (is_supported && nearest > near * near) {
       const int only = only_camera(rig, maps, x);
       if (only >= 0) {
         std::vector<char> alone(is_faced.size(), 0);
