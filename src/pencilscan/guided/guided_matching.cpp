@@ -48,9 +48,9 @@ struct NamedPlace {
 class CameraMatching {
  public:
   CameraMatching(const Rig& rig, const std::vector<ColorFamily>& families,
-                 const std::vector<cv::Mat>& presence, GridGraph& graph,
-                 std::vector<LabeledRun>& runs, std::span<const LabeledRun> tentative,
-                 const GuidedMatchingOptions& options, std::span<const MeasuredPoint> dense);
+                 std::vector<cv::Mat> presence, GridGraph& graph, std::vector<LabeledRun>& runs,
+                 std::span<const LabeledRun> tentative, const GuidedMatchingOptions& options,
+                 std::span<const MeasuredPoint> dense);
 
   /// Predicts all lines on the surface of what is labelled; keeps those that no labelled point
   /// shows.
@@ -116,7 +116,7 @@ class CameraMatching {
 };
 
 CameraMatching::CameraMatching(const Rig& rig, const std::vector<ColorFamily>& families,
-                               const std::vector<cv::Mat>& presence, GridGraph& graph,
+                               std::vector<cv::Mat> presence, GridGraph& graph,
                                std::vector<LabeledRun>& runs, std::span<const LabeledRun> tentative,
                                const GuidedMatchingOptions& options,
                                std::span<const MeasuredPoint> dense)
@@ -138,7 +138,8 @@ CameraMatching::CameraMatching(const Rig& rig, const std::vector<ColorFamily>& f
     }
   }
   for (std::size_t f = 0; f < presence.size(); ++f) {
-    cv::Mat rest = presence[f].clone();
+    cv::Mat rest = std::move(presence[f]);
+    if (rest.u == nullptr || rest.u->refcount > 1) rest = rest.clone();
     for (const Curve& curve : graph.curves) {
       if (curve.family == static_cast<int>(f)) subtract_curve(curve, rest);
     }
@@ -458,7 +459,7 @@ void CameraMatching::find_missing() {
 }  // namespace
 
 std::vector<LocalSurface> match_guided(const Rig& rig, const std::vector<ColorFamily>& families,
-                                       std::span<const std::vector<cv::Mat>> presence,
+                                       std::vector<std::vector<cv::Mat>> presence,
                                        std::span<GridGraph> graphs, Labeling& labeling,
                                        const GuidedMatchingOptions& options,
                                        std::span<const MeasuredPoint> dense) {
@@ -467,7 +468,7 @@ std::vector<LocalSurface> match_guided(const Rig& rig, const std::vector<ColorFa
   labeling.undecided.resize(labeling.runs.size());
   parallel_for(graphs.size(), [&](std::size_t g) {
     const auto camera = static_cast<std::size_t>(graphs[g].camera);
-    CameraMatching look(rig, families, presence[g], graphs[g], labeling.runs[camera],
+    CameraMatching look(rig, families, std::move(presence[g]), graphs[g], labeling.runs[camera],
                         labeling.tentative[camera], options, dense);
     for (int pass = 0; pass < options.passes; ++pass) {
       look.predict();

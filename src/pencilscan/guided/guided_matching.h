@@ -40,10 +40,10 @@ struct GuidedMatchingOptions {
 ///      that remains once the known curves are subtracted.
 /// New curves are appended to `graphs`, new runs to `labeling`. The function returns, per graph,
 /// the surface that all labelled points show. `presence`: the presence image of each graph and
-/// colour family, CV_32FC1, of the whole camera image. `dense`: more points of the surface, of all
-/// cameras; their projector, pattern and line are not read.
+/// colour family, CV_32FC1, of the whole camera image; what nobody else holds is used up. `dense`:
+/// more points of the surface, of all cameras; their projector, pattern and line are not read.
 std::vector<LocalSurface> match_guided(const Rig& rig, const std::vector<ColorFamily>& families,
-                                       std::span<const std::vector<cv::Mat>> presence,
+                                       std::vector<std::vector<cv::Mat>> presence,
                                        std::span<GridGraph> graphs, Labeling& labeling,
                                        const GuidedMatchingOptions& options = {},
                                        std::span<const MeasuredPoint> dense = {});

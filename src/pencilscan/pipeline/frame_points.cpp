@@ -42,6 +42,14 @@ std::vector<MeasuredPoint> dense_points(const Rig& rig, std::span<const DepthMap
   return points;
 }
 
+/// The presence images, which nobody looks at any more.
+std::vector<std::vector<cv::Mat>> taken_presence(std::span<CameraDetection> detections) {
+  std::vector<std::vector<cv::Mat>> presence;
+  for (CameraDetection& detection : detections)
+    presence.push_back(std::exchange(detection.presence, {}));
+  return presence;
+}
+
 }  // namespace
 
 PointOptions before_surface(PointOptions options) {
@@ -94,7 +102,7 @@ FrameResult match_on_surface(const Rig& rig, FrameResult result, const PointOpti
     points.points = {};  // made anew
     points.contradicted = drop_contradicted(rig, *shape.scene, points.graphs, points.labeling);
     const std::vector<LocalSurface> surfaces =
-        match_guided(rig, points.families, presence_images(points.detections), points.graphs,
+        match_guided(rig, points.families, taken_presence(points.detections), points.graphs,
                      points.labeling, guided, dense_points(rig, shape.depth.maps));
     std::vector<MeasuredPoint> triangulated =
         triangulate(rig, points.graphs, points.labeling, options.triangulation);
