@@ -92,9 +92,8 @@ def way_found(scene, result):
     return RADIUS / rig["volume"]["radius"] * motion["way_mm"] if motion.get("seen") else 0.0
 
 
-def print_summary(rows):
-    print("\n| of the frames | median | worst of ten | worst |")
-    print("|---|---|---|---|")
+def print_summary(path, rows):
+    table = []
     for key, title, sign in (("label_error", "label error, share", 1), ("line_recall", "line recall", -1),
                              ("distance_median_mm", "points: median, mm", 1),
                              ("share_above_2mm", "points beyond 2 mm, share", 1),
@@ -103,9 +102,10 @@ def print_summary(rows):
                              ("completeness_1mm", "complete at 1 mm", -1)):
         values = np.sort([sign * float(row[key]) for row in rows if row[key] != ""])
         picked = sign * values[[len(values) // 2, len(values) * 9 // 10, -1]]
-        print(f"| {title} | " + " | ".join(f"{v:.4f}" for v in picked) + " |")
+        table.append([title, *(f"{v:.4f}" for v in picked)])
+    common.print_table(path, f"{len(rows)} rigs drawn at random", ["of the frames", "median", "worst of ten", "worst"], table)
     below = np.sort([float(row["sigma_below_1"]) for row in rows if row["sigma_below_1"] != ""])
-    print(f"\npoints below one sigma: {below[len(below) // 2]:.2f} ({below[0]:.2f} to {below[-1]:.2f})")
+    print(f"points below one sigma: {below[len(below) // 2]:.2f} ({below[0]:.2f} to {below[-1]:.2f})")
     ways = np.array([[float(row["way_mm"]), float(row["found_way_mm"])] for row in rows])
     rests, seen = ways[:, 0] == 0, ways[:, 1] > 0
     print(f"at rest: {rests.sum()}, said to move: {(rests & seen).sum()}; moving: {(~rests).sum()}, seen: {(~rests & seen).sum()}")
@@ -133,7 +133,7 @@ def main():
                  found_way_mm=way_found(scene, folder / "made/result"))
         shutil.rmtree(folder / "made")
         print(" ".join(f"{key} {value}" for key, value in shown.items()))
-    print_summary(rows.rows)
+    print_summary(args.out / "table.md", rows.rows)
 
 
 if __name__ == "__main__":

@@ -36,7 +36,7 @@ std::vector<cv::Mat> camera_images(const Rig& rig, const Images& images) {
     if (stored.depth() == CV_32F && !cv::checkRange(stored, true, nullptr, -1, 2)) {
       throw InputError("images", camera.name, "", "float pixels must be finite and lie in [0, 1]");
     }
-    check_channels(camera, stored, "images");
+    check_channels(camera, stored.channels(), "images");
     result[c] = stored;
   }
   if (known == images.size()) return result;

@@ -84,7 +84,7 @@ CapturePair capture_pair(const fs::path& folder, const Projector& projector) {
 
 cv::Mat read_color_image(const fs::path& path, const Camera& camera) {
   const cv::Mat stored = read_stored_image(path);
-  check_channels(camera, stored, path);
+  check_channels(camera, stored.channels(), path);
   cv::Mat color = camera_values(camera, stored);
   if (color.cols != camera.width || color.rows != camera.height) {
     throw InputError(path.string(), "size",

@@ -26,15 +26,16 @@ ColorView view_of(const Rig& rig, std::size_t c, const cv::Mat& stored, const Un
   ColorView view;
   view.camera = static_cast<int>(c);
   view.is_plain = unmixing == nullptr;
-  const bool is_linear = camera.gamma == 1 && camera.black_level == 0 && !camera.mosaic;
-  view.image = is_linear && !is_registered ? stored : linear_light(camera, stored);
+  const bool is_as_stored =
+      camera.gamma == 1 && camera.black_level == 0 && !camera.mosaic && !is_registered;
+  view.image = is_as_stored ? stored : linear_light(camera, stored);
   if (is_registered) {  // colours are unmixed where the sensor has them
     view.image = unmixing != nullptr ? projector_light(camera, view.image, *unmixing)
                                      : registered(camera, view.image);
   } else if (unmixing != nullptr) {
     view.light_from_image = unmixing->projector_from_camera.cast<float>();
   }
-  if (view.image.data == stored.data) {
+  if (is_as_stored) {
     view.full = kFullRange;
   } else {
     view.image.setTo(cv::Scalar::all(std::nan("")), overexposed(stored));

@@ -62,7 +62,8 @@ struct FrameSource::Recorded : Storage {
       if (!at) continue;
       result[c] = recording.read(*at, *camera_of[c]);
       if (!result[c].empty())
-        check_channels(rig.cameras[c], result[c], recording.picture_file(*at, *camera_of[c]));
+        check_channels(rig.cameras[c], result[c].channels(),
+                       recording.picture_file(*at, *camera_of[c]));
     }
     return result;
   }

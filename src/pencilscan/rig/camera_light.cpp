@@ -12,13 +12,6 @@
 namespace pencilscan {
 namespace {
 
-void check_channels(const Camera& camera, int channels, const std::filesystem::path& path) {
-  if (camera.mosaic && channels != 1) {
-    throw InputError(path.string(), "channels", std::to_string(channels),
-                     "must be 1: camera " + camera.name + " of the rig has a mosaic");
-  }
-}
-
 void check_size(const Camera& camera, int width, int height, const std::filesystem::path& path) {
   if (width == camera.width && height == camera.height) return;
   throw InputError(path.string(), "image size",
@@ -29,14 +22,16 @@ void check_size(const Camera& camera, int width, int height, const std::filesyst
 
 }  // namespace
 
-void check_channels(const Camera& camera, const cv::Mat& stored,
-                    const std::filesystem::path& path) {
-  check_channels(camera, stored.channels(), path);
+void check_channels(const Camera& camera, int channels, const std::filesystem::path& path) {
+  if (camera.mosaic && channels != 1) {
+    throw InputError(path.string(), "channels", std::to_string(channels),
+                     "must be 1: camera " + camera.name + " of the rig has a mosaic");
+  }
 }
 
 cv::Mat read_camera_image(const Camera& camera, const std::filesystem::path& path) {
   cv::Mat image = read_stored_image(path);
-  check_channels(camera, image, path);
+  check_channels(camera, image.channels(), path);
   check_size(camera, image.cols, image.rows, path);
   return image;
 }

@@ -9,9 +9,8 @@ namespace pencilscan {
 
 // An image stays as the sensor gave it, a byte or two a sample, as long as possible.
 
-/// InputError, named by `path`, when an image as stored has three channels, and its camera a
-/// mosaic.
-void check_channels(const Camera& camera, const cv::Mat& stored, const std::filesystem::path& path);
+/// InputError, named by `path`, when an image of a camera with a mosaic has three channels.
+void check_channels(const Camera& camera, int channels, const std::filesystem::path& path);
 /// The image of a file as read_stored_image() has it; InputError when it has other channels or
 /// another size than the camera.
 [[nodiscard]] cv::Mat read_camera_image(const Camera& camera, const std::filesystem::path& path);

@@ -2,6 +2,7 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "pencilscan/uncertainty/blur_equations.h"
@@ -139,9 +140,10 @@ double way_of(std::span<const LineBlur> lines, const BlurColumns& columns, const
 }
 
 /// Deviation of the length of `m` along itself, or of its part from `first` on, by leaving out one
-/// part of the lines after the other.
+/// part of the lines after the other; 0 where there are none to leave out.
 double jackknife(const std::vector<BlurEquations>& without, const Twist& m, bool may_turn,
                  Index first, Index count) {
+  if (without.empty()) return 0;
   const auto along = m.segment(first, count).normalized();
   std::vector<double> lengths;
   for (const BlurEquations& rest : without) {
@@ -173,18 +175,21 @@ double student_tail(double t, int degrees) {
   return 1 - (is_odd ? 2 / M_PI * (angle + inside) : inside);
 }
 
-/// Whether `m`, or its part from `first` on, is far beyond what any pair, camera or projector makes
-/// of it.
-bool is_beyond_doubt(const MotionEquations& equations, const Twist& m, bool may_turn, Index first,
-                     Index count) {
-  const double length = m.segment(first, count).norm();
-  const double deviation = jackknife(equations.without[0], m, may_turn, first, count);
-  if (student_tail(length / deviation, static_cast<int>(equations.pairs) - 1) > kChance)
-    return false;
-  return std::all_of(equations.without.begin(), equations.without.end(), [&](const auto& without) {
-    return without.empty() ||
-           length > kLeastDeviations * jackknife(without, m, may_turn, first, count);
-  });
+/// Deviations of a length, by pairs, cameras and projectors.
+using Deviations = std::array<double, 3>;
+
+Deviations deviations_of(const MotionEquations& equations, const Twist& m, bool may_turn,
+                         Index first, Index count) {
+  Deviations result;
+  for (std::size_t kind = 0; kind < result.size(); ++kind)
+    result[kind] = jackknife(equations.without[kind], m, may_turn, first, count);
+  return result;
+}
+
+/// Whether a length is far beyond what any pair, camera or projector makes of it.
+bool is_beyond_doubt(double length, const Deviations& deviations, std::size_t pairs) {
+  return student_tail(length / deviations[0], static_cast<int>(pairs) - 1) <= kChance &&
+         length > kLeastDeviations * *std::max_element(deviations.begin(), deviations.end());
 }
 
 }  // namespace
@@ -213,15 +218,16 @@ ExposureMotion exposure_motion(std::span<const LineBlur> lines, double overlap, 
   bool may_turn = false;
   const Twist turned = best_with_turn(all, m, unsure);
   if (gain(all, turned) - gain(all, m) > kLeastGain &&
-      is_beyond_doubt(equations, turned, true, 3, 3)) {
+      is_beyond_doubt(turned.tail<3>().norm(), deviations_of(equations, turned, true, 3, 3),
+                      equations.pairs)) {
     m = turned;
     may_turn = true;
   }
   motion.way = way_of(lines, columns, m);
-  const double deviation = jackknife(equations.without[0], m, may_turn, 0, kTwist);
-  motion.way_deviation = m.isZero() ? 0 : deviation * motion.way / m.norm();
+  const Deviations deviations = deviations_of(equations, m, may_turn, 0, kTwist);
+  motion.way_deviation = m.isZero() ? 0 : deviations[0] * motion.way / m.norm();
   motion.is_seen = gain(all, m) > kLeastGain && motion.way > unsure &&
-                   is_beyond_doubt(equations, m, may_turn, 0, kTwist);
+                   is_beyond_doubt(m.norm(), deviations, equations.pairs);
   if (expected != nullptr) *expected = fit.expected(m);
   if (!motion.is_seen) return motion;
   motion.at_most = std::max(motion.at_most, motion.way + 2 * motion.way_deviation);

@@ -61,9 +61,9 @@ struct ExposureMotion {
 /// >= 1, as which they count once. `unknown_px2`: variance that pictures may have along some of
 /// their directions beyond the baseline. `expected`, if given, becomes the variance that the fit
 /// has at each place. Motion counts as seen where it makes the fit better than chance does, is
-/// several deviations long by a jackknife over pairs of camera and projector, and adds more than a
-/// share of the blur itself, as which the baseline is not believed. A turn is taken in where it is
-/// needed.
+/// several deviations long by jackknives over pairs of camera and projector, over cameras and over
+/// projectors, and adds more than a share of the blur itself, as which the baseline is not
+/// believed. A turn is taken in where it is needed.
 [[nodiscard]] ExposureMotion exposure_motion(std::span<const LineBlur> lines, double overlap,
                                              double unknown_px2 = 0,
                                              std::vector<double>* expected = nullptr);
