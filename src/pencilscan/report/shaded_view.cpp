@@ -15,7 +15,15 @@ namespace {
 
 using Color3 = Eigen::Vector3d;  // linear light
 
-double linear(uchar value) { return std::pow(value / 255.0, 2.2); }
+double linear(uchar value) {
+  static const auto table = [] {
+    std::array<double, 256> light{};
+    for (std::size_t i = 0; i < light.size(); ++i)
+      light[i] = std::pow(static_cast<double>(i) / 255.0, 2.2);
+    return light;
+  }();
+  return table[value];
+}
 uchar encoded(double value) {
   return static_cast<uchar>(std::lround(255 * std::pow(std::clamp(value, 0.0, 1.0), 1 / 2.2)));
 }
@@ -37,28 +45,77 @@ std::vector<Vec3> sphere_directions(int count) {
   return directions;
 }
 
-std::vector<float> ambient_openness(const RayScene& scene, const std::vector<Vec3>& normals,
-                                    int rays) {
-  const TriangleMesh& mesh = scene.mesh();
-  std::vector<float> openness(mesh.vertices.size(), 1.0F);
-  if (rays <= 0 || mesh.faces.empty()) return openness;
-  const std::vector<Vec3> directions = sphere_directions(2 * rays);
-  const BoundingBox box = bounding_box(mesh);
-  const double reach = 0.25 * (box.high - box.low).norm();
-  const double lift = 1e-3 * reach;
-  parallel_for(mesh.vertices.size(), [&](std::size_t v) {
+/// Shares of the hemispheres above vertices that nothing within a quarter of the mesh blocks, by
+/// rays.
+class Openness {
+ public:
+  Openness(const RayScene& scene, const std::vector<Vec3>& normals, int rays)
+      : scene_(scene), normals_(normals), directions_(sphere_directions(2 * rays)) {
+    const BoundingBox box = bounding_box(scene.mesh());
+    reach_ = 0.25 * (box.high - box.low).norm();
+  }
+
+  [[nodiscard]] float operator()(std::size_t vertex) const {
+    const Vec3& normal = normals_[vertex];
+    const Vec3 from = scene_.mesh().vertices[vertex] + 1e-3 * reach_ * normal;
     double free = 0;
     double all = 0;
-    const Vec3 from = mesh.vertices[v] + lift * normals[v];
-    for (const Vec3& d : directions) {
-      const double cosine = d.dot(normals[v]);
+    for (const Vec3& d : directions_) {
+      const double cosine = d.dot(normal);
       if (cosine <= 0.05) continue;
       all += cosine;
-      if (!scene.first_hit({from, d}, reach)) free += cosine;
+      if (scene_.visible(from, from + reach_ * d, 0)) free += cosine;
     }
-    openness[v] = all > 0 ? static_cast<float>(free / all) : 1.0F;
+    return all > 0 ? static_cast<float>(free / all) : 1.0F;
+  }
+
+ private:
+  const RayScene& scene_;
+  const std::vector<Vec3>& normals_;
+  std::vector<Vec3> directions_;
+  double reach_ = 0;
+};
+
+/// Gives each vertex the mean of its neighbours that have a value (>= 0); with `all`, of itself
+/// too.
+void spread(const TriangleMesh& mesh, bool all, std::vector<float>& values) {
+  std::vector<float> sums(values.size(), 0.0F);
+  std::vector<float> counts(values.size(), 0.0F);
+  for (const auto& face : mesh.faces) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      const auto to = static_cast<std::size_t>(face[k]);
+      if (!all && values[to] >= 0) continue;
+      for (const int from : face) {
+        const float value = values[static_cast<std::size_t>(from)];
+        if (value < 0) continue;
+        sums[to] += value;
+        counts[to] += 1;
+      }
+    }
+  }
+  for (std::size_t v = 0; v < values.size(); ++v) {
+    if (counts[v] > 0) values[v] = sums[v] / counts[v];
+  }
+}
+
+/// Openness of every vertex. It varies slowly: rays start from every eighth vertex, and the others
+/// take the means of their neighbours.
+std::vector<float> ambient_openness(const RayScene& scene, const std::vector<Vec3>& normals,
+                                    int rays) {
+  constexpr std::size_t kStep = 8;
+  constexpr int kRounds = 3;
+  const TriangleMesh& mesh = scene.mesh();
+  if (rays <= 0 || mesh.faces.empty()) return std::vector<float>(mesh.vertices.size(), 1.0F);
+  std::vector<float> values(mesh.vertices.size(), -1.0F);
+  const Openness openness(scene, normals, rays);
+  parallel_for((values.size() + kStep - 1) / kStep,
+               [&](std::size_t i) { values[kStep * i] = openness(kStep * i); });
+  for (int round = 0; round < kRounds; ++round) spread(mesh, false, values);
+  parallel_for(values.size(), [&](std::size_t v) {
+    if (values[v] < 0) values[v] = openness(v);
   });
-  return openness;
+  spread(mesh, true, values);
+  return values;
 }
 
 /// A key light from the upper left of the view, a weak fill from the right, a sky above.
