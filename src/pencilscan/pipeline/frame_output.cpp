@@ -285,20 +285,24 @@ void write_frame_pictures(const std::filesystem::path& folder, const Rig& rig, c
   for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
     if (!frame.images[c].empty()) cameras.push_back(c);
   }
-  parallel_for(2 * cameras.size(), [&](std::size_t i) {
-    const std::size_t c = cameras[i / 2];
-    const OverlayKey key = i % 2 == 0 ? OverlayKey::kLocalId : OverlayKey::kProjector;
-    OverlayOptions options;
-    options.key_name = key == OverlayKey::kLocalId ? "local ID" : "projector";
-    // Raw samples have no colours to draw on.
+  parallel_for(cameras.size(), [&](std::size_t i) {
+    const std::size_t c = cameras[i];
     const Camera& camera = rig.cameras[c];
-    const cv::Mat shown = camera.mosaic ? linear_light(camera, frame.images[c])
-                                        : camera_values(camera, frame.images[c]);
-    const Picture overlay = {
-        rig.cameras[c].name + (i % 2 == 0 ? "_local_id" : "_projector"),
-        draw_overlay(shown, overlay_curves(rig, points.graphs[c], points.labeling.runs[c], key),
-                     options)};
-    write_pictures(folder, {&overlay, 1});
+    // Raw samples have no colours to draw on.
+    const cv::Mat ground = displayable(camera.mosaic ? linear_light(camera, frame.images[c])
+                                                     : camera_values(camera, frame.images[c]));
+    const auto write_overlay = [&](OverlayKey key, const std::string& name,
+                                   const std::string& ending) {
+      OverlayOptions options;
+      options.key_name = name;
+      const Picture overlay = {
+          camera.name + ending,
+          draw_overlay(ground, overlay_curves(rig, points.graphs[c], points.labeling.runs[c], key),
+                       options)};
+      write_pictures(folder, {&overlay, 1});
+    };
+    write_overlay(OverlayKey::kLocalId, "local ID", "_local_id");
+    write_overlay(OverlayKey::kProjector, "projector", "_projector");
   });
   FrameResults results{.rig = rig};
   results.points = points.points;

@@ -66,11 +66,11 @@ void add_point_sheet(const FrameResults& results, const PictureOptions& options,
   }
   if (points.empty()) return;
   const Sphere scene = sphere_around(robust_box(points));
-  std::vector<cv::Mat> views;
-  for (const Side& side : six_sides()) {
-    const Device view = make_view(scene, side.direction, options.width, options.height);
-    views.push_back(point_view(points, colors, view, 0.0022 * scene.radius));
-  }
+  std::vector<cv::Mat> views(six_sides().size());
+  parallel_for(views.size(), [&](std::size_t i) {
+    const Device view = make_view(scene, six_sides()[i].direction, options.width, options.height);
+    views[i] = point_view(points, colors, view, 0.0022 * scene.radius);
+  });
   cv::Mat sheet = contact_sheet(views, side_names(), 3);
   std::vector<LegendEntry> entries;
   for (std::size_t k = 0; k < results.rig.projectors.size(); ++k) {
