@@ -22,7 +22,8 @@ COLORS = [("blue,cyan", "red,yellow"), ("red,magenta", "green,cyan"), ("green,ye
 MOVING = 0.3  # share of the frames
 SETTINGS = ["cameras", "projectors", "object", "size", "pitch", "noise", "exposure", "mosaic", "has_lens", "unit"]
 COLUMNS = ["points", "label_error", "line_recall", "distance_median_mm", "share_above_2mm", "sigma_below_1",
-           "mesh_distance_median_mm", "mesh_share_above_2mm", "completeness_1mm", "way_mm", "found_way_mm"]
+           "mesh_distance_median_mm", "mesh_share_above_2mm", "completeness_1mm", "way_mm", "found_way_mm",
+           "accused"]
 
 
 def drawn(seed):
@@ -85,11 +86,16 @@ def rendered(program, folder, seed):
     return choice
 
 
-def way_found(scene, result):
+def way_found(scene, report):
     """How far the object went, as the report has it; 0: at rest. In lengths of a volume of RADIUS."""
     rig = json.loads((scene / "rig.json").read_text())
-    motion = json.loads((result / "000000/report.json").read_text()).get("motion", {})
+    motion = report.get("motion", {})
     return RADIUS / rig["volume"]["radius"] * motion["way_mm"] if motion.get("seen") else 0.0
+
+
+def accused(report):
+    """How many cameras are said to have a wrong picture; all of them are right."""
+    return sum(finding["code"] == "wrong-picture" for finding in report["findings"])
 
 
 def print_summary(path, rows):
@@ -111,6 +117,8 @@ def print_summary(path, rows):
     print(f"at rest: {rests.sum()}, said to move: {(rests & seen).sum()}; moving: {(~rests).sum()}, seen: {(~rests & seen).sum()}")
     for way, found in ways[~rests & seen]:
         print(f"  went {way:.2f} mm, found {found:.2f}")
+    print(f"cameras said to have a wrong picture: {sum(int(row['accused']) for row in rows)} of "
+          f"{sum(int(row['cameras']) for row in rows)}")
 
 
 def main():
@@ -129,8 +137,9 @@ def main():
         if not found:
             raise SystemExit(f"drawn_rigs: seed {seed} has no result: see {args.out / 'commands.log'}")
         shown = {key: choice[key] for key in SETTINGS}
+        report = json.loads((folder / "made/result/000000/report.json").read_text())
         rows.add(seed=seed, **shown, **{key: found[key] for key in COLUMNS if key in found}, way_mm=choice["way"],
-                 found_way_mm=way_found(scene, folder / "made/result"))
+                 found_way_mm=way_found(scene, report), accused=accused(report))
         shutil.rmtree(folder / "made")
         print(" ".join(f"{key} {value}" for key, value in shown.items()))
     print_summary(args.out / "table.md", rows.rows)

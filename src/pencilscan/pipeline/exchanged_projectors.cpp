@@ -36,23 +36,22 @@ std::vector<int> projectors_with_few_names(const Rig& rig, const Labeling& label
 }  // namespace
 
 std::optional<std::pair<int, int>> exchanged_projectors(const Rig& rig, const Frame& frame,
-                                                        const std::vector<GridGraph>& graphs,
                                                         const Labeling& labeling,
                                                         const PointOptions& options) {
   // The cameras with the smallest named shares tell most.
   std::vector<std::size_t> poor;
-  double named = 0;
-  double points = 0;
-  for (std::size_t c = 0; c < graphs.size(); ++c) {
-    if (frame.images[c].empty() || curve_points(graphs[c]) < kLeastCurvePoints) continue;
+  std::vector<TellingPoints> points;
+  TellingPoints sum;
+  for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
+    points.push_back(telling_points(labeling, c));
+    if (frame.images[c].empty() || !points[c].are_enough()) continue;
     poor.push_back(c);
-    const auto weight = static_cast<double>(curve_points(graphs[c]));
-    named += weight * named_share(labeling, c);
-    points += weight;
+    sum.named += points[c].named;
+    sum.unnamed += points[c].unnamed;
   }
   if (poor.empty()) return std::nullopt;
   std::sort(poor.begin(), poor.end(), [&](std::size_t a, std::size_t b) {
-    return named_share(labeling, a) < named_share(labeling, b);
+    return points[a].named_share() < points[b].named_share();
   });
   poor.resize(std::min(poor.size(), kTellingCameras));
 
@@ -60,7 +59,7 @@ std::optional<std::pair<int, int>> exchanged_projectors(const Rig& rig, const Fr
   std::vector<std::pair<int, int>> pairs = {{-1, -1}};
   std::vector<int> doubtful(rig.projectors.size());
   std::iota(doubtful.begin(), doubtful.end(), 0);
-  const bool is_hopeless = named < kFewNamed * points;
+  const bool is_hopeless = sum.named_share() < kFewNamed;
   if (!is_hopeless) doubtful = projectors_with_few_names(rig, labeling);
   for (const int a : doubtful) {
     for (const int b : doubtful) {
@@ -83,9 +82,10 @@ std::optional<std::pair<int, int>> exchanged_projectors(const Rig& rig, const Fr
     if (i > 0) std::swap(of(pairs[i].first).patterns, of(pairs[i].second).patterns);
     const PictureTrial trial(trial_rig, options);
     for (std::size_t k = 0; k < poor.size(); ++k) {
-      const PictureTrial::Named alone = trial.named(poor[k], light[k]);
+      const TellingPoints alone = trial.telling_points(poor[k], light[k]);
       // Where hardly anything is named, chance names a little more with any exchange.
-      counts[i].push_back(i > 0 && is_hopeless && alone.share < kFewNamed ? 0 : alone.points);
+      const bool is_chance = i > 0 && is_hopeless && alone.named_share() < kFewNamed;
+      counts[i].push_back(is_chance ? 0 : static_cast<double>(alone.named));
     }
   });
   // Exchanging two projectors that stand right takes names from every camera that sees them.

@@ -45,7 +45,7 @@ std::optional<Rig> label_lines(const Rig& rig, const Frame& frame, const PointOp
   };
   result.labeling = solve();
   if (!method.capabilities.corrects_rig) return std::nullopt;
-  if (const auto pair = exchanged_projectors(rig, frame, result.graphs, result.labeling, options)) {
+  if (const auto pair = exchanged_projectors(rig, frame, result.labeling, options)) {
     const std::string one = rig.projector(pair->first).name;
     const std::string other = rig.projector(pair->second).name;
     throw StageError(
@@ -53,10 +53,8 @@ std::optional<Rig> label_lines(const Rig& rig, const Frame& frame, const PointOp
         " show each other's patterns: their outputs or cables are exchanged (put them "
         "back; frames that are taken already fit a rig with the two patterns exchanged)");
   }
-  std::vector<PictureFinding> misplaced =
-      misplaced_pictures(rig, frame, result.graphs, result.labeling, options);
-  if (misplaced.empty())
-    misplaced = contradicting_pictures(rig, frame, result.graphs, result.labeling, options);
+  std::vector<PictureFinding> misplaced = misplaced_pictures(rig, frame, result, options);
+  if (misplaced.empty()) misplaced = contradicting_pictures(rig, frame, result, options);
   if (!misplaced.empty()) {
     leave_out(rig, misplaced, result);
     result.labeling = solve();

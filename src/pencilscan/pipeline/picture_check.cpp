@@ -7,6 +7,7 @@
 #include "pencilscan/core/median.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/pipeline/picture_trial.h"
+#include "pencilscan/pipeline/shown_lines.h"
 #include "pencilscan/pipeline/view_agreement.h"
 #include "pencilscan/rig/camera_light.h"
 
@@ -17,6 +18,8 @@ constexpr double kFarLess = 0.5;  // of what the other cameras have
 constexpr double kFarMore = 2;    // of what the picture as it is has, alone
 constexpr double kFewer = 0.75;   // of the others' usual share: a second sign of a wrong picture
 constexpr double kPlainContradiction = 0.25;  // agreement (view_agreement.h)
+constexpr double kNamedByChance = 0.1;        // share of the points that could have a name
+constexpr std::size_t kFewPoints = 20;  // right ones, .6 each, contradict so plainly once in 3000
 
 cv::Mat flipped(const cv::Mat& picture, int code) {
   cv::Mat result;
@@ -48,12 +51,21 @@ const std::vector<Remedy>& remedies() {
 /// A camera that may have a wrong picture.
 struct Suspect {
   std::size_t camera = 0;
-  double share = 0;  ///< named_share() of its own picture, among the others
-  double named = 0;  ///< the same, alone
+  double share = 0;  ///< named of its own picture, among the others
+  double alone = 0;  ///< the same, without the others
   cv::Mat light;
   PictureFinding best;
   double best_named = 0;
 };
+
+/// Some of what each camera measured.
+std::vector<std::vector<MeasuredPoint>> points_by_camera(const Rig& rig,
+                                                         const std::vector<GridGraph>& graphs,
+                                                         const Labeling& labeling) {
+  std::vector<std::vector<MeasuredPoint>> points(rig.cameras.size());
+  for (const MeasuredPoint& p : some_points(rig, graphs, labeling)) points[p.camera].push_back(p);
+  return points;
+}
 
 /// The two of the doubtful cameras whose pictures contradict nothing where the other one stands, if
 /// there are no other two. `points`: what each measured.
@@ -119,14 +131,14 @@ std::string describe(const Rig& rig, const PictureFinding& finding) {
 }
 
 std::vector<PictureFinding> misplaced_pictures(const Rig& rig, const Frame& frame,
-                                               const std::vector<GridGraph>& graphs,
-                                               const Labeling& labeling,
+                                               const PointResult& found,
                                                const PointOptions& options) {
   std::vector<double> of_others;
   std::vector<Suspect> suspects;
-  for (std::size_t c = 0; c < graphs.size(); ++c) {
-    if (frame.images[c].empty() || curve_points(graphs[c]) < kLeastCurvePoints) continue;
-    const double share = named_share(labeling, c);
+  for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
+    const TellingPoints points = telling_points(found.labeling, c);
+    if (frame.images[c].empty() || !points.are_enough()) continue;
+    const double share = points.named_share();
     if (share >= kFewNamed) {
       of_others.push_back(share);
       continue;
@@ -145,43 +157,60 @@ std::vector<PictureFinding> misplaced_pictures(const Rig& rig, const Frame& fram
     Suspect& s = suspects[i];
     const Camera& camera = rig.cameras[s.camera];
     s.light = linear_light(camera, frame.images[s.camera]);
-    s.named = trial.named(s.camera, s.light).share;
+    s.alone = trial.telling_points(s.camera, s.light).named_share();
   });
-  const auto consider = [&](Suspect& s, const PictureFinding& finding, double named) {
-    if (named <= s.best_named || named < kFarMore * s.named || named < kFarLess * usual) return;
+  const auto consider = [&](Suspect& s, const PictureFinding& finding,
+                            const TellingPoints& points) {
+    const double named = points.named_share();
+    if (!points.are_enough() || named <= s.best_named || named < kFarMore * s.alone ||
+        named < kFarLess * usual)
+      return;
     s.best = finding;
     s.best_named = named;
   };
   for (Suspect& s : suspects) {
     for (const Remedy& remedy : remedies()) {
       consider(s, {remedy.fault, static_cast<int>(s.camera), -1},
-               trial.named(s.camera, remedy.undo(s.light)).share);
+               trial.telling_points(s.camera, remedy.undo(s.light)));
     }
     for (const Suspect& other : suspects) {
       if (other.camera == s.camera || other.light.size() != s.light.size()) continue;
       consider(
           s, {PictureFault::kExchanged, static_cast<int>(s.camera), static_cast<int>(other.camera)},
-          trial.named(other.camera, s.light).share);
+          trial.telling_points(other.camera, s.light));
     }
   }
+  const auto points = points_by_camera(rig, found.graphs, found.labeling);
+  const ViewAgreement agreement(rig, points);
+  const auto is_contradicted = [&](const Suspect& s) {
+    const PairAgreement said = agreement.with_others(s.camera);
+    return said.same + said.apart >= kFewPoints ? said.share() < kPlainContradiction
+                                                : s.share < kNamedByChance;
+  };
   std::vector<PictureFinding> findings;
+  std::vector<PictureFinding> unfit;
+  std::size_t fit = others;
   for (const Suspect& s : suspects) {
+    const ShownLines shown = shown_lines(rig, found.families, found.graphs[s.camera], points);
     if (s.best_named > 0) {
       findings.push_back(s.best);
-    } else if (s.share < kFarLess * usual && suspects.size() < others) {
-      findings.push_back({PictureFault::kDoesNotFit, static_cast<int>(s.camera), -1});
+    } else if (shown.tell() && shown.fit()) {
+      ++fit;
+    } else if (s.share < kFarLess * usual && (shown.tell() || is_contradicted(s))) {
+      unfit.push_back({PictureFault::kDoesNotFit, static_cast<int>(s.camera), -1});
     }
   }
+  // Where most do not fit, their pictures are not what is wrong.
+  if (unfit.size() < fit) findings.insert(findings.end(), unfit.begin(), unfit.end());
   return findings;
 }
 
 std::vector<PictureFinding> contradicting_pictures(const Rig& rig, const Frame& frame,
-                                                   const std::vector<GridGraph>& graphs,
-                                                   const Labeling& labeling,
+                                                   const PointResult& found,
                                                    const PointOptions& options) {
   const std::size_t count = rig.cameras.size();
-  std::vector<std::vector<MeasuredPoint>> points(count);
-  for (const MeasuredPoint& p : some_points(rig, graphs, labeling)) points[p.camera].push_back(p);
+  std::vector<std::vector<MeasuredPoint>> points =
+      points_by_camera(rig, found.graphs, found.labeling);
   const ViewAgreement agreement(rig, points);
   const std::vector<std::size_t> doubtful = agreement.doubtful_cameras();
   if (doubtful.empty()) return {};
@@ -198,11 +227,14 @@ std::vector<PictureFinding> contradicting_pictures(const Rig& rig, const Frame& 
                         [&](std::size_t a, std::size_t b) { return share(a) < share(b); });
   std::vector<double> of_others;
   for (std::size_t c = 0; c < count; ++c)
-    if (c != alone && !points[c].empty()) of_others.push_back(named_share(labeling, c));
-  points[alone].clear();
+    if (c != alone && !points[c].empty())
+      of_others.push_back(telling_points(found.labeling, c).named_share());
   // Without a second sign, such as few names, the contradiction must be plain.
-  const bool is_plain = share(alone) < kPlainContradiction ||
-                        named_share(labeling, alone) < kFewer * upper_median(std::move(of_others));
+  const ShownLines shown = shown_lines(rig, found.families, found.graphs[alone], points);
+  const double named = telling_points(found.labeling, alone).named_share();
+  const bool is_plain = share(alone) < kPlainContradiction || (shown.tell() && !shown.fit()) ||
+                        named < kFewer * upper_median(std::move(of_others));
+  points[alone].clear();
   if (count < 3 || !is_plain || ViewAgreement(rig, points).doubtful_pairs() > 0) return {};
   return {{PictureFault::kDoesNotFit, static_cast<int>(alone), -1}};
 }

@@ -36,24 +36,27 @@ struct PictureFinding {
 
 /// Finds the fault of cameras whose curves the solution could not name. Each of the faults above is
 /// undone in turn, and the camera's curves are named alone. The one after which most curves have a
-/// name was the fault. `labeling`: of all cameras (joint).
+/// name was the fault. Where none helps, the picture does not fit, unless it shows lines where
+/// other cameras measured them (shown_lines.h): a camera may see little that two projectors light.
+/// `labeling`: of all cameras (joint).
 [[nodiscard]] std::vector<PictureFinding> misplaced_pictures(const Rig& rig, const Frame& frame,
-                                                             const std::vector<GridGraph>& graphs,
-                                                             const Labeling& labeling,
+                                                             const PointResult& found,
                                                              const PointOptions& options);
 
 /// Finds the picture that fits the projectors but not what the other cameras see: two cameras are
 /// exchanged in a ring that repeats itself, or one took its picture at another moment. Tried is
-/// only what takes all contradictions away (view_agreement.h). `labeling` as above.
-[[nodiscard]] std::vector<PictureFinding> contradicting_pictures(
-    const Rig& rig, const Frame& frame, const std::vector<GridGraph>& graphs,
-    const Labeling& labeling, const PointOptions& options);
+/// only what takes all contradictions away (view_agreement.h). `found` as above.
+[[nodiscard]] std::vector<PictureFinding> contradicting_pictures(const Rig& rig, const Frame& frame,
+                                                                 const PointResult& found,
+                                                                 const PointOptions& options);
 
 /// Finds two projectors that show each other's patterns: their lines have next to no names, and
-/// each of the cameras with the smallest named share gets more once these are exchanged. `labeling`
-/// as above. Only projectors with panels of one size and different patterns are tried.
-[[nodiscard]] std::optional<std::pair<int, int>> exchanged_projectors(
-    const Rig& rig, const Frame& frame, const std::vector<GridGraph>& graphs,
-    const Labeling& labeling, const PointOptions& options);
+/// each of the cameras with the smallest named share gets more once these are exchanged.
+/// `labeling`: of all cameras (joint). Only projectors with panels of one size and different
+/// patterns are tried.
+[[nodiscard]] std::optional<std::pair<int, int>> exchanged_projectors(const Rig& rig,
+                                                                      const Frame& frame,
+                                                                      const Labeling& labeling,
+                                                                      const PointOptions& options);
 
 }  // namespace pencilscan

@@ -4,13 +4,11 @@
 
 namespace pencilscan {
 
-double named_share(const Labeling& labeling, std::size_t c) {
-  const std::size_t named = labelled_points(labeling.runs[c]);
+TellingPoints telling_points(const Labeling& labeling, std::size_t c) {
   const auto undecided = undecided_points(labeling.undecided[c], labeling.runs[c]);
-  const std::size_t unnamed = undecided[static_cast<std::size_t>(UndecidedReason::kAmbiguous)] +
-                              undecided[static_cast<std::size_t>(UndecidedReason::kContradicted)];
-  if (named == 0) return 0;
-  return static_cast<double>(named) / static_cast<double>(named + unnamed);
+  return {labelled_points(labeling.runs[c]),
+          undecided[static_cast<std::size_t>(UndecidedReason::kAmbiguous)] +
+              undecided[static_cast<std::size_t>(UndecidedReason::kContradicted)]};
 }
 
 std::vector<MeasuredPoint> some_points(const Rig& rig, const std::vector<GridGraph>& graphs,
@@ -29,9 +27,8 @@ PictureTrial::PictureTrial(const Rig& rig, const PointOptions& options)
   }
 }
 
-PictureTrial::Named PictureTrial::named(std::size_t c, const cv::Mat& light) const {
-  const Labeling labeling = solved(c, light).labeling;
-  return {static_cast<double>(labelled_points(labeling.runs[c])), named_share(labeling, c)};
+TellingPoints PictureTrial::telling_points(std::size_t c, const cv::Mat& light) const {
+  return pencilscan::telling_points(solved(c, light).labeling, c);
 }
 
 std::vector<MeasuredPoint> PictureTrial::points(std::size_t c, const cv::Mat& light) const {

@@ -11,9 +11,19 @@ namespace pencilscan {
 constexpr double kFewNamed = 0.4;
 constexpr std::size_t kLeastCurvePoints = 500;  ///< of a picture that can be judged
 
-/// Share of a camera's curve points that have a name, of those that a right picture could have
-/// named: what nothing crosses, or lies outside the volume (walls, people), says nothing.
-[[nodiscard]] double named_share(const Labeling& labeling, std::size_t c);
+/// The curve points of a picture that a right one could have named: what nothing crosses, or lies
+/// outside the volume (walls, people), says nothing.
+struct TellingPoints {
+  std::size_t named = 0;
+  std::size_t unnamed = 0;
+
+  [[nodiscard]] std::size_t all() const { return named + unnamed; }
+  [[nodiscard]] bool are_enough() const { return all() >= kLeastCurvePoints; }
+  [[nodiscard]] double named_share() const {
+    return named > 0 ? static_cast<double>(named) / static_cast<double>(all()) : 0;
+  }
+};
+[[nodiscard]] TellingPoints telling_points(const Labeling& labeling, std::size_t c);
 
 /// Measured points of every seventh pixel of the curves.
 [[nodiscard]] std::vector<MeasuredPoint> some_points(const Rig& rig,
@@ -25,12 +35,8 @@ class PictureTrial {
  public:
   PictureTrial(const Rig& rig, const PointOptions& options);
 
-  /// How many points of `light` have a name where camera c stands, and named_share() there.
-  struct Named {
-    double points = 0;
-    double share = 0;
-  };
-  [[nodiscard]] Named named(std::size_t c, const cv::Mat& light) const;
+  /// Of `light` where camera c stands.
+  [[nodiscard]] TellingPoints telling_points(std::size_t c, const cv::Mat& light) const;
 
   /// What `light` measures where camera c stands.
   [[nodiscard]] std::vector<MeasuredPoint> points(std::size_t c, const cv::Mat& light) const;
