@@ -212,7 +212,7 @@ Reconstruction reconstruct(const DetectedFrame& detected, std::span<const PointL
     const StageClock clock(progress, times);
     FrameResult found =
         measure_frame(inner.in_footprints, inner.frame, std::move(lines), how, links, clock);
-    found = in_unit(footprint(inner.rig), std::move(found));
+    found = in_unit_of(inner.rig, std::move(found));
     result = reconstruction_of(inner.rig, inner.frame, std::move(found), options.depth_maps);
   });
   return result;

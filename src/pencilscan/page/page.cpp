@@ -64,7 +64,7 @@ ordered_json describe_rig(const Rig& rig, const fs::path& path) {
           {"projectors", std::move(json["projectors"])},
           {"patterns", std::move(lines)},
           {"families", std::move(families)},
-          {"unit", rig.unit_known ? "mm" : "units"},
+          {"unit", unit_name(rig)},
           {"volume",
            {{"center", {volume.center.x(), volume.center.y(), volume.center.z()}},
             {"radius", volume.radius}}}};

@@ -49,7 +49,7 @@ FrameResult reconstruct_frame(const Rig& stated, const Frame& frame, const Frame
   FrameResult result = measure_frame(rig, seen, std::move(lines), how, links, clock);
   if (coarse) result = in_fine_pixels(*coarse, std::move(result));
   result.times = std::move(times);
-  return in_unit(footprint(stated), std::move(result));
+  return in_unit_of(stated, std::move(result));
 }
 
 FrameResult measure_frame(const Rig& rig, const Frame& frame, PointResult lines,
@@ -111,14 +111,15 @@ PointResult detect_frame(const Rig& rig, const Frame& frame, const PointOptions&
   return result;
 }
 
-FrameResult in_unit(double unit, FrameResult result) {
+FrameResult in_unit_of(const Rig& rig, FrameResult result) {
+  const double unit = footprint(rig);
   const auto f = static_cast<float>(unit);
   for (MeasuredPoint& p : result.points.points) {
     for (float* length : {&p.x, &p.y, &p.z, &p.sigma}) *length *= f;
   }
   ShapeResult& shape = result.shape;
   scale_lengths(unit, shape);
-  if (shape.motion.is_seen) result.points.warnings.push_back(motion_warning(shape.motion));
+  if (shape.motion.is_seen) result.points.warnings.push_back(motion_warning(rig, shape.motion));
   // Scaling and files round: what lay apart may lie at one place.
   separate_vertices(shape.surface.mesh);
   separate_vertices(shape.surface.measured);

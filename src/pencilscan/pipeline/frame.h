@@ -191,8 +191,7 @@ struct NothingFound : StageError {
                                          const PointOptions& options = {},
                                          const StageClock& clock = {});
 
-/// A result in footprints in the unit that a footprint is `unit` of, without `scene`. Warns of
-/// motion within the exposure.
-[[nodiscard]] FrameResult in_unit(double unit, FrameResult result);
+/// A result in footprints in the rig's unit, without `scene`. Warns of motion within the exposure.
+[[nodiscard]] FrameResult in_unit_of(const Rig& rig, FrameResult result);
 
 }  // namespace pencilscan

@@ -122,10 +122,10 @@ Warning views_warning(double deviations) {
           {{"deviations", deviations}}};
 }
 
-Warning motion_warning(const ExposureMotion& motion) {
+Warning motion_warning(const Rig& rig, const ExposureMotion& motion) {
   return {WarningCode::kMotion,
-          "the object moved by " + formatted(motion.way) + " mm, give or take " +
-              formatted(motion.way_deviation) +
+          "the object moved by " + formatted(motion.way) + " " + unit_name(rig) +
+              ", give or take " + formatted(motion.way_deviation) +
               ", while the shutters were open, which blurs lines: the shape is that of the middle "
               "of the exposure; a shorter exposure is sharper",
           {},

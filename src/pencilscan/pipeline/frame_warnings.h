@@ -31,6 +31,6 @@ namespace pencilscan {
 [[nodiscard]] Warning views_warning(double deviations);
 
 /// That the object moved while the shutters were open; lengths in the rig's unit.
-[[nodiscard]] Warning motion_warning(const ExposureMotion& motion);
+[[nodiscard]] Warning motion_warning(const Rig& rig, const ExposureMotion& motion);
 
 }  // namespace pencilscan

@@ -79,7 +79,7 @@ ordered_json refinement_report(const RigRefinement& refinement,
   return report;
 }
 
-RefinementOutcome refinement_outcome(const ordered_json& report) {
+RefinementOutcome refinement_outcome(const Rig& rig, const ordered_json& report) {
   RefinementOutcome outcome;
   outcome.refined = report.at("refined").get<bool>();
   if (!outcome.refined) outcome.reason = report.at("reason").get<std::string>();
@@ -89,10 +89,10 @@ RefinementOutcome refinement_outcome(const ordered_json& report) {
   for (const auto& device : report.at("devices")) {
     if (!device.at("refined").get<bool>()) continue;
     std::array<char, 200> text{};
-    std::snprintf(text.data(), text.size(), "%s moved by %.2f px of rotation and %.3f mm",
+    std::snprintf(text.data(), text.size(), "%s moved by %.2f px of rotation and %.3f %s",
                   device.at("name").get<std::string>().c_str(),
-                  device.at("rotation_px").get<double>(),
-                  device.at("translation_mm").get<double>());
+                  device.at("rotation_px").get<double>(), device.at("translation_mm").get<double>(),
+                  unit_name(rig).c_str());
     outcome.moves.emplace_back(text.data());
   }
   return outcome;

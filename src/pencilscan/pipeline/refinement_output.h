@@ -22,6 +22,7 @@ struct RefinementOutcome {
 /// refinement.json: counts, residuals before and after, what moved, warnings (docs/formats.md).
 [[nodiscard]] nlohmann::ordered_json refinement_report(const RigRefinement& refinement,
                                                        const std::vector<std::string>& frames);
-[[nodiscard]] RefinementOutcome refinement_outcome(const nlohmann::ordered_json& report);
+[[nodiscard]] RefinementOutcome refinement_outcome(const Rig& rig,
+                                                   const nlohmann::ordered_json& report);
 
 }  // namespace pencilscan

@@ -102,7 +102,7 @@ Rig refined_rig(const Rig& rig, const FrameSource& frames, const fs::path& out,
                 const SequenceOptions& options, const Progress& progress,
                 RefinementOutcome& outcome) {
   if (fs::exists(out / kRigFile) && fs::exists(out / kRefinementFile)) {
-    outcome = refinement_outcome(ordered_json(read_json(out / kRefinementFile)));
+    outcome = refinement_outcome(rig, ordered_json(read_json(out / kRefinementFile)));
     outcome.resumed = true;
     return read_rig(out / kRigFile);
   }
@@ -124,7 +124,7 @@ Rig refined_rig(const Rig& rig, const FrameSource& frames, const fs::path& out,
   const ordered_json report = refinement_report(refinement, names);
   write_json(out / kRefinementFile, report);
   write_rig(refinement.rig, out / kRigFile);  // last: its presence means that refinement is done
-  outcome = refinement_outcome(report);
+  outcome = refinement_outcome(rig, report);
   return refinement.rig;
 }
 

@@ -67,8 +67,6 @@ std::string factor_text(double factor) {
                            .ptr};
 }
 
-std::string unit_name(const Rig& rig) { return rig.unit_known ? " mm" : " units"; }
-
 /// Largest distance of a vertex from the middle of the bounding box.
 double reach_of(const TriangleMesh& object) {
   const BoundingBox box = bounding_box(object);
@@ -120,8 +118,9 @@ std::optional<std::string> object_unit_warning(const TriangleMesh& object, const
   const double share = reach / volume.radius;
   if (share >= kSmallestShare && share <= kLargestShare) return std::nullopt;
   const UnitFactor* unit = unit_behind(share);
-  std::string text = "the object is " + rounded(2 * reach) + unit_name(rig) +
-                     " large and the rig's volume " + rounded(2 * volume.radius) + unit_name(rig);
+  std::string text = "the object is " + rounded(2 * reach) + " " + unit_name(rig) +
+                     " large and the rig's volume " + rounded(2 * volume.radius) + " " +
+                     unit_name(rig);
   if (unit != nullptr) {
     text += ": the mesh is probably in " + std::string(unit->words) + ". --scale " +
             factor_text(unit->factor) + " makes it right, --fit makes it fit";
@@ -138,7 +137,7 @@ std::optional<std::string> volume_unit_warning(const Rig& rig) {
     distances.push_back((camera.center() - rig.volume->center).norm());
   std::string text = "the rig's volume cannot be what its cameras look at: its radius is " +
                      rounded(rig.volume->radius) + ", their distance to its centre " +
-                     rounded(upper_median(std::move(distances))) + unit_name(rig);
+                     rounded(upper_median(std::move(distances))) + " " + unit_name(rig);
   for (const UnitFactor& unit : kUnits) {
     const Sphere other{unit.factor * rig.volume->center, unit.factor * rig.volume->radius};
     if (!is_plausible(rig, other)) continue;

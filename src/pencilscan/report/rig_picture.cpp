@@ -197,7 +197,7 @@ cv::Mat draw_rig(const Rig& rig, int side_px) {
     view->outline_volume(volume);
     for (const DrawnDevice& d : devices) view->draw_body(d, 0.05 * extent);
     for (const DrawnDevice& d : devices) view->draw_name(d);
-    view->draw_frame(volume.radius, rig.unit_known ? " mm" : " units");
+    view->draw_frame(volume.radius, " " + unit_name(rig));
   }
   cv::line(picture, {side_px, 0}, {side_px, side_px}, scalar(kFaint), 1);
   return picture;

@@ -117,6 +117,8 @@ std::vector<int> adjacent_cameras(const Rig& rig, int camera) {
   return result;
 }
 
+std::string unit_name(const Rig& rig) { return rig.unit_known ? "mm" : "units"; }
+
 double footprint(const Rig& rig) {
   const Vec3 center = working_volume(rig).center;
   std::vector<double> footprints;

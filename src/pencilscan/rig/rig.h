@@ -105,6 +105,9 @@ void write_rig(const Rig& rig, const std::filesystem::path& path);
 /// nearest to all optical axes (least squares), with the radius that the median device sees whole.
 [[nodiscard]] Sphere working_volume(const Rig& rig);
 
+/// Name of its unit of length for people: "mm", or "units" where it is not known.
+[[nodiscard]] std::string unit_name(const Rig& rig);
+
 /// What one pixel covers at the volume's centre, square to the line of sight, in the rig's unit:
 /// the median over the cameras that see patterns.
 [[nodiscard]] double footprint(const Rig& rig);
