@@ -46,8 +46,7 @@ std::optional<std::pair<int, int>> exchanged_projectors(const Rig& rig, const Fr
     points.push_back(telling_points(labeling, c));
     if (frame.images[c].empty() || !points[c].are_enough()) continue;
     poor.push_back(c);
-    sum.named += points[c].named;
-    sum.unnamed += points[c].unnamed;
+    sum.add(points[c]);
   }
   if (poor.empty()) return std::nullopt;
   std::sort(poor.begin(), poor.end(), [&](std::size_t a, std::size_t b) {

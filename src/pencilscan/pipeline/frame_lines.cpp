@@ -26,13 +26,13 @@ void leave_out(const Rig& rig, const std::vector<PictureFinding>& findings, Poin
   }
 }
 
-/// The share of named points (named_share()) after guided matching.
+/// least_named_share() after guided matching.
 double guided_share(const Rig& rig, const PointOptions& options, const PointResult& result) {
   std::vector<GridGraph> graphs = result.graphs;
   Labeling labeling = result.labeling;
   match_guided(rig, result.families, presence_images(result.detections), graphs, labeling,
                options.guided);
-  return named_share(graphs, labeling);
+  return least_named_share(labeling);
 }
 
 /// Gives the curves their lines. Methods that correct the rig first leave out pictures that do not

@@ -10,13 +10,12 @@
 namespace pencilscan {
 namespace {
 
-std::size_t nameable_points(const std::vector<GridGraph>& graphs, const Labeling& labeling) {
-  std::size_t count = 0;
-  for (const GridGraph& graph : graphs) count += nameable_points(graph, labeling);
-  return count;
+TellingPoints telling_points(const Labeling& labeling) {
+  TellingPoints sum;
+  for (std::size_t c = 0; c < labeling.runs.size(); ++c) sum.add(telling_points(labeling, c));
+  return sum;
 }
 
-/// What the crossings of the labels say, with the rig as given.
 void judge(const Rig& rig, const std::vector<GridGraph>& graphs, LineNaming& naming) {
   const std::vector<CrossingTrack> tracks = crossing_tracks(rig, graphs, naming.labeling);
   naming.crossings = crossing_disagreement(rig, tracks);
@@ -26,18 +25,18 @@ void judge(const Rig& rig, const std::vector<GridGraph>& graphs, LineNaming& nam
 
 }  // namespace
 
-std::size_t nameable_points(const GridGraph& graph, const Labeling& labeling) {
-  const auto c = static_cast<std::size_t>(graph.camera);
-  const auto undecided = undecided_points(labeling.undecided[c], labeling.runs[c]);
-  return curve_points(graph) - undecided[static_cast<std::size_t>(UndecidedReason::kOutsideVolume)];
+TellingPoints telling_points(const Labeling& labeling, std::size_t camera) {
+  const auto undecided = undecided_points(labeling.undecided[camera], labeling.runs[camera]);
+  return {labelled_points(labeling.runs[camera]),
+          undecided[static_cast<std::size_t>(UndecidedReason::kAmbiguous)] +
+              undecided[static_cast<std::size_t>(UndecidedReason::kContradicted)]};
 }
 
-double named_share(const std::vector<GridGraph>& graphs, const Labeling& labeling) {
+double least_named_share(const Labeling& labeling) {
   double least = 1;
-  for (std::size_t c = 0; c < graphs.size(); ++c) {
-    const auto points = static_cast<double>(nameable_points(graphs[c], labeling));
-    if (points > 0)
-      least = std::min(least, static_cast<double>(labelled_points(labeling.runs[c])) / points);
+  for (std::size_t c = 0; c < labeling.runs.size(); ++c) {
+    const TellingPoints points = telling_points(labeling, c);
+    if (points.are_enough()) least = std::min(least, points.named_share());
   }
   return least;
 }
@@ -57,13 +56,12 @@ LineNaming name_lines(const Rig& rig, const std::vector<ColorFamily>& families,
   const bool is_off = disagrees(result.crossings);
   const auto points = static_cast<double>(labelled_points(result.labeling));
   if (!are_enough(result.crossings)) return result;
-  if (!is_off &&
-      points > kNearlyAll * static_cast<double>(nameable_points(graphs, result.labeling)))
+  if (!is_off && points > kNearlyAll * static_cast<double>(telling_points(result.labeling).all()))
     return result;
   const bool meets =
       !is_off && result.crossings.median_px <= kAsClosely * result.crossings.expected_px;
   if (meets &&
-      (named_share(graphs, result.labeling) > kMost || (guided_share && guided_share() > kMost)))
+      (least_named_share(result.labeling) > kMost || (guided_share && guided_share() > kMost)))
     return result;
 
   const FrameCurves curves{families, graphs};

@@ -17,23 +17,37 @@ struct LineNaming {
   std::optional<Warning> warning;
 };
 
-/// Points of a camera's curves that can have a name: all but those whose rays meet no line in the
-/// volume (walls, a floor, people).
-[[nodiscard]] std::size_t nameable_points(const GridGraph& graph, const Labeling& labeling);
+/// The curve points of a picture that a right one, with a right rig, could have named: what nothing
+/// crosses, or lies outside the volume (walls, a floor, people), says nothing.
+struct TellingPoints {
+  std::size_t named = 0;
+  std::size_t unnamed = 0;
 
-/// The share of a camera's nameable points that have a name, of the camera where it is least: one
-/// that stands elsewhere has few. A camera without any does not count.
-[[nodiscard]] double named_share(const std::vector<GridGraph>& graphs, const Labeling& labeling);
+  void add(const TellingPoints& other) {
+    named += other.named;
+    unnamed += other.unnamed;
+  }
+  [[nodiscard]] std::size_t all() const { return named + unnamed; }
+  [[nodiscard]] bool are_enough() const { return all() >= 500; }  ///< to judge a picture
+  [[nodiscard]] double named_share() const {
+    return named > 0 ? static_cast<double>(named) / static_cast<double>(all()) : 0;
+  }
+};
+[[nodiscard]] TellingPoints telling_points(const Labeling& labeling, std::size_t camera);
+
+/// The share of a camera's telling points that have a name, of the camera where it is least: one
+/// that stands elsewhere has few. A camera without enough of them does not count.
+[[nodiscard]] double least_named_share(const Labeling& labeling);
 
 /// Decides whether lines keep the names that the solution gave with the rig as given, or get names
 /// with a corrected rig. For methods that may correct the rig (MethodCapabilities).
 ///
-/// The rig is doubted where crossings miss each other, or where many curves in the volume have no
-/// name. It is not doubted where crossings meet about as closely as noise lets expect and most
+/// The rig is doubted where crossings miss each other, or where many curves that others cross have
+/// no name. It is not doubted where crossings meet about as closely as noise lets expect and most
 /// curves of every camera have a name after guided matching: curves that are close together only
 /// need the surface.
-/// (`guided_share` gives the named_share() after guided matching. It is asked only where it may be
-/// less than enough: guided matching takes no name away. Without it, the share counts as 0.)
+/// (`guided_share` gives the least_named_share() after guided matching. It is asked only where it
+/// may be less than enough: guided matching takes no name away. Without it, the share counts as 0.)
 ///
 /// A rig in doubt is corrected from the crossings (refine_rig_on_frames). The names with the
 /// corrected rig are taken if its crossings agree, or agree better, or if clearly more curves have

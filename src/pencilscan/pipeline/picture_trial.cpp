@@ -4,13 +4,6 @@
 
 namespace pencilscan {
 
-TellingPoints telling_points(const Labeling& labeling, std::size_t c) {
-  const auto undecided = undecided_points(labeling.undecided[c], labeling.runs[c]);
-  return {labelled_points(labeling.runs[c]),
-          undecided[static_cast<std::size_t>(UndecidedReason::kAmbiguous)] +
-              undecided[static_cast<std::size_t>(UndecidedReason::kContradicted)]};
-}
-
 std::vector<MeasuredPoint> some_points(const Rig& rig, const std::vector<GridGraph>& graphs,
                                        const Labeling& labeling) {
   TriangulationOptions options;
