@@ -53,6 +53,7 @@ struct Suspect {
   std::size_t camera = 0;
   double share = 0;  ///< named of its own picture, among the others
   double alone = 0;  ///< the same, without the others
+  ShownLines shown;
   cv::Mat light;
   PictureFinding best;
   double best_named = 0;
@@ -149,6 +150,7 @@ std::vector<PictureFinding> misplaced_pictures(const Rig& rig, const Frame& fram
     suspects.push_back(std::move(suspect));
   }
   if (suspects.empty()) return {};
+  const auto points = points_by_camera(rig, found.graphs, found.labeling);
   const std::size_t others = of_others.size();
   const double usual = others == 0 ? 2 * kFewNamed : upper_median(std::move(of_others));
 
@@ -158,11 +160,11 @@ std::vector<PictureFinding> misplaced_pictures(const Rig& rig, const Frame& fram
     const Camera& camera = rig.cameras[s.camera];
     s.light = linear_light(camera, frame.images[s.camera]);
     s.alone = trial.telling_points(s.camera, s.light).named_share();
+    s.shown = shown_lines(rig, found.families, found.graphs[s.camera], points);
   });
-  const auto consider = [&](Suspect& s, const PictureFinding& finding,
-                            const TellingPoints& points) {
-    const double named = points.named_share();
-    if (!points.are_enough() || named <= s.best_named || named < kFarMore * s.alone ||
+  const auto consider = [&](Suspect& s, const PictureFinding& finding, const TellingPoints& of) {
+    const double named = of.named_share();
+    if (!of.are_enough() || named <= s.best_named || named < kFarMore * s.alone ||
         named < kFarLess * usual)
       return;
     s.best = finding;
@@ -170,17 +172,18 @@ std::vector<PictureFinding> misplaced_pictures(const Rig& rig, const Frame& fram
   };
   for (Suspect& s : suspects) {
     for (const Remedy& remedy : remedies()) {
+      if (s.shown.fits() && remedy.fault != PictureFault::kRedBlueExchanged) continue;
       consider(s, {remedy.fault, static_cast<int>(s.camera), -1},
                trial.telling_points(s.camera, remedy.undo(s.light)));
     }
     for (const Suspect& other : suspects) {
-      if (other.camera == s.camera || other.light.size() != s.light.size()) continue;
+      if (s.shown.fits() || other.camera == s.camera || other.light.size() != s.light.size())
+        continue;
       consider(
           s, {PictureFault::kExchanged, static_cast<int>(s.camera), static_cast<int>(other.camera)},
           trial.telling_points(other.camera, s.light));
     }
   }
-  const auto points = points_by_camera(rig, found.graphs, found.labeling);
   const ViewAgreement agreement(rig, points);
   const auto is_contradicted = [&](const Suspect& s) {
     const PairAgreement said = agreement.with_others(s.camera);
@@ -191,12 +194,11 @@ std::vector<PictureFinding> misplaced_pictures(const Rig& rig, const Frame& fram
   std::vector<PictureFinding> unfit;
   std::size_t fit = others;
   for (const Suspect& s : suspects) {
-    const ShownLines shown = shown_lines(rig, found.families, found.graphs[s.camera], points);
     if (s.best_named > 0) {
       findings.push_back(s.best);
-    } else if (shown.tell() && shown.fit()) {
+    } else if (s.shown.fits()) {
       ++fit;
-    } else if (s.share < kFarLess * usual && (shown.tell() || is_contradicted(s))) {
+    } else if (s.share < kFarLess * usual && (s.shown.misfits() || is_contradicted(s))) {
       unfit.push_back({PictureFault::kDoesNotFit, static_cast<int>(s.camera), -1});
     }
   }
@@ -212,7 +214,11 @@ std::vector<PictureFinding> contradicting_pictures(const Rig& rig, const Frame& 
   std::vector<std::vector<MeasuredPoint>> points =
       points_by_camera(rig, found.graphs, found.labeling);
   const ViewAgreement agreement(rig, points);
-  const std::vector<std::size_t> doubtful = agreement.doubtful_cameras();
+  const auto shown = [&](std::size_t c) {
+    return shown_lines(rig, found.families, found.graphs[c], points);
+  };
+  std::vector<std::size_t> doubtful = agreement.doubtful_cameras();
+  std::erase_if(doubtful, [&](std::size_t c) { return shown(c).fits(); });
   if (doubtful.empty()) return {};
 
   if (const auto pair = exchanged_pair(rig, frame, points, doubtful, options)) {
@@ -230,9 +236,8 @@ std::vector<PictureFinding> contradicting_pictures(const Rig& rig, const Frame& 
     if (c != alone && !points[c].empty())
       of_others.push_back(telling_points(found.labeling, c).named_share());
   // Without a second sign, such as few names, the contradiction must be plain.
-  const ShownLines shown = shown_lines(rig, found.families, found.graphs[alone], points);
   const double named = telling_points(found.labeling, alone).named_share();
-  const bool is_plain = share(alone) < kPlainContradiction || (shown.tell() && !shown.fit()) ||
+  const bool is_plain = share(alone) < kPlainContradiction || shown(alone).misfits() ||
                         named < kFewer * upper_median(std::move(of_others));
   points[alone].clear();
   if (count < 3 || !is_plain || ViewAgreement(rig, points).doubtful_pairs() > 0) return {};

@@ -18,13 +18,14 @@ struct ShownLines {
   std::size_t near = 0;  ///< points with a curve of their colours within 3 px
   std::size_t on = 0;    ///< of these, within 1 px
 
-  /// Enough of them to tell a right picture from chance: the share's deviation is .1.
-  [[nodiscard]] bool tell() const { return near >= 25; }
   /// Right pictures of scenes that experiments/drawn_rigs.py draws have .60 and more (.46 where
-  /// lines are three pixels apart), moved ones .38 and less.
-  [[nodiscard]] bool fit() const {
-    return static_cast<double>(on) >= 0.42 * static_cast<double>(near);
-  }
+  /// lines are three pixels apart), wrong ones .45 and less (a horse), mostly .38.
+  [[nodiscard]] bool fits() const { return tells() && share() >= 0.5; }
+  [[nodiscard]] bool misfits() const { return tells() && share() < 0.45; }
+
+ private:
+  [[nodiscard]] bool tells() const { return near >= 25; }  // the share's deviation is .1
+  [[nodiscard]] double share() const { return static_cast<double>(on) / static_cast<double>(near); }
 };
 
 /// Of the curves of one camera. `points`: what each camera measured, with their deviations; used is

@@ -59,15 +59,13 @@ class ShownLinesTest : public testing::Test {
 
 TEST_F(ShownLinesTest, LinesThroughOtherCamerasPointsFit) {
   const ShownLines right = shown(curves(Vec2::Zero()));
-  EXPECT_TRUE(right.tell());
-  EXPECT_TRUE(right.fit());
+  EXPECT_TRUE(right.fits());
   EXPECT_EQ(right.on, right.near);
 }
 
 TEST_F(ShownLinesTest, LinesBesideThemDoNot) {
   const ShownLines moved = shown(curves({0, 2}));
-  EXPECT_TRUE(moved.tell());
-  EXPECT_FALSE(moved.fit());
+  EXPECT_TRUE(moved.misfits());
 }
 
 TEST_F(ShownLinesTest, OtherColorsAndBlurredPlacesSayNothing) {
@@ -76,6 +74,7 @@ TEST_F(ShownLinesTest, OtherColorsAndBlurredPlacesSayNothing) {
   GridGraph none;
   none.camera = 1;
   EXPECT_EQ(shown(none).near, 0U);
+  EXPECT_FALSE(shown(none).fits() || shown(none).misfits());
   for (MeasuredPoint& p : points_[0]) p.sigma = 10;
   EXPECT_EQ(shown(curves(Vec2::Zero())).near, 0U);
 }
