@@ -4,6 +4,7 @@
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/pipeline/picture_check.h"
 #include "pencilscan/pipeline/picture_trial.h"
+#include "pencilscan/pipeline/shown_lines.h"
 #include "pencilscan/rig/camera_light.h"
 
 namespace pencilscan {
@@ -33,17 +34,27 @@ std::vector<int> projectors_with_few_names(const Rig& rig, const Labeling& label
   return few;
 }
 
+/// True where the points that cameras measured lie on each other's lines: few names, but right
+/// ones.
+bool have_right_names(const Rig& rig, const PointResult& found,
+                      const std::vector<std::size_t>& cameras) {
+  const auto points = points_by_camera(rig, found.graphs, found.labeling);
+  return std::any_of(cameras.begin(), cameras.end(), [&](std::size_t c) {
+    return shown_lines(rig, found.families, found.graphs[c], points).fits();
+  });
+}
+
 }  // namespace
 
 std::optional<std::pair<int, int>> exchanged_projectors(const Rig& rig, const Frame& frame,
-                                                        const Labeling& labeling,
+                                                        const PointResult& found,
                                                         const PointOptions& options) {
   // The cameras with the smallest named shares tell most.
   std::vector<std::size_t> poor;
   std::vector<TellingPoints> points;
   TellingPoints sum;
   for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
-    points.push_back(telling_points(labeling, c));
+    points.push_back(telling_points(found.labeling, c));
     if (frame.images[c].empty() || !points[c].are_enough()) continue;
     poor.push_back(c);
     sum.add(points[c]);
@@ -58,8 +69,8 @@ std::optional<std::pair<int, int>> exchanged_projectors(const Rig& rig, const Fr
   std::vector<std::pair<int, int>> pairs = {{-1, -1}};
   std::vector<int> doubtful(rig.projectors.size());
   std::iota(doubtful.begin(), doubtful.end(), 0);
-  const bool is_hopeless = sum.named_share() < kFewNamed;
-  if (!is_hopeless) doubtful = projectors_with_few_names(rig, labeling);
+  const bool is_hopeless = sum.named_share() < kFewNamed && !have_right_names(rig, found, poor);
+  if (!is_hopeless) doubtful = projectors_with_few_names(rig, found.labeling);
   for (const int a : doubtful) {
     for (const int b : doubtful) {
       const Projector& one = rig.projector(a);

@@ -26,13 +26,15 @@ void leave_out(const Rig& rig, const std::vector<PictureFinding>& findings, Poin
   }
 }
 
-/// least_named_share() after guided matching.
-double guided_share(const Rig& rig, const PointOptions& options, const PointResult& result) {
+/// Says that the rig is right, whatever curves have no name: points that one camera measured lie on
+/// the lines of the others, or most curves get a name from the surface around them.
+bool is_right_rig(const Rig& rig, const PointOptions& options, const PointResult& result) {
+  if (points_lie_on_lines(rig, result)) return true;
   std::vector<GridGraph> graphs = result.graphs;
   Labeling labeling = result.labeling;
   match_guided(rig, result.families, presence_images(result.detections), graphs, labeling,
                options.guided);
-  return least_named_share(labeling);
+  return least_named_share(labeling) > kMostNamed;
 }
 
 /// Gives the curves their lines. Methods that correct the rig first leave out pictures that do not
@@ -45,7 +47,7 @@ std::optional<Rig> label_lines(const Rig& rig, const Frame& frame, const PointOp
   };
   result.labeling = solve();
   if (!method.capabilities.corrects_rig) return std::nullopt;
-  if (const auto pair = exchanged_projectors(rig, frame, result.labeling, options)) {
+  if (const auto pair = exchanged_projectors(rig, frame, result, options)) {
     const std::string one = rig.projector(pair->first).name;
     const std::string other = rig.projector(pair->second).name;
     throw StageError(
@@ -60,7 +62,7 @@ std::optional<Rig> label_lines(const Rig& rig, const Frame& frame, const PointOp
     result.labeling = solve();
   }
   LineNaming naming = name_lines(rig, result.families, result.graphs, result.labeling, options,
-                                 [&] { return guided_share(rig, options, result); });
+                                 [&] { return is_right_rig(rig, options, result); });
   result.labeling = std::move(naming.labeling);
   result.crossings = naming.crossings;
   result.device_crossings = std::move(naming.device_crossings);

@@ -43,9 +43,8 @@ double least_named_share(const Labeling& labeling) {
 
 LineNaming name_lines(const Rig& rig, const std::vector<ColorFamily>& families,
                       const std::vector<GridGraph>& graphs, Labeling labeling,
-                      const PointOptions& options, const std::function<double()>& guided_share) {
+                      const PointOptions& options, const std::function<bool()>& is_confirmed) {
   constexpr double kNearlyAll = 0.8;    // of the nameable points; right names reach .9 and more
-  constexpr double kMost = 0.5;         // once guided; the rest are close together, or no lines
   constexpr double kAsClosely = 1.2;    // the misses that noise lets expect are known to a fifth
   constexpr double kClearlyMore = 1.1;  // points named, of those before
   constexpr double kAsWell = 1.2;       // crossings' misses, of those before
@@ -61,7 +60,7 @@ LineNaming name_lines(const Rig& rig, const std::vector<ColorFamily>& families,
   const bool meets =
       !is_off && result.crossings.median_px <= kAsClosely * result.crossings.expected_px;
   if (meets &&
-      (least_named_share(result.labeling) > kMost || (guided_share && guided_share() > kMost)))
+      (least_named_share(result.labeling) > kMostNamed || (is_confirmed && is_confirmed())))
     return result;
 
   const FrameCurves curves{families, graphs};

@@ -38,16 +38,15 @@ struct TellingPoints {
 /// The share of a camera's telling points that have a name, of the camera where it is least: one
 /// that stands elsewhere has few. A camera without enough of them does not count.
 [[nodiscard]] double least_named_share(const Labeling& labeling);
+inline constexpr double kMostNamed = 0.5;  ///< of it: the rest are close together, or no lines
 
 /// Decides whether lines keep the names that the solution gave with the rig as given, or get names
 /// with a corrected rig. For methods that may correct the rig (MethodCapabilities).
 ///
 /// The rig is doubted where crossings miss each other, or where many curves that others cross have
 /// no name. It is not doubted where crossings meet about as closely as noise lets expect and most
-/// curves of every camera have a name after guided matching: curves that are close together only
-/// need the surface.
-/// (`guided_share` gives the least_named_share() after guided matching. It is asked only where it
-/// may be less than enough: guided matching takes no name away. Without it, the share counts as 0.)
+/// such curves of every camera have a name, or something else says that the rig is right:
+/// `is_confirmed`, asked only where it matters.
 ///
 /// A rig in doubt is corrected from the crossings (refine_rig_on_frames). The names with the
 /// corrected rig are taken if its crossings agree, or agree better, or if clearly more curves have
@@ -55,6 +54,6 @@ struct TellingPoints {
 [[nodiscard]] LineNaming name_lines(const Rig& rig, const std::vector<ColorFamily>& families,
                                     const std::vector<GridGraph>& graphs, Labeling labeling,
                                     const PointOptions& options,
-                                    const std::function<double()>& guided_share = {});
+                                    const std::function<bool()>& is_confirmed = {});
 
 }  // namespace pencilscan

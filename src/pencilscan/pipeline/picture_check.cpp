@@ -59,15 +59,6 @@ struct Suspect {
   double best_named = 0;
 };
 
-/// Some of what each camera measured.
-std::vector<std::vector<MeasuredPoint>> points_by_camera(const Rig& rig,
-                                                         const std::vector<GridGraph>& graphs,
-                                                         const Labeling& labeling) {
-  std::vector<std::vector<MeasuredPoint>> points(rig.cameras.size());
-  for (const MeasuredPoint& p : some_points(rig, graphs, labeling)) points[p.camera].push_back(p);
-  return points;
-}
-
 /// The two of the doubtful cameras whose pictures contradict nothing where the other one stands, if
 /// there are no other two. `points`: what each measured.
 std::optional<std::pair<int, int>> exchanged_pair(
@@ -242,6 +233,17 @@ std::vector<PictureFinding> contradicting_pictures(const Rig& rig, const Frame& 
   points[alone].clear();
   if (count < 3 || !is_plain || ViewAgreement(rig, points).doubtful_pairs() > 0) return {};
   return {{PictureFault::kDoesNotFit, static_cast<int>(alone), -1}};
+}
+
+bool points_lie_on_lines(const Rig& rig, const PointResult& found) {
+  const auto points = points_by_camera(rig, found.graphs, found.labeling);
+  std::size_t fit = 0;
+  for (const GridGraph& graph : found.graphs) {
+    const ShownLines shown = shown_lines(rig, found.families, graph, points);
+    if (shown.tells() && !shown.fits()) return false;
+    fit += shown.fits() ? 1U : 0U;
+  }
+  return fit >= 2;
 }
 
 }  // namespace pencilscan

@@ -50,13 +50,17 @@ struct PictureFinding {
                                                                  const PointResult& found,
                                                                  const PointOptions& options);
 
+/// True where each camera with enough to say shows lines where the others measured them
+/// (shown_lines.h), two cameras at least. `found` as above.
+[[nodiscard]] bool points_lie_on_lines(const Rig& rig, const PointResult& found);
+
 /// Finds two projectors that show each other's patterns: their lines have next to no names, and
 /// each of the cameras with the smallest named share gets more once these are exchanged.
 /// `labeling`: of all cameras (joint). Only projectors with panels of one size and different
 /// patterns are tried.
 [[nodiscard]] std::optional<std::pair<int, int>> exchanged_projectors(const Rig& rig,
                                                                       const Frame& frame,
-                                                                      const Labeling& labeling,
+                                                                      const PointResult& found,
                                                                       const PointOptions& options);
 
 }  // namespace pencilscan

@@ -11,6 +11,14 @@ std::vector<MeasuredPoint> some_points(const Rig& rig, const std::vector<GridGra
   return triangulate(rig, graphs, labeling, options);
 }
 
+std::vector<std::vector<MeasuredPoint>> points_by_camera(const Rig& rig,
+                                                         const std::vector<GridGraph>& graphs,
+                                                         const Labeling& labeling) {
+  std::vector<std::vector<MeasuredPoint>> points(rig.cameras.size());
+  for (const MeasuredPoint& p : some_points(rig, graphs, labeling)) points[p.camera].push_back(p);
+  return points;
+}
+
 PictureTrial::PictureTrial(const Rig& rig, const PointOptions& options)
     : rig_(rig), options_(options) {
   for (Camera& camera : rig_.cameras) {

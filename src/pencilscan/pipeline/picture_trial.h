@@ -15,6 +15,10 @@ constexpr double kFewNamed = 0.4;
                                                      const std::vector<GridGraph>& graphs,
                                                      const Labeling& labeling);
 
+/// The same by camera.
+[[nodiscard]] std::vector<std::vector<MeasuredPoint>> points_by_camera(
+    const Rig& rig, const std::vector<GridGraph>& graphs, const Labeling& labeling);
+
 /// Names the curves of single pictures, which come as linear light of three colours.
 class PictureTrial {
  public:

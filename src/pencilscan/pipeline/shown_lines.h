@@ -23,8 +23,9 @@ struct ShownLines {
   [[nodiscard]] bool fits() const { return tells() && share() >= 0.5; }
   [[nodiscard]] bool misfits() const { return tells() && share() < 0.45; }
 
+  [[nodiscard]] bool tells() const { return near >= 25; }  ///< the share's deviation is .1
+
  private:
-  [[nodiscard]] bool tells() const { return near >= 25; }  // the share's deviation is .1
   [[nodiscard]] double share() const { return static_cast<double>(on) / static_cast<double>(near); }
 };
 
