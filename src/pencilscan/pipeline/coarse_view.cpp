@@ -16,11 +16,6 @@
 namespace pencilscan {
 namespace {
 
-void scale(double factor, TriangleMesh& mesh) {
-  for (Vec3& x : mesh.vertices) x *= factor;
-  for (float& sigma : mesh.sigma) sigma *= static_cast<float>(factor);
-}
-
 /// A colour is the mean of its own samples: a mosaic's colours have their middles where the pixel
 /// has its own, and nothing is filled in.
 cv::Mat binned_samples(const cv::Mat& light, const Mosaic& mosaic, int binning) {
@@ -217,26 +212,6 @@ std::optional<CoarseView> coarse_view(const Rig& rig, const Frame& frame,
     }
   });
   return view;
-}
-
-void scale_lengths(double factor, ShapeResult& shape) {
-  const auto f = static_cast<float>(factor);
-  scale(factor, shape.surface.mesh);
-  scale(factor, shape.surface.measured);
-  shape.surface.report.spacing_mm *= factor;
-  for (double& area : shape.holes.area_mm2) area *= factor * factor;
-  for (CameraDepthReport& camera : shape.depth.report.cameras) camera.sigma_median_mm *= factor;
-  for (DepthMap& map : shape.depth.maps) {
-    for (DepthNode& node : map.nodes) {
-      for (float* inverse : {&node.w, &node.wx, &node.wy, &node.wxx, &node.wxy, &node.wyy})
-        *inverse /= f;
-      node.sigma *= f;
-    }
-  }
-  ExposureMotion& motion = shape.motion;
-  motion.shift *= factor;
-  motion.pivot *= factor;
-  for (double* length : {&motion.way, &motion.way_deviation, &motion.at_most}) *length *= factor;
 }
 
 FrameResult in_fine_pixels(const CoarseView& view, FrameResult result) {

@@ -29,7 +29,4 @@ struct CoarseView {
 /// images go.
 [[nodiscard]] FrameResult in_fine_pixels(const CoarseView& view, FrameResult result);
 
-/// All lengths of a result times `factor`.
-void scale_lengths(double factor, ShapeResult& shape);
-
 }  // namespace pencilscan

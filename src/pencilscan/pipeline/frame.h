@@ -109,6 +109,9 @@ struct ShapeResult {
   int carried_since = 0;  ///< moments since the closed surface was made from nothing
 };
 
+/// All its lengths times `factor`, without `scene`.
+void scale_lengths(double factor, ShapeResult& shape);
+
 /// What a whole frame gives.
 struct FrameResult {
   PointResult points;

@@ -18,6 +18,11 @@
 namespace pencilscan {
 namespace {
 
+void scale(double factor, TriangleMesh& mesh) {
+  for (Vec3& x : mesh.vertices) x *= factor;
+  for (float& sigma : mesh.sigma) sigma *= static_cast<float>(factor);
+}
+
 /// What camera c sees, linear: the image as stored where that is all that there is to it.
 /// `unmixing`: of an image with patterns.
 ColorView view_of(const Rig& rig, std::size_t c, const cv::Mat& stored, const Unmixing* unmixing) {
@@ -237,6 +242,26 @@ FrameResult finish_shape(const Rig& rig, FrameResult result, const FusionOptions
   if (result.points.is_on_surface) leave_unsupported(rig, result.points, shape);
   finish_surface(options, shape.surface);
   return result;
+}
+
+void scale_lengths(double factor, ShapeResult& shape) {
+  const auto f = static_cast<float>(factor);
+  scale(factor, shape.surface.mesh);
+  scale(factor, shape.surface.measured);
+  shape.surface.report.spacing_mm *= factor;
+  for (double& area : shape.holes.area_mm2) area *= factor * factor;
+  for (CameraDepthReport& camera : shape.depth.report.cameras) camera.sigma_median_mm *= factor;
+  for (DepthMap& map : shape.depth.maps) {
+    for (DepthNode& node : map.nodes) {
+      for (float* inverse : {&node.w, &node.wx, &node.wy, &node.wxx, &node.wxy, &node.wyy})
+        *inverse /= f;
+      node.sigma *= f;
+    }
+  }
+  ExposureMotion& motion = shape.motion;
+  motion.shift *= factor;
+  motion.pivot *= factor;
+  for (double* length : {&motion.way, &motion.way_deviation, &motion.at_most}) *length *= factor;
 }
 
 }  // namespace pencilscan
