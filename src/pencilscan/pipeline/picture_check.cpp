@@ -18,7 +18,6 @@ constexpr double kFarLess = 0.5;  // of what the other cameras have
 constexpr double kFarMore = 2;    // of what the picture as it is has, alone
 constexpr double kFewer = 0.75;   // of the others' usual share: a second sign of a wrong picture
 constexpr double kPlainContradiction = 0.25;  // agreement (view_agreement.h)
-constexpr double kNamedByChance = 0.1;        // share of the points that could have a name
 constexpr std::size_t kFewPoints = 20;  // right ones, .6 each, contradict so plainly once in 3000
 
 cv::Mat flipped(const cv::Mat& picture, int code) {
@@ -176,10 +175,9 @@ std::vector<PictureFinding> misplaced_pictures(const Rig& rig, const Frame& fram
     }
   }
   const ViewAgreement agreement(rig, points);
-  const auto is_contradicted = [&](const Suspect& s) {
-    const PairAgreement said = agreement.with_others(s.camera);
-    return said.same + said.apart >= kFewPoints ? said.share() < kPlainContradiction
-                                                : s.share < kNamedByChance;
+  const auto is_contradicted = [&](std::size_t c) {
+    const PairAgreement said = agreement.with_others(c);
+    return said.same + said.apart >= kFewPoints && said.share() < kPlainContradiction;
   };
   std::vector<PictureFinding> findings;
   std::vector<PictureFinding> unfit;
@@ -189,7 +187,7 @@ std::vector<PictureFinding> misplaced_pictures(const Rig& rig, const Frame& fram
       findings.push_back(s.best);
     } else if (s.shown.fits()) {
       ++fit;
-    } else if (s.share < kFarLess * usual && (s.shown.misfits() || is_contradicted(s))) {
+    } else if (s.share < kFarLess * usual && (s.shown.misfits() || is_contradicted(s.camera))) {
       unfit.push_back({PictureFault::kDoesNotFit, static_cast<int>(s.camera), -1});
     }
   }
