@@ -145,6 +145,11 @@ class FloorView {
   ObjectSpace space_;
 };
 
+constexpr std::size_t kPilots = 100;
+constexpr std::size_t kEnoughPilots =
+    20;                          // medians of ten each tell noise in the dark and the bright
+constexpr double kFacing = 0.5;  // cosine; flatter, a plane from other cameras is off in the slope
+
 double cost(const WindowFit& fit) { return static_cast<double>(fit.misfit); }
 
 }  // namespace
@@ -159,20 +164,11 @@ DepthOptions options_for(const CameraLight& light, DepthOptions options) {
   return options;
 }
 
-void measure_light(const Rig& rig, int camera, const std::vector<ColorFamily>& families,
-                   std::span<const MeasuredPoint> points, const DepthOptions& options,
-                   CameraLight& light) {
-  for (std::size_t f = 0; f < families.size(); ++f) {
-    for (const PatternRef& ref : families[f].patterns) {
-      light.patterns.emplace_back(rig, *light.camera, ref.projector, ref.pattern);
-      light.patterns.back().set_family(static_cast<int>(f));
-    }
-  }
-  light.noise.assign(families.size(), NoiseModel{});
-  // Pilot windows at evenly picked curve points.
-  constexpr std::size_t kPilots = 100;
+std::vector<PilotWindow> pilot_windows(const CameraLight& light, int camera,
+                                       std::span<const MeasuredPoint> points,
+                                       const DepthOptions& options) {
   const CurveSeeds seeds(*light.camera, camera, points);
-  std::vector<std::pair<Vec2, Quadric>> pilots;  // with their starts
+  std::vector<PilotWindow> pilots;
   std::size_t own = 0;
   for (const MeasuredPoint& p : points) own += p.camera == camera ? 1 : 0;
   const std::size_t step = std::max<std::size_t>(1, own / kPilots);
@@ -182,8 +178,37 @@ void measure_light(const Rig& rig, int camera, const std::vector<ColorFamily>& f
     if (i++ % step != 0) continue;
     const Vec2 pixel(std::round(p.u), std::round(p.v));
     const auto planes = seeds.planes(pixel, options.seed_radius_px, options.half);
-    if (!planes.empty()) pilots.emplace_back(pixel, planes[0]);
+    if (!planes.empty()) pilots.push_back({pixel, planes[0]});
   }
+  return pilots;
+}
+
+std::vector<PilotWindow> pilot_windows(const CameraLight& light, const RayScene& surface,
+                                       const DepthMap& map, const DepthOptions& options) {
+  const TriangleMesh& mesh = surface.mesh();
+  std::vector<PilotWindow> all;
+  for (std::size_t i = 0; i < map.nodes.size(); ++i) {
+    const Vec2 pixel = map.pixel(i);
+    const Ray ray = light.camera->ray(pixel);
+    const auto hit = surface.first_hit(ray);
+    if (!hit) continue;
+    const auto& face = mesh.faces[hit->face];
+    const bool is_measured = std::all_of(face.begin(), face.end(), [&](int v) {
+      return mesh.confidence[static_cast<std::size_t>(v)] > 0;
+    });
+    const Vec3 normal = face_normal(mesh, hit->face);
+    if (!is_measured || -ray.direction.dot(normal) < kFacing) continue;
+    all.push_back(
+        {pixel, quadric_of(TangentView(*light.camera, hit->point, normal), options.half)});
+  }
+  const std::size_t step = std::max<std::size_t>(1, all.size() / kPilots);
+  std::vector<PilotWindow> pilots;
+  for (std::size_t i = 0; i < all.size(); i += step) pilots.push_back(all[i]);
+  return pilots;
+}
+
+void measure_light(std::span<const PilotWindow> pilots, const DepthOptions& options,
+                   CameraLight& light) {
   /// take(fit, fitter) for each pilot window that fits.
   const auto run = [&](float blur, auto take) {
     light.blur_px = blur;
@@ -198,6 +223,7 @@ void measure_light(const Rig& rig, int camera, const std::vector<ColorFamily>& f
     if (values.empty()) return 1e9F;
     return upper_median(std::move(values));
   };
+  const float before = light.blur_px;
   // Golden section for the blur.
   float low = 0.3F, high = 2.5F;
   constexpr float kGolden = 0.618034F;
@@ -219,18 +245,23 @@ void measure_light(const Rig& rig, int camera, const std::vector<ColorFamily>& f
     }
   }
   using Samples = std::vector<std::pair<float, float>>;  // mean and variance of a window
-  std::vector<Samples> samples_of(families.size());
+  std::vector<Samples> samples_of(light.families.size());
   std::vector<float> residuals;
   run(0.5F * (low + high), [&](const WindowFit& fit, const WindowFitter& fitter) {
     residuals.push_back(fit.relative_residual);
-    for (std::size_t f = 0; f < families.size(); ++f)
+    for (std::size_t f = 0; f < samples_of.size(); ++f)
       samples_of[f].emplace_back(fitter.family_mean(f), fitter.family_variance(f));
   });
-  if (!residuals.empty()) light.usual_residual = upper_median(std::move(residuals));
+  light.is_measured = residuals.size() >= kEnoughPilots;
+  if (residuals.empty()) {
+    light.blur_px = before;
+    return;
+  }
+  light.usual_residual = upper_median(std::move(residuals));
   // Noise per family: a line through the medians of the darker and the brighter half.
-  for (std::size_t f = 0; f < families.size(); ++f) {
+  for (std::size_t f = 0; f < samples_of.size(); ++f) {
     Samples& samples = samples_of[f];
-    if (samples.size() < 20) continue;
+    if (samples.size() < kEnoughPilots) continue;
     std::sort(samples.begin(), samples.end());
     const auto half_median = [&](std::size_t from, std::size_t to) {
       std::vector<float> v;

@@ -26,10 +26,24 @@ struct DepthOptions {
 /// The options as they are for one camera's pictures: windows behind a mosaic are wider.
 [[nodiscard]] DepthOptions options_for(const CameraLight& light, DepthOptions options);
 
-/// Fills in the light of one camera whose images are there already: its patterns, and the blur and
-/// noise that its images show at the seeds.
-void measure_light(const Rig& rig, int camera, const std::vector<ColorFamily>& families,
-                   std::span<const MeasuredPoint> points, const DepthOptions& options,
+/// A window whose depth is known about: pictures show their blur and noise there.
+struct PilotWindow {
+  Vec2 pixel = Vec2::Zero();
+  Quadric start = Quadric::Zero();
+};
+
+/// Evenly picked labelled points of a camera.
+[[nodiscard]] std::vector<PilotWindow> pilot_windows(const CameraLight& light, int camera,
+                                                     std::span<const MeasuredPoint> points,
+                                                     const DepthOptions& options);
+/// Evenly picked nodes that see a measured part of `surface`, for a camera without labels.
+[[nodiscard]] std::vector<PilotWindow> pilot_windows(const CameraLight& light,
+                                                     const RayScene& surface, const DepthMap& map,
+                                                     const DepthOptions& options);
+
+/// Fills in the blur and noise that the images of a light show in pilot windows. Without windows
+/// that fit it stays as it is.
+void measure_light(std::span<const PilotWindow> pilots, const DepthOptions& options,
                    CameraLight& light);
 
 [[nodiscard]] DepthMap dense_depth(const CameraLight& light, int camera,

@@ -69,7 +69,14 @@ DepthResult measure_depth(const Rig& rig, const std::vector<ColorFamily>& famili
     light.valid = unsaturated(images[c]);
     light.of_mosaic = camera.mosaic || detections[c].is_filled_in;
     const DepthOptions depth = options_for(light, options.depth);
-    measure_light(rig, static_cast<int>(c), families, points, depth, light);
+    for (std::size_t f = 0; f < families.size(); ++f) {
+      for (const PatternRef& ref : families[f].patterns) {
+        light.patterns.emplace_back(rig, camera, ref.projector, ref.pattern);
+        light.patterns.back().set_family(static_cast<int>(f));
+      }
+    }
+    light.noise.assign(families.size(), NoiseModel{});
+    measure_light(pilot_windows(light, static_cast<int>(c), points, depth), depth, light);
     result.maps[i] = dense_depth(light, static_cast<int>(c), points, space, depth);
     with_wider_windows(
         light, binning_for(spacing_px(rig, camera), depth), result.maps[i],
@@ -97,16 +104,33 @@ void guided_depth(const Rig& rig, const RayScene& surface, const DepthStageOptio
   const ObjectSpace space(rig);
   std::vector<std::size_t> found(result.maps.size());
   parallel_for(result.maps.size(), [&](std::size_t i) {
-    const CameraLight& light = result.lights[i];
-    const DepthOptions depth = options_for(light, options.depth);
-    const auto complete = [&](const CameraLight& seen, DepthMap& map) {
-      found[i] +=
-          complete_map(seen, surface, space, result.report.consistency.sigma_factor, depth, map);
+    DepthMap& map = result.maps[i];
+    const DepthOptions depth = options_for(result.lights[i], options.depth);
+    const auto completed = [&](const CameraLight& light, DepthMap& completing) {
+      std::size_t count = 0;
+      const auto complete = [&](const CameraLight& seen, DepthMap& nodes) {
+        count += complete_map(seen, surface, space, result.report.consistency.sigma_factor, depth,
+                              nodes);
+      };
+      complete(light, completing);
+      // Where a surface turns from its projector, lines lie farther apart.
+      const int widest = std::max(2, binning_for(spacing_px(rig, *light.camera), depth));
+      with_wider_windows(light, widest, completing, complete);
+      return count;
     };
-    complete(light, result.maps[i]);
-    // Where a surface turns from its projector, lines lie farther apart.
-    const int widest = std::max(2, binning_for(spacing_px(rig, *light.camera), depth));
-    with_wider_windows(light, widest, result.maps[i], complete);
+    const DepthMap before = result.lights[i].is_measured ? DepthMap{} : map;
+    found[i] = completed(result.lights[i], map);
+    if (result.lights[i].is_measured) return;
+    // Labels told little of its blur and noise. The surface of other cameras may tell more.
+    CameraLight light = result.lights[i];
+    measure_light(pilot_windows(light, surface, before, depth), depth, light);
+    DepthMap again = before;
+    const std::size_t found_again = completed(light, again);
+    if (found_again <= found[i]) return;
+    found[i] = found_again;
+    map = std::move(again);
+    result.report.cameras[i].blur_px = static_cast<double>(light.blur_px);
+    result.lights[i] = std::move(light);
   });
   for (std::size_t i = 0; i < found.size(); ++i) {
     result.report.completed += found[i];

@@ -33,6 +33,7 @@ struct CameraLight {
   std::vector<cv::Mat> sampled;
   cv::Mat valid;                  ///< CV_8U, 0 where saturated
   bool of_mosaic = false;         ///< raw, or its colours were filled in
+  bool is_measured = false;       ///< blur and noise are what enough of its windows show
   float blur_px = 0.8F;           ///< standard deviation of camera and projector blur together
   std::vector<NoiseModel> noise;  ///< per family
   float usual_residual = 0;       ///< WindowFit::relative_residual, median of the pilot windows
