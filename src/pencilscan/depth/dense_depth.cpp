@@ -191,13 +191,9 @@ std::vector<PilotWindow> pilot_windows(const CameraLight& light, const RayScene&
     const Vec2 pixel = map.pixel(i);
     const Ray ray = light.camera->ray(pixel);
     const auto hit = surface.first_hit(ray);
-    if (!hit) continue;
-    const auto& face = mesh.faces[hit->face];
-    const bool is_measured = std::all_of(face.begin(), face.end(), [&](int v) {
-      return mesh.confidence[static_cast<std::size_t>(v)] > 0;
-    });
+    if (!hit || !is_measured(mesh, hit->face)) continue;
     const Vec3 normal = face_normal(mesh, hit->face);
-    if (!is_measured || -ray.direction.dot(normal) < kFacing) continue;
+    if (-ray.direction.dot(normal) < kFacing) continue;
     all.push_back(
         {pixel, quadric_of(TangentView(*light.camera, hit->point, normal), options.half)});
   }

@@ -249,6 +249,27 @@ TEST(DenseDepth, BlurIsFound) {
     EXPECT_NEAR(camera.blur_px, std::hypot(0.6, 0.29), 0.12);
 }
 
+// A camera may see so little that two projectors light that none of its lines has a name.
+TEST(DenseDepth, ACameraWithoutLabelsSeesItsBlurAndDepthOnTheSurfaceOfOthers) {
+  BallScene scene = ball_scene();
+  const std::size_t nodes = scene.measure().report.cameras[1].measured;
+  std::erase_if(scene.points, [](const MeasuredPoint& p) { return p.camera == 1; });
+  const DepthResult without = scene.measure();
+  ASSERT_EQ(without.report.cameras[1].measured, 0U);
+  TriangleMesh surface = make_sphere(42.2, 96);
+  const auto guided = [&](float confidence) {
+    surface.confidence.assign(surface.vertices.size(), confidence);
+    DepthResult result = without;
+    guided_depth(scene.rig, RayScene(surface), {}, result);
+    return result;
+  };
+  EXPECT_LT(guided(0).report.cameras[1].measured, nodes / 10);  // nobody measured the surface
+  const DepthResult result = guided(1);
+  EXPECT_GT(result.report.cameras[1].measured, nodes * 9 / 10);
+  EXPECT_NEAR(result.report.cameras[1].blur_px, std::hypot(0.6, 0.29), 0.2);
+  EXPECT_LT(median_size(scene.errors(result.maps[1])), 0.06);
+}
+
 TEST(DenseDepth, SigmaTellsTheError) {
   const BallScene& scene = ball_scene();
   std::size_t below_one = 0;

@@ -60,6 +60,11 @@ Vec3 face_normal(const TriangleMesh& mesh, std::size_t face) {
   return doubled_area_vector(mesh, mesh.faces[face]).stableNormalized();
 }
 
+bool is_measured(const TriangleMesh& mesh, std::size_t face) {
+  return std::all_of(mesh.faces[face].begin(), mesh.faces[face].end(),
+                     [&](int v) { return mesh.confidence[static_cast<std::size_t>(v)] > 0; });
+}
+
 std::vector<double> mean_bows(const TriangleMesh& mesh) {
   std::vector<double> areas(mesh.faces.size());
   std::vector<double> bows(mesh.faces.size());

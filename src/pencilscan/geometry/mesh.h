@@ -30,6 +30,8 @@ struct BoundingBox {
 /// Area-weighted unit normals per vertex (zero for a vertex without area).
 [[nodiscard]] std::vector<Vec3> vertex_normals(const TriangleMesh& mesh);
 [[nodiscard]] Vec3 face_normal(const TriangleMesh& mesh, std::size_t face);  ///< unit, or zero
+/// All its vertices have confidence. Of a mesh with confidences.
+[[nodiscard]] bool is_measured(const TriangleMesh& mesh, std::size_t face);
 /// How high a smooth surface through the vertices, with the mesh's vertex normals, stands over the
 /// faces around each vertex, mm, > 0 where it is convex: the mean over the areas of these faces and
 /// of their neighbours.

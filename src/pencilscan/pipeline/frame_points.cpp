@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "pencilscan/core/median.h"
+#include "pencilscan/core/parallel.h"
 #include "pencilscan/pipeline/frame.h"
 #include "pencilscan/pipeline/frame_warnings.h"
 #include "pencilscan/pipeline/view_agreement.h"
@@ -21,24 +22,47 @@ double plane_error_px(const CrossingDisagreement& crossings) {
 }
 
 /// The nodes of all depth maps.
-std::vector<MeasuredPoint> dense_points(const Rig& rig, std::span<const DepthMap> maps) {
-  std::vector<MeasuredPoint> points;
-  for (const DepthMap& map : maps) {
+MeasuredPoint point_at(const DepthMap& map, const Vec2& pixel, const Vec3& position, float sigma) {
+  MeasuredPoint p;
+  set_position(position, p);
+  p.u = static_cast<float>(pixel.x());
+  p.v = static_cast<float>(pixel.y());
+  p.camera = static_cast<std::uint8_t>(map.camera);
+  p.sigma = sigma;
+  return p;
+}
+
+/// The measured surface as each camera sees it: its own nodes, and where it has none, what others
+/// measured.
+std::vector<MeasuredPoint> dense_points(const Rig& rig, std::span<const DepthMap> maps,
+                                        const RayScene& scene) {
+  constexpr double kLeastCosine = 0.2;  // of the incidence, as of windows
+  const TriangleMesh& mesh = scene.mesh();
+  std::vector<std::vector<MeasuredPoint>> of_map(maps.size());
+  parallel_for(maps.size(), [&](std::size_t m) {
+    const DepthMap& map = maps[m];
     const Camera& camera = rig.cameras[static_cast<std::size_t>(map.camera)];
     for (std::size_t i = 0; i < map.nodes.size(); ++i) {
-      if (!map.nodes[i].measured()) continue;
-      const Vec3 x = node_point(rig, map, i);
       const Vec2 pixel = map.pixel(i);
-      MeasuredPoint p;
-      set_position(x, p);
-      p.u = static_cast<float>(pixel.x());
-      p.v = static_cast<float>(pixel.y());
-      p.camera = static_cast<std::uint8_t>(map.camera);
-      const double length = camera.normalized_from_pixel(pixel).homogeneous().norm();
-      p.sigma = map.nodes[i].sigma * static_cast<float>(length);
-      points.push_back(p);
+      if (map.nodes[i].measured()) {
+        const double length = camera.normalized_from_pixel(pixel).homogeneous().norm();
+        of_map[m].push_back(point_at(map, pixel, node_point(rig, map, i),
+                                     map.nodes[i].sigma * static_cast<float>(length)));
+        continue;
+      }
+      const Ray ray = camera.ray(pixel);
+      const auto hit = scene.first_hit(ray);
+      if (!hit || !is_measured(mesh, hit->face)) continue;
+      const double cosine = -ray.direction.dot(face_normal(mesh, hit->face));
+      if (cosine < kLeastCosine) continue;
+      float sigma = 0;
+      for (const int v : mesh.faces[hit->face])
+        sigma = std::max(sigma, mesh.sigma[static_cast<std::size_t>(v)]);
+      of_map[m].push_back(point_at(map, pixel, hit->point, sigma / static_cast<float>(cosine)));
     }
-  }
+  });
+  std::vector<MeasuredPoint> points;
+  for (const auto& some : of_map) points.insert(points.end(), some.begin(), some.end());
   return points;
 }
 
@@ -103,7 +127,7 @@ FrameResult match_on_surface(const Rig& rig, FrameResult result, const PointOpti
     points.contradicted = drop_contradicted(rig, *shape.scene, points.graphs, points.labeling);
     const std::vector<LocalSurface> surfaces =
         match_guided(rig, points.families, taken_presence(points.detections), points.graphs,
-                     points.labeling, guided, dense_points(rig, shape.depth.maps));
+                     points.labeling, guided, dense_points(rig, shape.depth.maps, *shape.scene));
     std::vector<MeasuredPoint> triangulated =
         triangulate(rig, points.graphs, points.labeling, options.triangulation);
     SettledPoints settled = settle_on_surface(

@@ -23,11 +23,7 @@ class SurfaceCheck {
   /// Where a ray meets the surface; nothing where that was not measured.
   [[nodiscard]] Hit look(const Ray& ray) const {
     Hit hit = surface_.first_hit(ray);
-    const TriangleMesh& mesh = surface_.mesh();
-    if (hit && std::any_of(mesh.faces[hit->face].begin(), mesh.faces[hit->face].end(), [&](int v) {
-          return !(mesh.confidence[static_cast<std::size_t>(v)] > 0);
-        }))
-      hit.reset();
+    if (hit && !is_measured(surface_.mesh(), hit->face)) hit.reset();
     return hit;
   }
 

@@ -168,12 +168,8 @@ std::vector<SurfaceEvidence> attribute_vertices(std::span<const SurfaceSample> s
 }
 
 std::vector<char> measured_faces(const TriangleMesh& mesh) {
-  std::vector<char> keep(mesh.faces.size(), 1);
-  for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
-    for (const int v : mesh.faces[f]) {
-      if (!(mesh.confidence[static_cast<std::size_t>(v)] > 0)) keep[f] = 0;
-    }
-  }
+  std::vector<char> keep(mesh.faces.size());
+  for (std::size_t f = 0; f < keep.size(); ++f) keep[f] = is_measured(mesh, f) ? 1 : 0;
   return keep;
 }
 
