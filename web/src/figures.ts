@@ -10,7 +10,7 @@ import {kStageWords, wordList} from './words';
 const kReasons = ['no_crossing', 'ambiguous', 'contradicted', 'outside_volume'];
 const words = (key: string) => key.replace(/_/g, ' ');
 const kStages = ['reading', 'detection', 'grid', 'solution', 'refinement', 'guided matching', 'triangulation',
-  'depth', 'surface', 'holes', 'color', 'guided matching on the surface', 'measured surface', 'pictures'];
+  'depth', 'surface', 'holes', 'color', 'guided matching on the surface', 'confirmation', 'pictures'];
 const kBands = ['below_3px', '3_5px', '5_8px', '8_12px', 'from_12px'];
 
 /** In the order of `known`; what is not in it comes last. */

@@ -15,7 +15,7 @@ export const kStageWords: Record<string, string> = {
   depth: 'between the curves, depth is fitted to the light of all projectors',
   surface: 'depth of all cameras becomes one closed surface',
   'guided matching on the surface': 'the closed surface removes labels that contradict it, and tells where missing lines are',
-  'measured surface': 'what no labelled point supports no longer counts as measured',
+  confirmation: 'what no labelled point supports no longer counts as measured',
   holes: 'places of the surface that nobody measured get their reason',
   color: 'the surface gets its albedo',
   pictures: 'pictures of the result are drawn',

@@ -65,7 +65,7 @@ FrameResult measure_frame(const Rig& rig, const Frame& frame, PointResult lines,
   result.shape = measure_shape(rig, right, result.points, options.shape, links, clock);
   if (links.only_hands_on) return result;
   result = match_on_surface(rig, std::move(result), options.points, clock);
-  clock("measured surface",
+  clock("confirmation",
         [&] { result = finish_shape(rig, std::move(result), options.shape.fusion); });
   return count_motion(rig, std::move(result));
 }
