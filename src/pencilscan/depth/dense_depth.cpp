@@ -146,9 +146,8 @@ class FloorView {
 };
 
 constexpr std::size_t kPilots = 100;
-constexpr std::size_t kEnoughPilots =
-    20;                          // medians of ten each tell noise in the dark and the bright
-constexpr double kFacing = 0.5;  // cosine; flatter, a plane from other cameras is off in the slope
+constexpr std::size_t kEnoughPilots = 20;  // ten each tell the noise in the dark and the bright
+constexpr double kFacing = 0.5;  // cosine; flatter, a plane from other cameras is off in its slope
 
 double cost(const WindowFit& fit) { return static_cast<double>(fit.misfit); }
 

@@ -118,14 +118,16 @@ void guided_depth(const Rig& rig, const RayScene& surface, const DepthStageOptio
       with_wider_windows(light, widest, completing, complete);
       return count;
     };
-    const DepthMap before = result.lights[i].is_measured ? DepthMap{} : map;
-    found[i] = completed(result.lights[i], map);
-    if (result.lights[i].is_measured) return;
+    if (result.lights[i].is_measured) {
+      found[i] = completed(result.lights[i], map);
+      return;
+    }
     // Labels told little of its blur and noise. The surface of other cameras may tell more.
     CameraLight light = result.lights[i];
-    measure_light(pilot_windows(light, surface, before, depth), depth, light);
-    DepthMap again = before;
+    measure_light(pilot_windows(light, surface, map, depth), depth, light);
+    DepthMap again = map;
     const std::size_t found_again = completed(light, again);
+    found[i] = completed(result.lights[i], map);
     if (found_again <= found[i]) return;
     found[i] = found_again;
     map = std::move(again);

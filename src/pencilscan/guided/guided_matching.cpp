@@ -86,7 +86,6 @@ class CameraMatching {
                                   float margin) const;
   [[nodiscard]] bool is_long_enough(const std::vector<char>& decided, int begin, int end) const;
   [[nodiscard]] std::vector<std::vector<char>> decided_points() const;
-  [[nodiscard]] int family_of(PatternRef ref) const;
   [[nodiscard]] float expected_width(const PredictedPoint& p) const;
   [[nodiscard]] LabeledRun run_of(int curve, int begin, int end, const LineName& name) const {
     return {
@@ -149,15 +148,6 @@ CameraMatching::CameraMatching(const Rig& rig, const std::vector<ColorFamily>& f
     if (p.camera == graph.camera) dense_.push_back(p);
   }
   accept(std::exchange(runs, {}));
-}
-
-int CameraMatching::family_of(PatternRef ref) const {
-  for (std::size_t f = 0; f < families_.size(); ++f) {
-    const auto& patterns = families_[f].patterns;
-    if (std::find(patterns.begin(), patterns.end(), ref) != patterns.end())
-      return static_cast<int>(f);
-  }
-  return -1;
 }
 
 /// Width of the profile of a predicted line, px.
@@ -256,7 +246,7 @@ std::optional<LineName> CameraMatching::line_at(const CurvePoint& point, int fam
   };
   std::vector<Candidate> candidates;
   aligned_predictions(point, [&](const PredictedPoint& p, float across) {
-    if (across > 2 * options_.max_offset_px || family_of(p.pattern) != family) return;
+    if (across > 2 * options_.max_offset_px || family_of(families_, p.pattern) != family) return;
     const Candidate candidate{{p.pattern, p.line}, across, is_near(across, p), p.spacing_px};
     const auto known = std::find_if(candidates.begin(), candidates.end(),
                                     [&](const Candidate& c) { return c.name == candidate.name; });
@@ -404,7 +394,7 @@ bool CameraMatching::fits(const CurvePoint& point, const LineName& name, int fam
 /// A curve where a line is predicted, as wide as it would be there.
 Curve CameraMatching::guess_of(const LineChain& chain) const {
   Curve curve;
-  curve.family = family_of(chain.front().pattern);
+  curve.family = family_of(families_, chain.front().pattern);
   for (const PredictedPoint& p : chain) {
     CurvePoint point;
     point.position = p.position;

@@ -5,6 +5,7 @@
 #include "pencilscan/pipeline/picture_check.h"
 #include "pencilscan/pipeline/picture_trial.h"
 #include "pencilscan/pipeline/shown_lines.h"
+#include "pencilscan/points/settle.h"
 #include "pencilscan/rig/camera_light.h"
 
 namespace pencilscan {
@@ -38,7 +39,7 @@ std::vector<int> projectors_with_few_names(const Rig& rig, const Labeling& label
 /// ones.
 bool have_right_names(const Rig& rig, const PointResult& found,
                       const std::vector<std::size_t>& cameras) {
-  const auto points = points_by_camera(rig, found.graphs, found.labeling);
+  const auto points = points_by_camera(rig, some_points(rig, found));
   return std::any_of(cameras.begin(), cameras.end(), [&](std::size_t c) {
     return shown_lines(rig, found.families, found.graphs[c], points).fits();
   });

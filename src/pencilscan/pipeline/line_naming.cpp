@@ -16,6 +16,7 @@ TellingPoints telling_points(const Labeling& labeling) {
   return sum;
 }
 
+/// What the crossings of the labels say, with the rig as given.
 void judge(const Rig& rig, const std::vector<GridGraph>& graphs, LineNaming& naming) {
   const std::vector<CrossingTrack> tracks = crossing_tracks(rig, graphs, naming.labeling);
   naming.crossings = crossing_disagreement(rig, tracks);
@@ -44,7 +45,7 @@ double least_named_share(const Labeling& labeling) {
 LineNaming name_lines(const Rig& rig, const std::vector<ColorFamily>& families,
                       const std::vector<GridGraph>& graphs, Labeling labeling,
                       const PointOptions& options, const std::function<bool()>& is_confirmed) {
-  constexpr double kNearlyAll = 0.8;    // of the nameable points; right names reach .9 and more
+  constexpr double kNearlyAll = 0.8;    // of the telling points; right names reach .9 and more
   constexpr double kAsClosely = 1.2;    // the misses that noise lets expect are known to a fifth
   constexpr double kClearlyMore = 1.1;  // points named, of those before
   constexpr double kAsWell = 1.2;       // crossings' misses, of those before

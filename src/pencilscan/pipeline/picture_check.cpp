@@ -9,6 +9,7 @@
 #include "pencilscan/pipeline/picture_trial.h"
 #include "pencilscan/pipeline/shown_lines.h"
 #include "pencilscan/pipeline/view_agreement.h"
+#include "pencilscan/points/settle.h"
 #include "pencilscan/rig/camera_light.h"
 
 namespace pencilscan {
@@ -140,7 +141,7 @@ std::vector<PictureFinding> misplaced_pictures(const Rig& rig, const Frame& fram
     suspects.push_back(std::move(suspect));
   }
   if (suspects.empty()) return {};
-  const auto points = points_by_camera(rig, found.graphs, found.labeling);
+  const auto points = points_by_camera(rig, some_points(rig, found));
   const std::size_t others = of_others.size();
   const double usual = others == 0 ? 2 * kFewNamed : upper_median(std::move(of_others));
 
@@ -200,8 +201,7 @@ std::vector<PictureFinding> contradicting_pictures(const Rig& rig, const Frame& 
                                                    const PointResult& found,
                                                    const PointOptions& options) {
   const std::size_t count = rig.cameras.size();
-  std::vector<std::vector<MeasuredPoint>> points =
-      points_by_camera(rig, found.graphs, found.labeling);
+  std::vector<std::vector<MeasuredPoint>> points = points_by_camera(rig, some_points(rig, found));
   const ViewAgreement agreement(rig, points);
   const auto shown = [&](std::size_t c) {
     return shown_lines(rig, found.families, found.graphs[c], points);
@@ -234,7 +234,7 @@ std::vector<PictureFinding> contradicting_pictures(const Rig& rig, const Frame& 
 }
 
 bool points_lie_on_lines(const Rig& rig, const PointResult& found) {
-  const auto points = points_by_camera(rig, found.graphs, found.labeling);
+  const auto points = points_by_camera(rig, some_points(rig, found));
   std::size_t fit = 0;
   for (const GridGraph& graph : found.graphs) {
     const ShownLines shown = shown_lines(rig, found.families, graph, points);

@@ -38,7 +38,7 @@ struct PictureFinding {
 /// undone in turn, and the camera's curves are named alone. The one after which most curves have a
 /// name was the fault. Where none helps, the picture does not fit, unless it shows lines where
 /// other cameras measured them (shown_lines.h): a camera may see little that two projectors light.
-/// `labeling`: of all cameras (joint).
+/// `found`: with the labels of all cameras (joint).
 [[nodiscard]] std::vector<PictureFinding> misplaced_pictures(const Rig& rig, const Frame& frame,
                                                              const PointResult& found,
                                                              const PointOptions& options);
@@ -55,9 +55,8 @@ struct PictureFinding {
 [[nodiscard]] bool points_lie_on_lines(const Rig& rig, const PointResult& found);
 
 /// Finds two projectors that show each other's patterns: their lines have next to no names, and
-/// each of the cameras with the smallest named share gets more once these are exchanged.
-/// `labeling`: of all cameras (joint). Only projectors with panels of one size and different
-/// patterns are tried.
+/// each of the cameras with the smallest named share gets more once these are exchanged. `found` as
+/// above. Only projectors with panels of one size and different patterns are tried.
 [[nodiscard]] std::optional<std::pair<int, int>> exchanged_projectors(const Rig& rig,
                                                                       const Frame& frame,
                                                                       const PointResult& found,

@@ -4,19 +4,10 @@
 
 namespace pencilscan {
 
-std::vector<MeasuredPoint> some_points(const Rig& rig, const std::vector<GridGraph>& graphs,
-                                       const Labeling& labeling) {
+std::vector<MeasuredPoint> some_points(const Rig& rig, const PointResult& found) {
   TriangulationOptions options;
   options.used_of_seven = 1;
-  return triangulate(rig, graphs, labeling, options);
-}
-
-std::vector<std::vector<MeasuredPoint>> points_by_camera(const Rig& rig,
-                                                         const std::vector<GridGraph>& graphs,
-                                                         const Labeling& labeling) {
-  std::vector<std::vector<MeasuredPoint>> points(rig.cameras.size());
-  for (const MeasuredPoint& p : some_points(rig, graphs, labeling)) points[p.camera].push_back(p);
-  return points;
+  return triangulate(rig, found.graphs, found.labeling, options);
 }
 
 PictureTrial::PictureTrial(const Rig& rig, const PointOptions& options)
@@ -33,8 +24,7 @@ TellingPoints PictureTrial::telling_points(std::size_t c, const cv::Mat& light) 
 }
 
 std::vector<MeasuredPoint> PictureTrial::points(std::size_t c, const cv::Mat& light) const {
-  const PointResult result = solved(c, light);
-  return some_points(rig_, result.graphs, result.labeling);
+  return some_points(rig_, solved(c, light));
 }
 
 PointResult PictureTrial::solved(std::size_t c, const cv::Mat& light) const {

@@ -10,14 +10,8 @@ namespace pencilscan {
 /// and less.
 constexpr double kFewNamed = 0.4;
 
-/// Measured points of every seventh pixel of the curves.
-[[nodiscard]] std::vector<MeasuredPoint> some_points(const Rig& rig,
-                                                     const std::vector<GridGraph>& graphs,
-                                                     const Labeling& labeling);
-
-/// The same by camera.
-[[nodiscard]] std::vector<std::vector<MeasuredPoint>> points_by_camera(
-    const Rig& rig, const std::vector<GridGraph>& graphs, const Labeling& labeling);
+/// Measured points of every seventh pixel of the labelled curves.
+[[nodiscard]] std::vector<MeasuredPoint> some_points(const Rig& rig, const PointResult& found);
 
 /// Names the curves of single pictures, which come as linear light of three colours.
 class PictureTrial {

@@ -15,26 +15,14 @@ constexpr double kOn = 1;             // px
 constexpr double kMostSigma = 0.5;    // px
 constexpr double kLeastCosine = 0.5;  // between where a surface faces, about, and the camera
 
-/// Which family has the lines of a point; nothing for one that is not in the rig's patterns.
-std::optional<std::size_t> family_of(const std::vector<ColorFamily>& families,
-                                     const MeasuredPoint& p) {
-  for (std::size_t f = 0; f < families.size(); ++f) {
-    for (const PatternRef& pattern : families[f].patterns)
-      if (pattern.projector == p.projector && pattern.pattern == p.pattern) return f;
-  }
-  return std::nullopt;
-}
-
 /// A curve point or what should lie on one: families are far from each other.
-Vec3 place(const Vec2& pixel, std::size_t family) {
-  return {pixel.x(), pixel.y(), 10 * kNear * static_cast<double>(family)};
-}
+Vec3 place(const Vec2& pixel, int family) { return {pixel.x(), pixel.y(), 10 * kNear * family}; }
 
 /// A point of another camera in this one's picture.
 struct Seen {
   Vec2 pixel = Vec2::Zero();
   double depth = 0;
-  std::size_t family = 0;
+  int family = 0;
   bool faces = false;  ///< this camera, and its place is well known
 };
 
@@ -80,9 +68,9 @@ ShownLines shown_lines(const Rig& rig, const std::vector<ColorFamily>& families,
     for (const MeasuredPoint& p : points[c]) {
       const Vec3 x = position_of(p);
       const std::optional<Vec2> pixel = camera.project(x);
-      const std::optional<std::size_t> family = family_of(families, p);
-      if (!pixel || !camera.contains(*pixel) || !family) continue;
-      Seen s{*pixel, (camera.device_from_world * x).z(), *family, false};
+      if (!pixel || !camera.contains(*pixel)) continue;
+      Seen s{*pixel, (camera.device_from_world * x).z(),
+             family_of(families, {p.projector, p.pattern}), false};
       // A surface that one device sees and another one lights faces about the middle of them.
       const Vec3 facing = (rig.cameras[c].center() - x).normalized() +
                           (rig.projectors[p.projector].center() - x).normalized();
@@ -95,8 +83,7 @@ ShownLines shown_lines(const Rig& rig, const std::vector<ColorFamily>& families,
   std::vector<Vec3> places;
   for (const Curve& curve : graph.curves) {
     for (const CurvePoint& point : curve.points)
-      places.push_back(
-          place(point.position.cast<double>(), static_cast<std::size_t>(curve.family)));
+      places.push_back(place(point.position.cast<double>(), curve.family));
   }
   const PointGrid curves(places, kNear);
   ShownLines shown;

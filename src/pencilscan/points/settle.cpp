@@ -81,14 +81,14 @@ std::optional<MeasuredPoint> settled(const MeasuredPoint& point, const LocalSurf
   return result;
 }
 
+}  // namespace
+
 std::vector<std::vector<MeasuredPoint>> points_by_camera(const Rig& rig,
                                                          std::span<const MeasuredPoint> points) {
   std::vector<std::vector<MeasuredPoint>> by_camera(rig.cameras.size());
   for (const MeasuredPoint& p : points) by_camera[p.camera].push_back(p);
   return by_camera;
 }
-
-}  // namespace
 
 std::vector<LocalSurface> local_surfaces(const Rig& rig, std::span<const MeasuredPoint> points,
                                          const LocalSurfaceOptions& options) {

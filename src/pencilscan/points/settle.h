@@ -29,6 +29,10 @@ struct SettleOptions {
                                                        std::span<const LocalSurface> surfaces,
                                                        const SettleOptions& options = {});
 
+/// The points of each camera, in their order.
+[[nodiscard]] std::vector<std::vector<MeasuredPoint>> points_by_camera(
+    const Rig& rig, std::span<const MeasuredPoint> points);
+
 /// The surfaces that all points show, per camera.
 [[nodiscard]] std::vector<LocalSurface> local_surfaces(const Rig& rig,
                                                        std::span<const MeasuredPoint> points,

@@ -66,6 +66,13 @@ std::vector<ColorFamily> color_families(const Rig& rig) {
   return families;
 }
 
+int family_of(const std::vector<ColorFamily>& families, PatternRef pattern) {
+  const auto found = std::find_if(families.begin(), families.end(), [&](const ColorFamily& f) {
+    return std::find(f.patterns.begin(), f.patterns.end(), pattern) != f.patterns.end();
+  });
+  return found == families.end() ? -1 : static_cast<int>(found - families.begin());
+}
+
 Rig with_registered_patterns(Rig rig) {
   if (std::all_of(rig.projectors.begin(), rig.projectors.end(),
                   [](const Projector& p) { return p.color_registration.none(); }))

@@ -21,6 +21,8 @@ struct ColorFamily {
 };
 
 [[nodiscard]] std::vector<ColorFamily> color_families(const Rig& rig);
+/// Index of the family that has a pattern; -1: none.
+[[nodiscard]] int family_of(const std::vector<ColorFamily>& families, PatternRef pattern);
 
 /// The rig with every pattern where the projector's model has the colours by which its lines are
 /// found (presence), so that color_registration of projectors is spent: twice is as once. Lines of
