@@ -11,13 +11,14 @@
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/pipeline/curve_output.h"
+#include "pencilscan/pipeline/sensor_frame.h"
 
 namespace pencilscan {
 
 struct DetectedFrame::Inner {
   Rig rig;
-  Rig in_footprints;
-  Frame frame;  ///< with pictures of its own
+  Frame frame;         ///< with pictures of its own
+  SensorFrame sensor;  ///< lengths in footprints
   PointResult found;
   CurveFile curves;
   std::vector<GridCurve> grid;
@@ -147,7 +148,6 @@ DetectedFrame detect(const Rig& rig, const Images& images, const ReconstructionO
   if (identities) how.points.method = MultiviewOptions{};
   auto inner = std::make_shared<DetectedFrame::Inner>();
   inner->rig = rig;
-  inner->in_footprints = in_footprints(rig);
   inner->frame = frame_of(rig, images, options);
   for (auto* pictures : {&inner->frame.images, &inner->frame.plain})
     for (cv::Mat& picture : *pictures) picture = picture.clone();
@@ -156,7 +156,8 @@ DetectedFrame detect(const Rig& rig, const Images& images, const ReconstructionO
   run_stages(options.progress, told_stages(), [&](const Progress& progress) {
     std::vector<StageTime> times;
     const StageClock clock(progress, times);
-    inner->found = detect_frame(inner->in_footprints, inner->frame, how.points, clock);
+    inner->sensor = sensor_frame(in_footprints(rig), inner->frame);
+    inner->found = detect_frame(inner->sensor.rig, inner->sensor.frame, how.points, clock);
   });
   inner->found.labeling = no_labels(rig.cameras.size());
   inner->curves = describe_curves(rig, inner->found);
@@ -180,8 +181,8 @@ std::vector<PointLabel> label(const DetectedFrame& detected, const Reconstructio
   run_stages(options.progress, told_stages(), [&](const Progress& progress) {
     std::vector<StageTime> times;
     const StageClock clock(progress, times);
-    PointResult curves = check_pictures(inner.in_footprints, inner.frame, inner.found);
-    lines = solve_frame(inner.in_footprints, inner.frame, std::move(curves), how.points, clock);
+    PointResult curves = check_pictures(inner.sensor.rig, inner.sensor.frame, inner.found);
+    lines = solve_frame(inner.sensor.rig, inner.sensor.frame, std::move(curves), how.points, clock);
   });
   return labels_of(graphs, inner.curves.samples.size(), lines.labeling);
 }
@@ -195,7 +196,7 @@ Reconstruction reconstruct(const DetectedFrame& detected, std::span<const PointL
         "labels", "", std::to_string(labels.size()),
         "must be " + std::to_string(inner.curves.samples.size()) + ", one for every curve point");
   Labeling labeling = labeling_of(inner.rig, inner.found.graphs, labels);
-  PointResult lines = check_pictures(inner.in_footprints, inner.frame, inner.found);
+  PointResult lines = check_pictures(inner.sensor.rig, inner.sensor.frame, inner.found);
   for (std::size_t c = 0; c < lines.left_out.size(); ++c)
     if (lines.left_out[c] != 0) labeling.runs[c].clear();
   // Images of `found` stay as they are, whatever the stages do to theirs.
@@ -211,7 +212,7 @@ Reconstruction reconstruct(const DetectedFrame& detected, std::span<const PointL
     links.progress = progress;
     const StageClock clock(progress, times);
     FrameResult found =
-        measure_frame(inner.in_footprints, inner.frame, std::move(lines), how, links, clock);
+        measure_frame(inner.sensor.rig, inner.sensor.frame, std::move(lines), how, links, clock);
     found = in_unit_of(inner.rig, std::move(found));
     result = reconstruction_of(inner.rig, inner.frame, std::move(found), options.depth_maps);
   });

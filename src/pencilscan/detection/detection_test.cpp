@@ -178,6 +178,92 @@ TEST(LooksInterpolated, TellsFilledInColoursFromThreeChannels) {
   EXPECT_TRUE(looks_interpolated(demosaiced(sampled(rgb, mosaic), mosaic)));
 }
 
+/// Lines of two colours in the noise of three full channels.
+cv::Mat noisy_lines() {
+  return cv::max(draw({{.x = 60, .y = 0, .angle = 1.2, .width = 5, .color = {0.1F, 0.8F, 1}},
+                       {.x = 310, .y = 0, .angle = 1.9, .width = 6, .color = {1, 0.2F, 0.1F}},
+                       {.x = 0, .y = 170, .angle = 0.3, .width = 4, .color = {0.2F, 1, 0.2F}}},
+                      480, 360, 0.02),
+                 0);
+}
+
+/// The colours of a raw picture filled in by the gradient-corrected filters as Malvar, He and
+/// Cutler print them, in eighths.
+cv::Mat gradient_corrected(const cv::Mat& raw, const Mosaic& mosaic) {
+  const cv::Mat green = (cv::Mat_<float>(5, 5) << 0, 0, -1, 0, 0, 0, 0, 2, 0, 0, -1, 2, 4, 2, -1, 0,
+                         0, 2, 0, 0, 0, 0, -1, 0, 0);
+  const cv::Mat beside = (cv::Mat_<float>(5, 5) << 0, 0, 0.5, 0, 0, 0, -1, 0, -1, 0, -1, 4, 5, 4,
+                          -1, 0, -1, 0, -1, 0, 0, 0, 0.5, 0, 0);
+  const cv::Mat opposite = (cv::Mat_<float>(5, 5) << 0, 0, -1.5, 0, 0, 0, 2, 0, 2, 0, -1.5, 0, 6, 0,
+                            -1.5, 0, 2, 0, 2, 0, 0, 0, -1.5, 0, 0);
+  cv::Mat of_green, of_beside, of_below, of_opposite;
+  cv::filter2D(raw, of_green, CV_32F, green / 8);
+  cv::filter2D(raw, of_beside, CV_32F, beside / 8);
+  cv::filter2D(raw, of_below, CV_32F, beside.t() / 8);
+  cv::filter2D(raw, of_opposite, CV_32F, opposite / 8);
+  cv::Mat rgb(raw.size(), CV_32FC3);
+  for (int y = 0; y < raw.rows; ++y) {
+    for (int x = 0; x < raw.cols; ++x) {
+      for (int color = 0; color < 3; ++color) {
+        const bool is_beside = mosaic.color(x + 1, y) == color;
+        const bool is_below = mosaic.color(x, y + 1) == color;
+        const cv::Mat& filled = mosaic.color(x, y) == color ? raw
+                                : is_beside && is_below     ? of_green
+                                : is_beside                 ? of_beside
+                                : is_below                  ? of_below
+                                                            : of_opposite;
+        rgb.at<cv::Vec3f>(y, x)[color] = std::clamp(filled.at<float>(y, x), 0.F, 1.F);
+      }
+    }
+  }
+  return rgb;
+}
+
+/// As a camera with a black level and a gamma stores light.
+cv::Mat stored_picture(const cv::Mat& light, const Camera& camera, int depth) {
+  cv::Mat values;
+  cv::pow(cv::max(light, 0.0), 1 / camera.gamma, values);
+  values = values * (1 - camera.black_level) + cv::Scalar::all(camera.black_level);
+  cv::Mat stored;
+  values.convertTo(stored, depth, depth == CV_8U ? 255 : 65535);
+  return stored;
+}
+
+TEST(MosaicBehind, IsFoundWhereItsSamplesStandInThePicture) {
+  const cv::Mat rgb = noisy_lines();
+  for (const char* name : {"RGGB", "BGGR", "GRBG", "GBRG"}) {
+    const Mosaic mosaic = *Mosaic::from_name(name);
+    const cv::Mat raw = sampled(rgb, mosaic);
+    for (const double gamma : {1.0, 2.2}) {
+      Camera camera;
+      camera.gamma = gamma;
+      camera.black_level = 0.05;
+      for (const int depth : {CV_8U, CV_16U}) {
+        for (const cv::Mat& filled : {demosaiced(raw, mosaic), gradient_corrected(raw, mosaic)}) {
+          const cv::Mat stored = stored_picture(filled, camera, depth);
+          EXPECT_EQ(mosaic_behind(camera, stored), mosaic) << name << " " << gamma;
+          // A picture that was changed afterwards does not hold the samples.
+          cv::Mat blurred;
+          cv::GaussianBlur(stored, blurred, {}, 0.5);
+          EXPECT_EQ(mosaic_behind(camera, blurred), std::nullopt) << name << " " << gamma;
+        }
+      }
+      EXPECT_EQ(mosaic_behind(camera, stored_picture(rgb, camera, CV_8U)), std::nullopt) << gamma;
+    }
+  }
+}
+
+TEST(MosaicBehind, SmoothPicturesOfThreeChannelsHaveNone) {
+  const Camera camera;
+  for (const double blur : {0.5, 1.0, 2.0, 4.0}) {
+    const cv::Mat rgb =
+        draw({{.x = 60, .y = 0, .angle = 1.2, .width = 12, .color = {1, 0.8F, 1}},
+              {.x = 0, .y = 70, .angle = 0.3, .width = 8, .color = {0.9F, 1, 0.2F}}},
+             160, 120, 0, blur);
+    EXPECT_EQ(mosaic_behind(camera, stored_picture(rgb, camera, CV_8U)), std::nullopt) << blur;
+  }
+}
+
 TEST(SampleColor, OfAStoredImageIsThatOfItsValues) {
   for (const int type : {CV_8UC3, CV_16UC3, CV_8UC1, CV_16UC1}) {
     cv::Mat stored(20, 30, type);

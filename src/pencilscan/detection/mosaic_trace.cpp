@@ -3,8 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
+#include <vector>
 
 #include "pencilscan/core/check.h"
+#include "pencilscan/io/linear_light.h"
+#include "pencilscan/rig/camera_light.h"
 
 namespace pencilscan {
 namespace {
@@ -42,6 +46,119 @@ std::array<PhaseSum, 4> phase_sums(const cv::Mat& rgb, int channel) {
   return phases;
 }
 
+enum class Interpolation { kNearest, kGradientCorrected };
+
+constexpr int kFilterReach = 2;  // px, of the interpolations
+
+/// Linear light of some rows of a picture (CV_32FC3), and the mosaic's samples in it.
+class Samples {
+ public:
+  Samples(const cv::Mat& light, const Mosaic& mosaic) : light_(light), mosaic_(mosaic) {}
+
+  [[nodiscard]] int color(int x, int y) const { return mosaic_.color(x, y); }
+  [[nodiscard]] float value(int x, int y, int color) const {
+    return light_.at<cv::Vec3f>(y, x)[color];
+  }
+  [[nodiscard]] float at(int x, int y) const { return value(x, y, color(x, y)); }
+  /// The means of two samples on both sides, of four around, and of the four on the diagonals.
+  [[nodiscard]] float pair(int x, int y, int dx, int dy) const {
+    return (at(x - dx, y - dy) + at(x + dx, y + dy)) / 2;
+  }
+  [[nodiscard]] float cross(int x, int y, int step) const {
+    return (pair(x, y, step, 0) + pair(x, y, 0, step)) / 2;
+  }
+  [[nodiscard]] float corners(int x, int y) const {
+    return (pair(x, y, 1, 1) + pair(x, y, 1, -1)) / 2;
+  }
+
+ private:
+  const cv::Mat& light_;
+  const Mosaic& mosaic_;
+};
+
+/// Where the samples of a colour lie that a pixel does not have.
+struct Neighbors {
+  bool beside = false;
+  bool below = false;
+};
+
+Neighbors neighbors(const Samples& s, int x, int y, int color) {
+  return {s.color(x + 1, y) == color, s.color(x, y + 1) == color};
+}
+
+/// Least and greatest of the nearest samples of a colour.
+std::pair<float, float> range(const Samples& s, int x, int y, const Neighbors& at) {
+  std::pair<float, float> range(1e9F, -1e9F);
+  const auto add = [&](int dx, int dy) {
+    for (const int side : {-1, 1}) {
+      const float sample = s.at(x + side * dx, y + side * dy);
+      range = {std::min(range.first, sample), std::max(range.second, sample)};
+    }
+  };
+  if (at.beside) add(1, 0);
+  if (at.below) add(0, 1);
+  if (at.beside || at.below) return range;
+  add(1, 1);
+  add(1, -1);
+  return range;
+}
+
+/// How far the colour of a pixel is from what an interpolation makes of the samples around it.
+float apart(const Samples& s, Interpolation how, int x, int y, int color, const Neighbors& at) {
+  const auto off = [&](float made) {
+    return std::abs(std::clamp(made, 0.F, 1.F) - s.value(x, y, color));
+  };
+  if (how == Interpolation::kNearest) {
+    if (at.beside && at.below)
+      return std::min({off(s.pair(x, y, 1, 0)), off(s.pair(x, y, 0, 1)), off(s.cross(x, y, 1))});
+    if (at.beside) return off(s.pair(x, y, 1, 0));
+    return off(at.below ? s.pair(x, y, 0, 1) : s.corners(x, y));
+  }
+  const float here = s.at(x, y);
+  if (at.beside && at.below) return off(s.cross(x, y, 1) + 0.5F * (here - s.cross(x, y, 2)));
+  if (!at.beside && !at.below) return off(s.corners(x, y) + 0.75F * (here - s.cross(x, y, 2)));
+  const int dx = at.beside ? 1 : 0;
+  const int dy = 1 - dx;
+  return off(s.pair(x, y, dx, dy) + 0.625F * here - 0.5F * s.corners(x, y) -
+             0.25F * s.pair(x, y, 2 * dx, 2 * dy) + 0.125F * s.pair(x, y, 2 * dy, 2 * dx));
+}
+
+/// A mosaic and what may have filled in its colours.
+class Candidate {
+ public:
+  Candidate(const Mosaic& mosaic, Interpolation how) : mosaic_(mosaic), how_(how) {}
+
+  /// Looks at the two rows in the middle of `light`. `tolerance`: in values, of a brightest light.
+  template <class Tolerance>
+  void look(const cv::Mat& light, Tolerance tolerance) {
+    constexpr float kContrast = 8;  // tolerances
+    const Samples samples(light, mosaic_);
+    for (int y = kFilterReach; y < light.rows - kFilterReach; ++y) {
+      for (int x = kFilterReach; x < light.cols - kFilterReach && !is_out(); ++x) {
+        for (int color = 0; color < 3; ++color) {
+          if (samples.color(x, y) == color) continue;
+          const Neighbors at = neighbors(samples, x, y, color);
+          const auto [least, most] = range(samples, x, y, at);
+          const float allowed = tolerance(std::max(most, samples.at(x, y)));
+          if (most - least < kContrast * allowed) continue;
+          ++telling_;
+          if (apart(samples, how_, x, y, color, at) <= allowed) ++agreeing_;
+        }
+      }
+    }
+  }
+
+  [[nodiscard]] const Mosaic& mosaic() const { return mosaic_; }
+  [[nodiscard]] bool is_out() const { return telling_ >= 200 && agreeing_ < 0.9 * telling_; }
+  [[nodiscard]] bool is_it() const { return telling_ >= 1000 && agreeing_ >= 0.99 * telling_; }
+
+ private:
+  Mosaic mosaic_;
+  Interpolation how_;
+  double telling_ = 0;
+  double agreeing_ = 0;
+};
+
 }  // namespace
 
 bool looks_interpolated(const cv::Mat& rgb) {
@@ -56,6 +173,33 @@ bool looks_interpolated(const cv::Mat& rgb) {
     if (error > 0 && most->mean() - least->mean() > kDeviations * error) return true;
   }
   return false;
+}
+
+std::optional<Mosaic> mosaic_behind(const Camera& camera, const cv::Mat& stored) {
+  PENCILSCAN_CHECK(stored.channels() == 3);
+  constexpr int kRows = 2;   // looked at together: all places of a mosaic
+  constexpr int kEvery = 8;  // of so many rows
+  // Samples are rounded, and what is made of them once or twice: 1.5 steps at most were measured.
+  const double rounding = 2.0 / (stored.depth() == CV_16U ? 4095 : 255);
+  const auto tolerance = [&](float light) {
+    const double slope = std::pow(static_cast<double>(std::max(light, 0.F)), 1 - 1 / camera.gamma);
+    return static_cast<float>(rounding * camera.gamma * slope / (1 - camera.black_level));
+  };
+  std::vector<Candidate> candidates;
+  for (const char* name : {"RGGB", "BGGR", "GRBG", "GBRG"}) {
+    for (const Interpolation how : {Interpolation::kNearest, Interpolation::kGradientCorrected})
+      candidates.emplace_back(*Mosaic::from_name(name), how);
+  }
+  for (int y = kFilterReach; y + kRows + kFilterReach <= stored.rows; y += kEvery) {
+    const cv::Mat rows = stored.rowRange(y - kFilterReach, y + kRows + kFilterReach);
+    const cv::Mat light = linearized(camera_values(camera, rows), camera.gamma, camera.black_level);
+    for (Candidate& candidate : candidates) candidate.look(light, tolerance);
+    std::erase_if(candidates, [](const Candidate& candidate) { return candidate.is_out(); });
+    if (candidates.empty()) return std::nullopt;
+  }
+  // A picture without noise may be so smooth that every mosaic fills it in.
+  const bool is_known = candidates.size() == 1 && candidates.front().is_it();
+  return is_known ? std::optional(candidates.front().mosaic()) : std::nullopt;
 }
 
 }  // namespace pencilscan

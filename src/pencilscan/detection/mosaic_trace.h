@@ -1,6 +1,9 @@
 #pragma once
 
 #include <opencv2/core.hpp>
+#include <optional>
+
+#include "pencilscan/rig/rig.h"
 
 namespace pencilscan {
 
@@ -8,5 +11,13 @@ namespace pencilscan {
 /// the mean of their neighbours by more than what was interpolated from these (after Gallagher and
 /// Chen 2008). In a picture of three full channels, the four places of a 2 x 2 mosaic are alike.
 [[nodiscard]] bool looks_interpolated(const cv::Mat& rgb);
+
+/// The mosaic whose samples stand unchanged in a picture as stored (three channels of any depth):
+/// where the picture has contrast, every other colour is, to rounding, what an interpolation makes
+/// of them. Known are means of the nearest samples, a missing green also along one direction alone,
+/// and the gradient-corrected filters of Malvar, He and Cutler (High-quality linear interpolation
+/// for demosaicing of Bayer-patterned color images, ICASSP 2004). Nothing where none of them is it:
+/// three full channels, another interpolation, or pictures that were changed after it.
+[[nodiscard]] std::optional<Mosaic> mosaic_behind(const Camera& camera, const cv::Mat& stored);
 
 }  // namespace pencilscan

@@ -1,6 +1,8 @@
 #include "pencilscan/io/mosaic.h"
 
 #include <algorithm>
+#include <cstdint>
+#include <cstring>
 
 #include "pencilscan/core/check.h"
 #include "pencilscan/core/parallel.h"
@@ -34,12 +36,17 @@ std::string Mosaic::name() const {
 }
 
 cv::Mat sampled(const cv::Mat& rgb, const Mosaic& mosaic) {
-  PENCILSCAN_CHECK(rgb.type() == CV_32FC3);
-  cv::Mat raw(rgb.size(), CV_32FC1);
+  PENCILSCAN_CHECK(rgb.channels() == 3);
+  cv::Mat raw(rgb.size(), rgb.depth());
+  const std::size_t bytes = raw.elemSize();
   for (int y = 0; y < raw.rows; ++y) {
-    const auto* in = rgb.ptr<cv::Vec3f>(y);
-    float* out = raw.ptr<float>(y);
-    for (int x = 0; x < raw.cols; ++x) out[x] = in[x][mosaic.color(x, y)];
+    const std::uint8_t* in = rgb.ptr(y);
+    std::uint8_t* out = raw.ptr(y);
+    for (int x = 0; x < raw.cols; ++x) {
+      std::memcpy(out, in + static_cast<std::size_t>(mosaic.color(x, y)) * bytes, bytes);
+      in += 3 * bytes;
+      out += bytes;
+    }
   }
   return raw;
 }

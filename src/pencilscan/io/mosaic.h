@@ -27,7 +27,7 @@ class Mosaic {
   std::array<int, 4> colors_{0, 1, 1, 2};
 };
 
-/// What a sensor with this mosaic keeps of an image: CV_32FC3 RGB to CV_32FC1.
+/// What a sensor with this mosaic keeps of an image: RGB of any depth to one channel of it.
 [[nodiscard]] cv::Mat sampled(const cv::Mat& rgb, const Mosaic& mosaic);
 
 /// All three colours of every pixel, each colour from its own samples: CV_32FC1 to CV_32FC3 RGB.

@@ -6,6 +6,7 @@
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/pipeline/coarse_view.h"
 #include "pencilscan/pipeline/frame_warnings.h"
+#include "pencilscan/pipeline/sensor_frame.h"
 #include "pencilscan/surface/manifold.h"
 
 namespace pencilscan {
@@ -38,10 +39,10 @@ FrameResult reconstruct_frame(const Rig& stated, const Frame& frame, const Frame
   }
   std::vector<StageTime> times;
   const StageClock clock(links.progress, times);
-  const Rig fine = in_footprints(stated);
-  const auto coarse = coarse_view(fine, frame, options);
-  const Rig& rig = coarse ? coarse->rig : fine;
-  const Frame& seen = coarse ? coarse->frame : frame;
+  const SensorFrame fine = sensor_frame(in_footprints(stated), frame);
+  const auto coarse = coarse_view(fine.rig, fine.frame, options);
+  const Rig& rig = coarse ? coarse->rig : fine.rig;
+  const Frame& seen = coarse ? coarse->frame : fine.frame;
   const FrameOptions& how = coarse ? coarse->options : options;
   PointResult curves = detect_frame(rig, seen, how.points, clock);
   curves = check_pictures(rig, seen, std::move(curves));
@@ -72,10 +73,11 @@ FrameResult measure_frame(const Rig& rig, const Frame& frame, PointResult lines,
 
 PointResult measure_points(const Rig& stated, const Frame& frame, const PointOptions& options,
                            const StageClock& clock) {
-  const Rig rig = with_registered_patterns(stated);
-  PointResult curves = detect_frame(rig, frame, options, clock);
-  curves = check_pictures(rig, frame, std::move(curves));
-  PointResult lines = solve_frame(rig, frame, std::move(curves), options, clock);
+  const SensorFrame sensor = sensor_frame(with_registered_patterns(stated), frame);
+  const Rig& rig = sensor.rig;
+  PointResult curves = detect_frame(rig, sensor.frame, options, clock);
+  curves = check_pictures(rig, sensor.frame, std::move(curves));
+  PointResult lines = solve_frame(rig, sensor.frame, std::move(curves), options, clock);
   return place_points(rig, std::move(lines), options, clock);
 }
 

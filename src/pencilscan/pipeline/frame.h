@@ -41,6 +41,7 @@ struct Frame {
   /// The same moment in plain light, for colour: as `images`, or nothing at all.
   std::vector<cv::Mat> plain;
   std::optional<FrameTiming> timing;  ///< where the pictures have time stamps
+  std::vector<Warning> notes;         ///< what is known of the pictures before they are looked at
 };
 
 /// What decides the labelled points.

@@ -20,7 +20,7 @@ void add_name(std::string& names, const std::string& name, const char* separator
 std::vector<Warning> detection_warnings(const Rig& rig, const Frame& frame,
                                         std::span<const ColorFamily> families,
                                         std::span<const CameraDetection> detections) {
-  std::vector<Warning> warnings;
+  std::vector<Warning> warnings = frame.notes;
   for (const ColorFamily& family : families) {
     if (family.leakage <= 0.1) continue;
     std::string names;
@@ -76,7 +76,7 @@ std::optional<Warning> gamma_warning(const Rig& rig, const Frame& frame,
   std::vector<double> gammas(rig.cameras.size(), 0);
   parallel_for(rig.cameras.size(), [&](std::size_t c) {
     const Camera& camera = rig.cameras[c];
-    if (graphs[c].crossings.empty() || camera.mosaic) return;  // raw samples count light
+    if (graphs[c].crossings.empty()) return;
     const auto trace = gamma_at_crossings(graphs[c], linear_light(camera, frame.images[c]));
     if (!trace) return;
     const double off = std::abs(std::log(trace->gamma));

@@ -9,7 +9,8 @@
 
 namespace pencilscan {
 
-/// What detection says of a frame's pictures: colours that mix, no picture, no lines, saturation.
+/// A frame's notes and what detection says of its pictures: colours that mix, no picture, no lines,
+/// saturation.
 [[nodiscard]] std::vector<Warning> detection_warnings(const Rig& rig, const Frame& frame,
                                                       std::span<const ColorFamily> families,
                                                       std::span<const CameraDetection> detections);

@@ -119,6 +119,30 @@ TEST_F(Laws, TheGainDecidesNothing) {
   EXPECT_GT(agreement(same.points.points, other.points.points), 0.98);
 }
 
+/// Where the samples of a mosaic stand in a picture whose colours were filled in, that picture is
+/// worth what they are.
+TEST_F(Laws, FilledInColoursGiveWhatTheirSamplesGive) {
+  const Mosaic mosaic = *Mosaic::from_name("GRBG");
+  Rig raw_rig = *rig_;
+  for (Camera& camera : raw_rig.cameras) camera.mosaic = mosaic;
+  Frame raw = *frame_;
+  Frame filled_in = *frame_;
+  for (std::size_t c = 0; c < raw.images.size(); ++c) {
+    sampled(frame_->images[c], mosaic).convertTo(raw.images[c], CV_8U, 255);
+    cv::Mat values;
+    raw.images[c].convertTo(values, CV_32F);
+    demosaiced(values, mosaic).convertTo(filled_in.images[c], CV_8U);
+  }
+  const FrameResult of_raw = reconstruct_frame(raw_rig, raw, points_alone());
+  const FrameResult of_filled = reconstruct_frame(*rig_, filled_in, points_alone());
+  ASSERT_GT(of_raw.points.points.size(), 1000U);
+  EXPECT_EQ(of_filled.points.points.size(), of_raw.points.points.size());
+  EXPECT_EQ(agreement(of_filled.points.points, of_raw.points.points), 1);
+  const auto is_told = [](const Warning& w) { return w.code == WarningCode::kColorsFilledIn; };
+  const auto& warnings = of_filled.points.warnings;
+  EXPECT_EQ(std::count_if(warnings.begin(), warnings.end(), is_told), 1);
+}
+
 constexpr double kGamma = 2.2;
 
 Frame coded(const Frame& frame) {

@@ -1,0 +1,17 @@
+#pragma once
+
+#include "pencilscan/pipeline/frame.h"
+
+namespace pencilscan {
+
+/// A frame as the sensors gave it: pictures whose colours were filled in behind a mosaic are their
+/// samples again where these stand in them unchanged (detection/mosaic_trace.h), and their cameras
+/// have that mosaic. A note says which.
+struct SensorFrame {
+  Rig rig;
+  Frame frame;
+};
+
+[[nodiscard]] SensorFrame sensor_frame(Rig rig, Frame frame);
+
+}  // namespace pencilscan
