@@ -59,7 +59,7 @@ reconstructs entire shapes from one frame of a ring of cameras and
 projectors: rigs, simulation, calibration, reconstruction, evaluation.")
 # What pencilscan-config.cmake looks for.
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS
-  "libassimp-dev, libblosc-dev, libceres-dev, libeigen3-dev, libembree-dev, libopencv-dev, libtbb-dev, nlohmann-json3-dev, zlib1g-dev")
+  "libassimp-dev, libblosc-dev, libceres-dev, libdeflate-dev, libeigen3-dev, libembree-dev, libopencv-dev, libtbb-dev, nlohmann-json3-dev, zlib1g-dev")
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SUGGESTS "pencilscan-doc, cmake")
 
 pencilscan_package(python python3-pencilscan python "Entire shapes from one frame (Python 3)"

@@ -1,7 +1,5 @@
 #include "pencilscan/io/image.h"
 
-#include <zlib.h>
-
 #include <algorithm>
 #include <array>
 #include <cstring>
@@ -16,6 +14,7 @@
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/lower_case.h"
 #include "pencilscan/io/file.h"
+#include "pencilscan/io/png.h"
 
 namespace pencilscan {
 namespace {
@@ -23,36 +22,6 @@ namespace {
 using std::string_view_literals::operator""sv;
 
 constexpr std::array<const char*, 6> kEndings = {".png", ".tiff", ".tif", ".jpg", ".jpeg", ".bmp"};
-
-std::uint32_t big_endian_32(std::string_view bytes, std::size_t at) {
-  std::uint32_t value = 0;
-  for (std::size_t k = 0; k < 4; ++k) {
-    value = value << 8 | static_cast<unsigned char>(bytes[at + k]);
-  }
-  return value;
-}
-
-constexpr std::string_view kPng = "\x89PNG\r\n\x1a\n"sv;
-
-/// Walks the chunks (length, type, data, checksum) to IEND, as long as is_right(type and data,
-/// checksum). PNG specification, section 5.
-template <class IsRight>
-bool reaches_end_of_png(std::string_view bytes, IsRight is_right) {
-  std::size_t at = kPng.size();
-  while (at + 12 <= bytes.size()) {
-    const std::size_t length = big_endian_32(bytes, at);
-    if (length > bytes.size() - at - 12) return false;
-    if (!is_right(bytes.substr(at + 4, 4 + length), big_endian_32(bytes, at + 8 + length)))
-      return false;
-    if (bytes.substr(at + 4, 4) == "IEND"sv) return true;
-    at += 12 + length;
-  }
-  return false;
-}
-
-bool png_is_whole(std::string_view bytes) {
-  return reaches_end_of_png(bytes, [](std::string_view, std::uint32_t) { return true; });
-}
 
 /// True when an end-of-image marker follows the last start-of-scan. Cameras append bytes after it.
 bool jpeg_is_whole(std::string_view bytes) {
@@ -73,8 +42,8 @@ bool bmp_is_whole(std::string_view bytes) {
 void check_whole(const std::filesystem::path& path, std::string_view bytes) {
   const auto fail = [&](const char* rule) { throw InputError(path.string(), "", "", rule); };
   if (bytes.empty()) fail("the image file is empty");
-  if (bytes.starts_with(kPng)) {
-    if (!png_is_whole(bytes)) fail("truncated PNG: it must end with an IEND chunk");
+  if (is_png(bytes)) {
+    if (!png_reaches_end(bytes)) fail("truncated PNG: it must end with an IEND chunk");
   } else if (bytes.starts_with("\xff\xd8"sv)) {
     if (!jpeg_is_whole(bytes)) fail("truncated JPEG: it must end with an end-of-image marker");
   } else if (bytes.starts_with("BM"sv)) {
@@ -84,7 +53,8 @@ void check_whole(const std::filesystem::path& path, std::string_view bytes) {
   }
 }
 
-/// Decoded as stored: without rotation by EXIF, alpha dropped, palette expanded.
+/// Decoded by OpenCV as stored, in RGB order: without rotation by EXIF, alpha dropped, palette
+/// expanded.
 cv::Mat decode(const std::filesystem::path& path, const std::string& bytes) {
   const cv::Mat encoded(1, static_cast<int>(bytes.size()), CV_8UC1,
                         const_cast<char*>(bytes.data()));  // NOLINT: imdecode only reads
@@ -96,6 +66,15 @@ cv::Mat decode(const std::filesystem::path& path, const std::string& bytes) {
     image.release();
   }
   if (image.empty()) throw InputError(path.string(), "", "", "cannot be decoded as an image");
+  if (image.depth() != CV_8U && image.depth() != CV_16U && image.depth() != CV_32F)
+    throw InputError(path.string(), "", "", "must have 8 or 16 bit per channel");
+  if (image.channels() == 4) {
+    cv::cvtColor(image, image, cv::COLOR_BGRA2RGB);
+  } else if (image.channels() == 3) {
+    cv::cvtColor(image, image, cv::COLOR_BGR2RGB);
+  } else if (image.channels() != 1) {
+    throw InputError(path.string(), "", "", "must be grey or colour");
+  }
   return image;
 }
 
@@ -122,16 +101,8 @@ std::string lower_ending(const std::filesystem::path& path) {
 cv::Mat read_stored_image(const std::filesystem::path& path) {
   const std::string bytes = read_file(path);
   check_whole(path, bytes);
+  if (std::optional<cv::Mat> plain = plain_png(bytes)) return *std::move(plain);
   cv::Mat image = decode(path, bytes);
-  if (image.depth() != CV_8U && image.depth() != CV_16U && image.depth() != CV_32F)
-    throw InputError(path.string(), "", "", "must have 8 or 16 bit per channel");
-  if (image.channels() == 4) {
-    cv::cvtColor(image, image, cv::COLOR_BGRA2RGB);
-  } else if (image.channels() == 3) {
-    cv::cvtColor(image, image, cv::COLOR_BGR2RGB);
-  } else if (image.channels() != 1) {
-    throw InputError(path.string(), "", "", "must be grey or colour");
-  }
   cv::Point wrong;
   constexpr double kMost = std::numeric_limits<float>::max();
   if (image.depth() == CV_32F && !cv::checkRange(image, true, &wrong, -kMost, kMost)) {
@@ -143,21 +114,7 @@ cv::Mat read_stored_image(const std::filesystem::path& path) {
 }
 
 std::optional<ImageShape> sound_png(const std::filesystem::path& path) {
-  const std::string bytes = read_file(path);
-  constexpr std::size_t kHeader = 33;  // signature and IHDR
-  if (!bytes.starts_with(kPng) || bytes.size() < kHeader) return std::nullopt;
-  const bool is_sound =
-      reaches_end_of_png(bytes, [](std::string_view chunk, std::uint32_t checksum) {
-        return crc32_z(0, reinterpret_cast<const Bytef*>(chunk.data()), chunk.size()) == checksum;
-      });
-  const char bits = bytes[24];
-  const char color = bytes[25];
-  constexpr char kGrey = 0;
-  constexpr char kRgb = 2;
-  if (!is_sound || (bits != 8 && bits != 16) || (color != kGrey && color != kRgb))
-    return std::nullopt;
-  return ImageShape{static_cast<int>(big_endian_32(bytes, 16)),
-                    static_cast<int>(big_endian_32(bytes, 20)), color == kGrey ? 1 : 3};
+  return sound_png_shape(read_file(path));
 }
 
 cv::Mat unit_values(const cv::Mat& stored) {

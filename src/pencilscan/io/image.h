@@ -4,6 +4,8 @@
 #include <opencv2/core.hpp>
 #include <optional>
 
+#include "pencilscan/io/png.h"
+
 namespace pencilscan {
 
 /// Reads PNG, TIFF, JPEG or BMP, 8 or 16 bit, grey or colour. Result: CV_32FC3 in **RGB** order,
@@ -19,11 +21,6 @@ namespace pencilscan {
 /// CV_32FC3 in [0, 1] of an image as stored; grey is replicated.
 [[nodiscard]] cv::Mat unit_image(const cv::Mat& stored);
 
-struct ImageShape {
-  int width = 0;
-  int height = 0;
-  int channels = 0;
-};
 /// The shape of a PNG of 8 or 16 bits, grey or RGB, whose bytes are those that were written, by the
 /// checksums of its chunks: a tenth of the time that decoding takes. Nothing of any other file.
 [[nodiscard]] std::optional<ImageShape> sound_png(const std::filesystem::path& path);
