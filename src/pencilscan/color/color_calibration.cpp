@@ -56,7 +56,7 @@ std::optional<MeasuredNumber> measure_gamma(const CapturePair& pair, const Rig& 
   const Camera& camera = rig.cameras[pair.camera];
   const Projector& projector = rig.projectors[pair.projector];
   const auto image = [&](std::size_t i) {
-    return channel(read_color_image(pair.files[i], camera), 1);
+    return channel(read_color_image(pair, pair.files[i], camera), 1);
   };
   const auto sequence = gray_code_sequence(projector.width, projector.height);
   std::vector<std::pair<cv::Mat, cv::Mat>> patterns;
@@ -96,7 +96,7 @@ void ColorCollector::measure_channels(const CapturePair& pair, const DecodedView
   const Projector& projector = rig_.projectors[pair.projector];
   const double gamma = gamma_of(pair.camera, color.gamma);
   const auto read = [&](const std::filesystem::path& path) {
-    return linearized(read_color_image(path, camera), gamma);
+    return linearized(read_color_image(pair, path, camera), gamma);
   };
   GrayStack stack = make_gray_stack(projector.width, projector.height, pair.inverses,
                                     [&](std::size_t i) { return read(pair.files[i]); });
@@ -120,7 +120,7 @@ void ColorCollector::add(const CapturePair& pair, const DecodedView& grey) {
   if (!is_new) return;
   PairColor& color = at->second;
   color.gamma = measure_gamma(pair, rig_);
-  const cv::Mat white = read_color_image(pair.files.front(), rig_.cameras[pair.camera]);
+  const cv::Mat white = read_color_image(pair, pair.files.front(), rig_.cameras[pair.camera]);
   color.in_color = cv::countNonZero(channel(white, 0) != channel(white, 1)) > 0;
   if (color.in_color) measure_channels(pair, grey, color);
 }

@@ -5,11 +5,14 @@
 #include <algorithm>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
+#include <string>
 #include <vector>
 
 #include "pencilscan/core/random.h"
 #include "pencilscan/gray/image_order.h"
 #include "pencilscan/gray/local_map.h"
+#include "pencilscan/io/image.h"
+#include "pencilscan/io/temporary_folder.h"
 
 namespace pencilscan {
 namespace {
@@ -131,6 +134,39 @@ INSTANTIATE_TEST_SUITE_P(
                       Scene{.gamma = 2.2}, Scene{.inverses = false},
                       Scene{.ambient = 0.2, .contrast = 0.15, .inverses = false},
                       Scene{.noise = 0.001, .rounded = false}));
+
+/// Cameras of 10, 12 or 14 bits leave their values in the low ones of 16, or fill these.
+TEST(GrayStack, ValuesOfASensorFillItsRange) {
+  const TemporaryFolder folder("gray_stack");
+  Rig rig;
+  rig.cameras.emplace_back();
+  rig.cameras[0].name = "cam0";
+  rig.cameras[0].width = rig.cameras[0].height = kSize;
+  rig.cameras[0].black_level = 64. / 65535;
+  rig.projectors.emplace_back();
+  rig.projectors[0].name = "proj0";
+  rig.projectors[0].width = kPanelWidth;
+  rig.projectors[0].height = kPanelHeight;
+  Scene scene;
+  scene.rounded = false;
+  const GrayImageSource images = images_of(scene);
+  const std::size_t count = gray_code_sequence(kPanelWidth, kPanelHeight, true).size();
+  for (const double full : {1023., 4095., 65535.}) {
+    for (std::size_t i = 0; i < count; ++i) {
+      cv::Mat stored;
+      images(i).convertTo(stored, CV_16U, full - 64, 64);
+      const std::string number = std::to_string(1000 + i).substr(1) + ".png";
+      write_image(folder.path() / "proj0/cam0" / number, stored);
+    }
+    const auto pairs = list_captures(folder.path(), rig);
+    ASSERT_EQ(pairs.size(), 1U);
+    const GrayStack stack = read_gray_stack(pairs[0], rig);
+    EXPECT_LT(cv::norm(stack.white, images(0), cv::NORM_INF), 1 / full);
+    const Quality quality = quality_of(decode_gray_stack(stack));
+    EXPECT_GE(quality.kept, kLeastKept) << full;
+    EXPECT_LE(quality.gross, kMostGross) << full;
+  }
+}
 
 TEST(GrayDecode, UnlitPixelsSayWhy) {
   const DecodedView view = decoded({});

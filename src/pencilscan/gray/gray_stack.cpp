@@ -61,6 +61,18 @@ std::string names_of(const std::vector<DeviceT>& devices) {
   return names;
 }
 
+/// The range of the pictures' values, by some that are bright in whatever order they are.
+double range_of(const std::vector<fs::path>& files) {
+  constexpr std::size_t kBright = 4;
+  double most = 0;
+  for (std::size_t i = 0; i < std::min(kBright, files.size()); ++i) {
+    const cv::Mat stored = read_stored_image(files[i]);
+    if (stored.depth() != CV_16U) return 1;
+    most = std::max(most, greatest_value(stored));
+  }
+  return sensor_range(most);
+}
+
 CapturePair capture_pair(const fs::path& folder, const Projector& projector) {
   CapturePair pair;
   pair.folder = folder;
@@ -77,12 +89,13 @@ CapturePair capture_pair(const fs::path& folder, const Projector& projector) {
             " without inverses) for a panel of " + std::to_string(projector.width) + " x " +
             std::to_string(projector.height) + " px; " + what_is_missing(folder, pair.files));
   }
+  pair.range = range_of(pair.files);
   return pair;
 }
 
 }  // namespace
 
-cv::Mat read_color_image(const fs::path& path, const Camera& camera) {
+cv::Mat read_color_image(const CapturePair& pair, const fs::path& path, const Camera& camera) {
   const cv::Mat stored = read_stored_image(path);
   check_channels(camera, stored.channels(), path);
   cv::Mat color = camera_values(camera, stored);
@@ -93,6 +106,8 @@ cv::Mat read_color_image(const fs::path& path, const Camera& camera) {
                          " x " + std::to_string(camera.height));
   }
   color = linearized(color, 1, camera.black_level);
+  if (pair.range < 1 && camera.black_level < pair.range)
+    color = color * ((1 - camera.black_level) / (pair.range - camera.black_level));
   return camera.mosaic ? demosaiced(color, *camera.mosaic) : color;
 }
 
@@ -157,7 +172,7 @@ std::vector<CapturePair> list_captures(const fs::path& captures, const Rig& rig)
 }
 
 cv::Mat read_gray_image(const CapturePair& pair, const Rig& rig, std::size_t image) {
-  const cv::Mat color = read_color_image(pair.files[image], rig.cameras[pair.camera]);
+  const cv::Mat color = read_color_image(pair, pair.files[image], rig.cameras[pair.camera]);
   cv::Mat grey;
   cv::transform(color, grey, cv::Matx13f(1.F / 3, 1.F / 3, 1.F / 3));
   return grey;

@@ -37,6 +37,7 @@ struct CapturePair {
   std::size_t projector = 0;  ///< index in the rig
   std::size_t camera = 0;     ///< index in the rig
   bool inverses = true;
+  double range = 1;  ///< of its values in [0, 1]: sensor_range() (rig/camera_light.h)
   std::filesystem::path folder;
   std::vector<std::filesystem::path> files;
   /// Those of solid_images() that are there, by name.
@@ -49,9 +50,10 @@ struct CapturePair {
 [[nodiscard]] std::vector<CapturePair> list_captures(const std::filesystem::path& captures,
                                                      const Rig& rig);
 
-/// One image of a pair without its black level, gamma as stored, CV_32FC3 RGB; the colours that a
-/// mosaic leaves out are interpolated. InputError when its size is not the camera's.
-[[nodiscard]] cv::Mat read_color_image(const std::filesystem::path& path, const Camera& camera);
+/// One image of a pair, in its range without its black level, gamma as stored, CV_32FC3 RGB; the
+/// colours that a mosaic leaves out are interpolated. InputError when its size is not the camera's.
+[[nodiscard]] cv::Mat read_color_image(const CapturePair& pair, const std::filesystem::path& path,
+                                       const Camera& camera);
 /// One image of a pair as grey. InputError when its size is not the camera's.
 [[nodiscard]] cv::Mat read_gray_image(const CapturePair& pair, const Rig& rig, std::size_t image);
 /// Reads one pair's images; colour becomes grey. InputError when an image's size is not the

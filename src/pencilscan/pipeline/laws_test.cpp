@@ -119,6 +119,21 @@ TEST_F(Laws, TheGainDecidesNothing) {
   EXPECT_GT(agreement(same.points.points, other.points.points), 0.98);
 }
 
+/// Sensors of 10 or 12 bits leave their values in the low ones of 16.
+TEST_F(Laws, TheBitsOfTheSensorDecideNothing) {
+  const FrameResult same = reconstruct_frame(*rig_, *frame_, points_alone());
+  for (const int full : {1023, 4095}) {
+    constexpr int kBlack = 64;
+    Rig rig = *rig_;
+    for (Camera& camera : rig.cameras) camera.black_level = kBlack / 65535.;
+    Frame stored = *frame_;
+    for (std::size_t c = 0; c < stored.images.size(); ++c)
+      frame_->images[c].convertTo(stored.images[c], CV_16U, full - kBlack, kBlack);
+    const FrameResult other = reconstruct_frame(rig, stored, points_alone());
+    EXPECT_GT(agreement(same.points.points, other.points.points), 0.99) << full;
+  }
+}
+
 /// Where the samples of a mosaic stand in a picture whose colours were filled in, that picture is
 /// worth what they are.
 TEST_F(Laws, FilledInColoursGiveWhatTheirSamplesGive) {

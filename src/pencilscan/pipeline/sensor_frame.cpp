@@ -1,5 +1,7 @@
 #include "pencilscan/pipeline/sensor_frame.h"
 
+#include <algorithm>
+#include <opencv2/core.hpp>
 #include <optional>
 #include <string>
 #include <utility>
@@ -7,6 +9,7 @@
 
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/detection/mosaic_trace.h"
+#include "pencilscan/rig/camera_light.h"
 
 namespace pencilscan {
 namespace {
@@ -16,10 +19,45 @@ void keep_samples(const Mosaic& mosaic, std::vector<cv::Mat>& images, std::size_
   if (c < images.size() && !images[c].empty()) images[c] = sampled(images[c], mosaic);
 }
 
+bool is_of_16_bits(const cv::Mat& image) { return !image.empty() && image.depth() == CV_16U; }
+
+/// Of all cameras alike, so that their light compares.
+double range_of(const std::vector<cv::Mat>& images) {
+  double most = -1;
+  for (const cv::Mat& image : images)
+    if (is_of_16_bits(image)) most = std::max(most, greatest_value(image));
+  return most < 0 ? 1 : sensor_range(most);
+}
+
+/// Values of a sensor with fewer bits than 16 fill the range, and its black is 0.
+void fill_range(double range, double black, cv::Mat& image) {
+  const double gain = 1 / (range - black);
+  cv::Mat filled;
+  image.convertTo(filled, CV_16U, gain, -gain * 65535 * black);
+  image = filled;
+}
+
+void fill_range(Rig& rig, Frame& frame) {
+  const double range = range_of(frame.images);
+  const double plain_range = range_of(frame.plain);
+  if (range == 1 && plain_range == 1) return;
+  for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
+    Camera& camera = rig.cameras[c];
+    const bool has_plain = c < frame.plain.size() && !frame.plain[c].empty();
+    const bool are_of_16_bits = (frame.images[c].empty() || is_of_16_bits(frame.images[c])) &&
+                                (!has_plain || is_of_16_bits(frame.plain[c]));
+    if (!are_of_16_bits || camera.black_level >= std::min(range, plain_range)) continue;
+    if (!frame.images[c].empty()) fill_range(range, camera.black_level, frame.images[c]);
+    if (has_plain) fill_range(plain_range, camera.black_level, frame.plain[c]);
+    camera.black_level = 0;
+  }
+}
+
 }  // namespace
 
 SensorFrame sensor_frame(Rig rig, Frame frame) {
   SensorFrame result{std::move(rig), std::move(frame)};
+  fill_range(result.rig, result.frame);
   std::vector<Camera>& cameras = result.rig.cameras;
   std::vector<std::optional<Mosaic>> mosaics(cameras.size());
   parallel_for(cameras.size(), [&](std::size_t c) {

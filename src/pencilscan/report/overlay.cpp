@@ -96,7 +96,11 @@ void chain(std::vector<Eigen::Vector2f>& points, int key, std::vector<OverlayCur
 cv::Mat displayable(const cv::Mat& image) {
   if (image.type() == CV_8UC3) return image.clone();
   PENCILSCAN_CHECK(image.type() == CV_32FC3);
-  cv::Mat shown = cv::min(cv::max(image, 0.0), 1.0);
+  constexpr double kDark = 1. / 16;
+  double peak = 0;
+  cv::minMaxIdx(image.reshape(1), nullptr, &peak);
+  const double gain = peak > 0 && peak < kDark ? 1 / peak : 1;
+  cv::Mat shown = cv::min(cv::max(gain * image, 0.0), 1.0);
   cv::pow(shown, 1 / 2.2, shown);
   shown.convertTo(shown, CV_8UC3, 255);
   return shown;

@@ -41,7 +41,8 @@ enum class OverlayKey { kLocalId, kProjector };
                                                          std::size_t camera, OverlayKey key,
                                                          std::span<const char> used = {});
 
-/// 8-bit sRGB-like picture (gamma 2.2) of a linear float image; 8-bit images are copied.
+/// 8-bit sRGB-like picture (gamma 2.2) of a linear float image, brightened where it fills less than
+/// a sixteenth of the range (12 bits of 16); 8-bit images are copied.
 [[nodiscard]] cv::Mat displayable(const cv::Mat& image);
 
 }  // namespace pencilscan

@@ -48,6 +48,15 @@ TEST(Overlay, CurveHasTheColorOfItsKeyAtItsPixels) {
   EXPECT_LT(ground[0], 100);
 }
 
+TEST(Displayable, DarkPicturesAreBrightened) {
+  const cv::Mat light = grey_image();
+  const auto shown = [](const cv::Mat& image) { return displayable(image).at<Color>(0, 0)[0]; };
+  EXPECT_EQ(shown(light), 123);  // 0.2^(1 / 2.2) of 255
+  EXPECT_LT(shown(0.5 * light), shown(light));
+  EXPECT_EQ(shown(light / 64), 255);
+  EXPECT_EQ(shown(0 * light), 0);
+}
+
 TEST(Overlay, ZoomKeepsPixelCentres) {
   const std::vector<OverlayCurve> curves = {{{{10, 20}, {40, 20}}, 0}};
   OverlayOptions options;

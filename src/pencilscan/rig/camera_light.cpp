@@ -58,6 +58,18 @@ cv::Mat linear_light(const Camera& camera, const cv::Mat& stored) {
   return camera.mosaic ? demosaiced(linear, *camera.mosaic) : linear;
 }
 
+double sensor_range(double most) {
+  for (const int bits : {10, 12, 14})
+    if (most < 1 << bits) return ((1 << bits) - 1) / 65535.;
+  return 1;
+}
+
+double greatest_value(const cv::Mat& stored) {
+  double most = 0;
+  cv::minMaxIdx(stored.reshape(1), nullptr, &most);
+  return most;
+}
+
 cv::Mat overexposed(const cv::Mat& stored) {
   cv::Mat full(stored.size(), CV_8UC1);
   const int channels = stored.channels();

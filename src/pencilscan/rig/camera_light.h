@@ -27,6 +27,13 @@ void check_camera_image(const Camera& camera, const std::filesystem::path& path)
 /// that a mosaic leaves out interpolated (io/mosaic.h).
 [[nodiscard]] cv::Mat linear_light(const Camera& camera, const cv::Mat& stored);
 
+/// Sensors of 10, 12 or 14 bits fill 16 of them, or leave their values in the low ones. The
+/// greatest value that a sensor has whose pictures, CV_16U, have `most` at most: of the fewest bits
+/// that hold it, in [0, 1] of 16 bits.
+[[nodiscard]] double sensor_range(double most);
+/// The greatest value of an image as stored, of any channel.
+[[nodiscard]] double greatest_value(const cv::Mat& stored);
+
 /// Values in [0, 1] from here on are at the top of the range.
 inline constexpr float kFullRange = 0.998F;
 
