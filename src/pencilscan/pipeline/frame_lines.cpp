@@ -75,7 +75,7 @@ std::optional<Rig> label_lines(const Rig& rig, const Frame& frame, const PointOp
 PointResult check_pictures(const Rig& rig, const Frame& frame, PointResult curves) {
   if (std::optional<Warning> warning = interpolation_warning(rig, curves.detections))
     curves.warnings.push_back(std::move(*warning));
-  if (std::optional<Warning> warning = gamma_warning(rig, frame, curves.graphs))
+  if (std::optional<Warning> warning = gamma_warning(rig, frame, curves.detections, curves.graphs))
     curves.warnings.push_back(std::move(*warning));
   leave_out(rig, plain_faults(rig, frame), curves);
   return curves;

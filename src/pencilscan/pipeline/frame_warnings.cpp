@@ -70,8 +70,10 @@ std::optional<Warning> interpolation_warning(const Rig& rig,
 }
 
 std::optional<Warning> gamma_warning(const Rig& rig, const Frame& frame,
+                                     std::span<const CameraDetection> detections,
                                      std::span<const GridGraph> graphs) {
-  constexpr double kWorthSaying = 1.3;  // halved colours of a JPEG look like a factor of up to 1.16
+  constexpr double kWorthSaying = 1.3;
+  constexpr double kOfFilledIn = 1.5;  // halved colours of a JPEG look like a factor of up to 1.3
   constexpr double kDeviations = 4;
   std::vector<double> gammas(rig.cameras.size(), 0);
   parallel_for(rig.cameras.size(), [&](std::size_t c) {
@@ -80,7 +82,8 @@ std::optional<Warning> gamma_warning(const Rig& rig, const Frame& frame,
     const auto trace = gamma_at_crossings(graphs[c], linear_light(camera, frame.images[c]));
     if (!trace) return;
     const double off = std::abs(std::log(trace->gamma));
-    if (off > std::log(kWorthSaying) && off > kDeviations * trace->deviation)
+    const double worth_saying = detections[c].is_filled_in ? kOfFilledIn : kWorthSaying;
+    if (off > std::log(worth_saying) && off > kDeviations * trace->deviation)
       gammas[c] = camera.gamma * trace->gamma;
   });
   std::string names;

@@ -22,6 +22,7 @@ namespace pencilscan {
 /// Which cameras' values are not the light that the rig says, and with which gamma they would be
 /// (grid/gamma_trace.h).
 [[nodiscard]] std::optional<Warning> gamma_warning(const Rig& rig, const Frame& frame,
+                                                   std::span<const CameraDetection> detections,
                                                    std::span<const GridGraph> graphs);
 
 /// Crossings miss each other by more than noise. `is_corrected`: lines were named with the devices
