@@ -7,17 +7,25 @@
 #include <vector>
 
 #include "pencilscan/core/check.h"
+#include "pencilscan/io/image.h"
 #include "pencilscan/io/linear_light.h"
 #include "pencilscan/rig/camera_light.h"
 
 namespace pencilscan {
 namespace {
 
-/// |value - mean of its four neighbours| at one place of a 2 x 2 mosaic.
+/// Differences at some places of a 2 x 2 mosaic.
 struct PhaseSum {
   double sum = 0;
   double squares = 0;
   double count = 0;
+
+  void add(float difference) {
+    const auto d = static_cast<double>(difference);
+    sum += d;
+    squares += d * d;
+    count += 1;
+  }
 
   [[nodiscard]] double mean() const { return sum / count; }
   /// Standard deviation of the mean.
@@ -26,6 +34,7 @@ struct PhaseSum {
   }
 };
 
+/// |value - mean of its four neighbours|.
 std::array<PhaseSum, 4> phase_sums(const cv::Mat& rgb, int channel) {
   std::array<PhaseSum, 4> phases;
   // Of each four rows two, which hold all four places.
@@ -36,11 +45,8 @@ std::array<PhaseSum, 4> phase_sums(const cv::Mat& rgb, int channel) {
     for (int x = 1; x + 1 < rgb.cols; ++x) {
       const float around =
           here[x - 1][channel] + here[x + 1][channel] + above[x][channel] + below[x][channel];
-      const auto d = static_cast<double>(std::abs(here[x][channel] - 0.25F * around));
-      PhaseSum& phase = phases[static_cast<std::size_t>(2 * (y % 2) + x % 2)];
-      phase.sum += d;
-      phase.squares += d * d;
-      phase.count += 1;
+      phases[static_cast<std::size_t>(2 * (y % 2) + x % 2)].add(
+          std::abs(here[x][channel] - 0.25F * around));
     }
   }
   return phases;
@@ -173,6 +179,38 @@ bool looks_interpolated(const cv::Mat& rgb) {
     if (error > 0 && most->mean() - least->mean() > kDeviations * error) return true;
   }
   return false;
+}
+
+Greens greens_of(const Mosaic& mosaic) {
+  constexpr int kGreen = 1;
+  return mosaic.color(1, 0) == kGreen ? Greens::kOdd : Greens::kEven;
+}
+
+Greens greens_of(const cv::Mat& samples) {
+  PENCILSCAN_CHECK(samples.channels() == 1);
+  // One of the differences; pictures of three channels and of grey cameras are within .001.
+  constexpr double kLeastShare = 0.02;
+  constexpr double kDeviations = 8;
+  constexpr int kEvery = 8;  // rows of which two are looked at
+  std::array<PhaseSum, 2> of_parity;
+  for (int y = 0; y + 2 <= samples.rows; y += kEvery) {
+    const cv::Mat rows = unit_values(samples.rowRange(y, y + 2));
+    const float* above = rows.ptr<float>(0);
+    const float* below = rows.ptr<float>(1);
+    for (int x = 0; x + 1 < rows.cols; ++x) {
+      // y is even: the places of the first difference have the parity of x, of the second the
+      // other.
+      of_parity[static_cast<std::size_t>(x % 2)].add(std::abs(above[x] - below[x + 1]));
+      of_parity[static_cast<std::size_t>((x + 1) % 2)].add(std::abs(above[x + 1] - below[x]));
+    }
+  }
+  const auto& [even, odd] = of_parity;
+  const double apart = even.mean() - odd.mean();
+  const double error = std::hypot(even.error(), odd.error());
+  if (!(std::abs(apart) > kDeviations * error) ||
+      std::abs(apart) < kLeastShare * std::max(even.mean(), odd.mean()))
+    return Greens::kNone;
+  return apart > 0 ? Greens::kOdd : Greens::kEven;
 }
 
 std::optional<Mosaic> mosaic_behind(const Camera& camera, const cv::Mat& stored) {

@@ -12,6 +12,17 @@ namespace pencilscan {
 /// Chen 2008). In a picture of three full channels, the four places of a 2 x 2 mosaic are alike.
 [[nodiscard]] bool looks_interpolated(const cv::Mat& rgb);
 
+/// Where the green samples of a mosaic lie.
+enum class Greens {
+  kNone,  ///< it is none
+  kOdd,   ///< x + y is odd: RGGB, BGGR
+  kEven,  ///< x + y is even: GRBG, GBRG
+};
+[[nodiscard]] Greens greens_of(const Mosaic& mosaic);
+/// Those of a picture of one channel, any depth: of the two diagonals of its 2 x 2 places, greens
+/// differ less from each other than red from blue. Without a mosaic, neither differs more.
+[[nodiscard]] Greens greens_of(const cv::Mat& samples);
+
 /// The mosaic whose samples stand unchanged in a picture as stored (three channels of any depth):
 /// where the picture has contrast, every other colour is, to rounding, what an interpolation makes
 /// of them. Known are means of the nearest samples, a missing green also along one direction alone,

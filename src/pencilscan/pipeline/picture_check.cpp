@@ -92,6 +92,9 @@ std::optional<std::pair<int, int>> exchanged_pair(
 }  // namespace
 
 std::string describe(const Rig& rig, const PictureFinding& finding) {
+  const auto mosaics = [](const PictureFinding& of) {
+    return of.greens == Greens::kOdd ? "RGGB or BGGR" : "GRBG or GBRG";
+  };
   const auto name = [&](int camera) { return rig.camera(camera).name; };
   const std::string who = "camera " + name(finding.camera) + ": its picture ";
   const std::string out = "; reconstructed without it";
@@ -100,11 +103,21 @@ std::string describe(const Rig& rig, const PictureFinding& finding) {
       return who + "is black: no projector's light is in it" + out;
     case PictureFault::kGrey:
       return who + "is grey, and lines are told apart by colour: take it in colour" + out;
+    case PictureFault::kUnstatedMosaic:
+      return who + "has one colour a pixel: state the \"mosaic\" of the camera, " +
+             mosaics(finding) + out;
+    case PictureFault::kOtherMosaic:
+      return who + "is not that of its mosaic in the rig: its green samples are those of " +
+             mosaics(finding) + ", or the camera mirrors it" + out;
     case PictureFault::kRepeated:
       return who + "is the same as camera " + name(finding.other) + "'s: one of them is a copy" +
              out;
     case PictureFault::kRedBlueExchanged:
-      return who + "has red and blue exchanged (BGR for RGB): store it as RGB" + out;
+      return who + "has red and blue exchanged (BGR for RGB): store it as RGB" +
+             (rig.camera(finding.camera).mosaic
+                  ? ", or state the \"mosaic\" of raw pictures with R for B"
+                  : "") +
+             out;
     case PictureFault::kExchanged:
       return who + "is that of camera " + name(finding.other) + ": exchange their files" + out;
     case PictureFault::kTurned:

@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "pencilscan/detection/mosaic_trace.h"
 #include "pencilscan/pipeline/frame.h"
 
 namespace pencilscan {
@@ -13,6 +14,8 @@ namespace pencilscan {
 enum class PictureFault {
   kBlack,             ///< no light in it
   kGrey,              ///< its colours are gone, and lines are told apart by colour
+  kUnstatedMosaic,    ///< its colours are the samples of a mosaic that the rig does not state
+  kOtherMosaic,       ///< its green samples lie where the stated mosaic has red and blue
   kRepeated,          ///< another camera has the same picture
   kRedBlueExchanged,  ///< its channels are stored as blue, green, red
   kExchanged,         ///< it fits where another camera stands
@@ -25,13 +28,15 @@ enum class PictureFault {
 struct PictureFinding {
   PictureFault fault = PictureFault::kBlack;
   int camera = 0;
-  int other = -1;  ///< the camera that has the same picture, or that it is of
+  int other = -1;                 ///< the camera that has the same picture, or that it is of
+  Greens greens = Greens::kNone;  ///< of the mosaic in the picture
 };
 
 /// One sentence for the user: which camera, what is wrong, what to do.
 [[nodiscard]] std::string describe(const Rig& rig, const PictureFinding& finding);
 
-/// Faults that show without looking for lines: black, grey, repeated. One a camera at most.
+/// Faults that show without looking for lines: black, grey, of another mosaic, repeated. One a
+/// camera at most.
 [[nodiscard]] std::vector<PictureFinding> plain_faults(const Rig& rig, const Frame& frame);
 
 /// Finds the fault of cameras whose curves the solution could not name. Each of the faults above is

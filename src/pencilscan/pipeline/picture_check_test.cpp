@@ -180,6 +180,26 @@ TEST_F(PictureCheck, ExchangedColorsAreNamed) {
   EXPECT_EQ(said_of(frame).size(), 6U);
 }
 
+TEST_F(PictureCheck, MosaicsThatAreNotStatedOrOthersAreNamed) {
+  for (const char* name : {"RGGB", "BGGR", "GRBG", "GBRG"}) {
+    const Mosaic mosaic = *Mosaic::from_name(name);
+    const bool are_odd = name[0] != 'G';
+    const std::string right = are_odd ? "RGGB or BGGR" : "GRBG or GBRG";
+    const Frame raw = with(2, sampled(frame_->images[2], mosaic));
+    expect_said(raw, {"one colour a pixel: state the \"mosaic\" of the camera, " + right});
+    Rig rig = *rig_;
+    rig.cameras[2].mosaic = mosaic;
+    EXPECT_THAT(said_of(raw, rig), IsEmpty()) << name;
+    rig.cameras[2].mosaic = Mosaic::from_name(are_odd ? "GBRG" : "RGGB");
+    EXPECT_THAT(said_of(raw, rig),
+                testing::ElementsAre(HasSubstr("green samples are those of " + right)));
+  }
+  // A picture of a grey camera has no mosaic.
+  cv::Mat grey;
+  cv::transform(frame_->images[4], grey, cv::Matx13f(0.3F, 0.6F, 0.1F));
+  expect_said(with(4, grey), {"is grey"});
+}
+
 TEST_F(PictureCheck, BlackGreyAndRepeatedPicturesAreNamed) {
   cv::Mat black(frame_->images[0].size(), CV_32FC3);
   cv::randn(black, 0.01, 0.005);

@@ -1,8 +1,10 @@
 #include <algorithm>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
+#include <optional>
 
 #include "pencilscan/core/median.h"
+#include "pencilscan/detection/mosaic_trace.h"
 #include "pencilscan/pipeline/picture_check.h"
 #include "pencilscan/rig/camera_light.h"
 
@@ -90,8 +92,16 @@ std::vector<PictureFinding> plain_faults(const Rig& rig, const Frame& frame) {
       find(PictureFault::kBlack, c);
       continue;
     }
+    const std::optional<Mosaic>& stated = rig.cameras[c].mosaic;
+    const Greens greens = stored.channels() == 1 ? greens_of(stored) : Greens::kNone;
+    if (stated && greens != Greens::kNone && greens != greens_of(*stated)) {
+      find(PictureFault::kOtherMosaic, c);
+      findings.back().greens = greens;
+      continue;
+    }
     if (colored && is_grey(picture)) {
-      find(PictureFault::kGrey, c);
+      find(greens == Greens::kNone ? PictureFault::kGrey : PictureFault::kUnstatedMosaic, c);
+      findings.back().greens = greens;
       continue;
     }
     // A copy of a picture says nothing of which camera took it: both are left out.
