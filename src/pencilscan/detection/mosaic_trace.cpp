@@ -132,12 +132,13 @@ float apart(const Samples& s, Interpolation how, int x, int y, int color, const 
 /// A mosaic and what may have filled in its colours.
 class Candidate {
  public:
+  static constexpr float kContrast = 8;  ///< tolerances: of samples that tell
+
   Candidate(const Mosaic& mosaic, Interpolation how) : mosaic_(mosaic), how_(how) {}
 
   /// Looks at the two rows in the middle of `light`. `tolerance`: in values, of a brightest light.
   template <class Tolerance>
   void look(const cv::Mat& light, Tolerance tolerance) {
-    constexpr float kContrast = 8;  // tolerances
     const Samples samples(light, mosaic_);
     for (int y = kFilterReach; y < light.rows - kFilterReach; ++y) {
       for (int x = kFilterReach; x < light.cols - kFilterReach && !is_out(); ++x) {
@@ -231,6 +232,10 @@ std::optional<Mosaic> mosaic_behind(const Camera& camera, const cv::Mat& stored)
   for (int y = kFilterReach; y + kRows + kFilterReach <= stored.rows; y += kEvery) {
     const cv::Mat rows = stored.rowRange(y - kFilterReach, y + kRows + kFilterReach);
     const cv::Mat light = linearized(camera_values(camera, rows), camera.gamma, camera.black_level);
+    double darkest = 0;
+    double brightest = 0;
+    cv::minMaxIdx(light.reshape(1), &darkest, &brightest);
+    if (brightest - darkest < Candidate::kContrast * tolerance(0)) continue;  // dark: nothing tells
     for (Candidate& candidate : candidates) candidate.look(light, tolerance);
     std::erase_if(candidates, [](const Candidate& candidate) { return candidate.is_out(); });
     if (candidates.empty()) return std::nullopt;

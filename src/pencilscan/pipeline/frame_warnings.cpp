@@ -73,7 +73,8 @@ std::optional<Warning> gamma_warning(const Rig& rig, const Frame& frame,
                                      std::span<const CameraDetection> detections,
                                      std::span<const GridGraph> graphs) {
   constexpr double kWorthSaying = 1.3;
-  constexpr double kOfFilledIn = 1.5;  // halved colours of a JPEG look like a factor of up to 1.3
+  // Of colours that a mosaic or a JPEG leaves out: these look like a factor of up to 1.4.
+  constexpr double kOfFilledIn = 1.5;
   constexpr double kDeviations = 4;
   std::vector<double> gammas(rig.cameras.size(), 0);
   parallel_for(rig.cameras.size(), [&](std::size_t c) {
@@ -82,7 +83,8 @@ std::optional<Warning> gamma_warning(const Rig& rig, const Frame& frame,
     const auto trace = gamma_at_crossings(graphs[c], linear_light(camera, frame.images[c]));
     if (!trace) return;
     const double off = std::abs(std::log(trace->gamma));
-    const double worth_saying = detections[c].is_filled_in ? kOfFilledIn : kWorthSaying;
+    const double worth_saying =
+        detections[c].is_filled_in || camera.mosaic ? kOfFilledIn : kWorthSaying;
     if (off > std::log(worth_saying) && off > kDeviations * trace->deviation)
       gammas[c] = camera.gamma * trace->gamma;
   });
