@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "pencilscan/core/formatted.h"
+#include "pencilscan/planning/conventions.h"
 #include "pencilscan/planning/rig_check.h"
 
 namespace pencilscan {
@@ -40,6 +41,7 @@ class Collector {
       : rig_(rig), check_(check), options_(options) {}
 
   std::vector<RigWarning> collect() {
+    check_conventions();
     check_patterns();
     check_views();
     check_depth();
@@ -65,6 +67,12 @@ class Collector {
   }
   [[nodiscard]] const LinePattern& pattern(const LineFamily& family) const {
     return rig_.projectors[family.projector].patterns[family.pattern];
+  }
+
+  void check_conventions() {
+    if (auto warning = pose_convention_warning(rig_)) warn(true, "convention", *std::move(warning));
+    if (auto warning = intrinsics_convention_warning(rig_))
+      warn(true, "convention", *std::move(warning));
   }
 
   void check_patterns() {

@@ -1,0 +1,102 @@
+#include "pencilscan/planning/conventions.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+#include "pencilscan/core/formatted.h"
+
+namespace pencilscan {
+namespace {
+
+RigidTransform as_stated(const RigidTransform& pose) { return pose; }
+
+RigidTransform as_camera_to_world(const RigidTransform& pose) {
+  const Mat3 rotation = pose.rotation.transpose();
+  return {rotation, -rotation * pose.translation};
+}
+
+RigidTransform with_center(const RigidTransform& pose) {
+  return {pose.rotation, -pose.rotation * pose.translation};
+}
+
+template <class Visit>
+void for_each_device(Rig& rig, Visit visit) {
+  for (Camera& camera : rig.cameras) visit(static_cast<Device&>(camera));
+  for (Projector& projector : rig.projectors) visit(static_cast<Device&>(projector));
+}
+
+/// Share of the devices that have the place in their picture that all have in common.
+double share_that_looks(Rig rig, RigidTransform (*meant)(const RigidTransform&)) {
+  for_each_device(
+      rig, [&](Device& device) { device.device_from_world = meant(device.device_from_world); });
+  const Vec3 center = working_volume(rig).center;
+  double count = 0;
+  double looking = 0;
+  for_each_device(rig, [&](const Device& device) {
+    ++count;
+    const auto pixel = device.project(center);
+    looking += pixel && device.contains(*pixel) ? 1 : 0;
+  });
+  return count > 0 ? looking / count : 1;
+}
+
+std::string degrees(double radians) { return formatted(radians * 180 / std::numbers::pi, "%.0f"); }
+
+}  // namespace
+
+std::optional<std::string> pose_convention_warning(const Rig& rig) {
+  constexpr double kFew = 0.5;
+  constexpr double kNearlyAll = 0.9;
+  constexpr std::size_t kLeastDevices = 4;  // two or three meet somewhere, whatever is meant
+  if (rig.cameras.size() + rig.projectors.size() < kLeastDevices) return std::nullopt;
+  const double stated = share_that_looks(rig, as_stated);
+  if (stated > kFew) return std::nullopt;
+  struct Reading {
+    RigidTransform (*meant)(const RigidTransform&);
+    const char* words;
+    const char* remedy;
+  };
+  constexpr std::array kReadings = std::to_array<Reading>({
+      {as_camera_to_world, "R and t are camera-to-world", "write R' and -R't"},
+      {with_center, "t is the devices' centre", "write -R t"},
+  });
+  for (const Reading& reading : kReadings) {
+    const double share = share_that_looks(rig, reading.meant);
+    if (share < kNearlyAll) continue;
+    return "only " + formatted(100 * stated, "%.0f") + " % of the devices look at one place; if " +
+           reading.words + ", " + formatted(100 * share, "%.0f") +
+           " % do. X_device = R X_world + t is what the rig states: " + reading.remedy;
+  }
+  return std::nullopt;
+}
+
+std::optional<std::string> intrinsics_convention_warning(const Rig& rig) {
+  constexpr double kWidest = 150 * std::numbers::pi / 180;
+  constexpr double kRim = 0.1;  // of the picture
+  std::optional<std::string> warning;
+  const auto look = [&](const Device& device, bool is_camera) {
+    if (warning) return;
+    const double angle = 2 * std::atan(0.5 * device.width / std::abs(device.K(0, 0)));
+    if (angle > kWidest) {
+      warning = "K of " + device.name + " has a focal length of " + formatted(device.K(0, 0)) +
+                " px for " + std::to_string(device.width) + " columns: it sees " + degrees(angle) +
+                " degrees. K is in pixels: millimetres over the width of a pixel";
+      return;
+    }
+    const Vec2 center(device.K(0, 2) / device.width, device.K(1, 2) / device.height);
+    // Projectors shift their picture; cameras' lenses hardly do.
+    if (is_camera && (center.minCoeff() < kRim || center.maxCoeff() > 1 - kRim)) {
+      warning = "K of " + device.name + " has its principal point at " + formatted(device.K(0, 2)) +
+                ", " + formatted(device.K(1, 2)) +
+                " px, at the rim of its picture: the middle of " + std::to_string(device.width) +
+                " x " + std::to_string(device.height) + " px is usual";
+    }
+  };
+  for (const Camera& camera : rig.cameras) look(camera, true);
+  for (const Projector& projector : rig.projectors) look(projector, false);
+  return warning;
+}
+
+}  // namespace pencilscan

@@ -1,0 +1,21 @@
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "pencilscan/rig/rig.h"
+
+// Poses and intrinsics that follow another convention than rig.json: X_device = R X_world + t, K in
+// pixels. What comes of them looks like a bad calibration, or like a result.
+
+namespace pencilscan {
+
+/// Where hardly any device looks at the place that they have in common, and nearly all would if R
+/// and t were camera-to-world, or t the devices' centres: that, and what the file wants.
+[[nodiscard]] std::optional<std::string> pose_convention_warning(const Rig& rig);
+
+/// A device that sees more than 150 degrees by its focal length, or a camera whose principal point
+/// lies at its picture's rim: K is in pixels.
+[[nodiscard]] std::optional<std::string> intrinsics_convention_warning(const Rig& rig);
+
+}  // namespace pencilscan
