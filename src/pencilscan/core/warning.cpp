@@ -34,6 +34,8 @@ const char* to_string(WarningCode code) {
       return "little-measured";
     case WarningCode::kViewsDisagree:
       return "views-disagree";
+    case WarningCode::kMissingLines:
+      return "missing-lines";
     case WarningCode::kMotion:
       return "motion";
   }

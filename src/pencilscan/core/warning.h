@@ -23,6 +23,7 @@ enum class WarningCode {
   kNotClosed,       ///< figures "boundary", "non_manifold": edges of the surface
   kLittleMeasured,  ///< figure "share": of the closed surface
   kViewsDisagree,   ///< figure "deviations": of depths of different cameras
+  kMissingLines,    ///< of a projector; figures "share", "usual_share": of its lines, the others'
   kMotion,          ///< within the exposure; figures "way_mm", "way_sigma_mm"
 };
 

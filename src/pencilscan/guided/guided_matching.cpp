@@ -63,6 +63,8 @@ class CameraMatching {
   void find_missing();
   /// Where colours denied a dense surface in the last pass.
   [[nodiscard]] const std::vector<DeniedRun>& denied() const { return denied_; }
+  /// Per projector, since predict() was called first.
+  [[nodiscard]] const std::vector<ExpectedLines>& expected() const { return expected_; }
   /// The surface of all that is labelled now.
   [[nodiscard]] LocalSurface take_surface();
 
@@ -112,6 +114,7 @@ class CameraMatching {
   std::vector<PredictedPoint> missing_;  ///< predicted points that no label explains
   Places<PredictedPoint> missing_places_;
   std::vector<DeniedRun> denied_;
+  std::vector<ExpectedLines> expected_;
 };
 
 CameraMatching::CameraMatching(const Rig& rig, const std::vector<ColorFamily>& families,
@@ -208,9 +211,17 @@ void CameraMatching::predict() {
   // Those that became known lie where the surface grew.
   std::erase_if(missing_,
                 [&](const PredictedPoint& p) { return surface_.refitted()[p.patch] != 0; });
+  constexpr float kFarApart = 5;  // px; of denser lines more are missing by themselves
+  const bool is_first = expected_.empty();
+  expected_.resize(rig_.projectors.size());
   for (const PredictedPoint& p :
        predict_lines(rig_, camera_, surface_, patterns_, options_.prediction)) {
-    if (!is_known(p)) missing_.push_back(p);
+    const bool is_named = is_known(p);
+    if (!is_named) missing_.push_back(p);
+    if (!is_first || p.spacing_px < kFarApart) continue;
+    ExpectedLines& of_projector = expected_[static_cast<std::size_t>(p.pattern.projector)];
+    ++of_projector.points;
+    of_projector.named += is_named ? 1 : 0;
   }
   missing_places_.clear();
   for (const PredictedPoint& p : missing_) missing_places_.add(p.position, p);
@@ -454,6 +465,7 @@ std::vector<LocalSurface> match_guided(const Rig& rig, const std::vector<ColorFa
                                        const GuidedMatchingOptions& options,
                                        std::span<const MeasuredPoint> dense) {
   std::vector<std::optional<LocalSurface>> surfaces(graphs.size());
+  std::vector<std::vector<ExpectedLines>> expected(graphs.size());
   labeling.denied.assign(labeling.runs.size(), {});
   labeling.undecided.resize(labeling.runs.size());
   parallel_for(graphs.size(), [&](std::size_t g) {
@@ -470,8 +482,16 @@ std::vector<LocalSurface> match_guided(const Rig& rig, const std::vector<ColorFa
       drop_beside_denied(graphs[g], look.denied(), labeling.runs[camera],
                          labeling.undecided[camera]);
     labeling.denied[camera] = look.denied();
+    expected[g] = look.expected();
     surfaces[g] = look.take_surface();
   });
+  labeling.expected.assign(rig.projectors.size(), {});
+  for (const std::vector<ExpectedLines>& of_camera : expected) {
+    for (std::size_t p = 0; p < of_camera.size(); ++p) {
+      labeling.expected[p].points += of_camera[p].points;
+      labeling.expected[p].named += of_camera[p].named;
+    }
+  }
   std::vector<LocalSurface> result;
   for (auto& surface : surfaces) result.push_back(*std::move(surface));
   return result;

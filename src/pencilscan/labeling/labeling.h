@@ -65,6 +65,13 @@ struct DeniedRun {
   float spacing_px = 0;  ///< of the lines there, in the picture
 };
 
+/// Of the lines of a projector, 5 px apart at least, that a surface lets cameras expect where
+/// nothing shades it: points, and those with that name.
+struct ExpectedLines {
+  std::size_t points = 0;
+  std::size_t named = 0;
+};
+
 /// Result of a solution over all cameras; curve points in no run are undecided.
 struct Labeling {
   std::vector<std::vector<LabeledRun>> runs;  ///< per camera, ordered by (curve, begin), disjoint
@@ -73,6 +80,7 @@ struct Labeling {
   std::vector<ComponentReport> components;           ///< all but joint
   std::vector<std::vector<UndecidedRun>> undecided;  ///< per camera; joint only
   std::vector<std::vector<DeniedRun>> denied;  ///< per camera; guided matching on a dense surface
+  std::vector<ExpectedLines> expected;         ///< per projector; as guided matching begins
 };
 
 [[nodiscard]] std::size_t labelled_points(std::span<const LabeledRun> runs);

@@ -18,7 +18,7 @@ struct Known {
 };
 
 /// What to do about warnings, by their code (core/warning.h).
-constexpr std::array<Known, 12> kKnown = {{
+constexpr std::array<Known, 13> kKnown = {{
     {"saturated",
      "Close the aperture or shorten the exposure until the brightest lines stay below "
      "full scale, and capture again."},
@@ -45,6 +45,9 @@ constexpr std::array<Known, 12> kKnown = {{
      "depth from being found between the curves."},
     {"not-closed", "Look at the mesh for gaps; more overlap between the cameras closes them."},
     {"little-measured", "More cameras and projectors around the object measure more of it."},
+    {"missing-lines",
+     "Look whether the projector shines, and whether its picture is the one that the rig states "
+     "(pencilscan pattern writes it)."},
     {"motion", "Shorten the exposure, or flash the projectors for a part of it."},
     {"colors-filled-in", "Let the camera give raw pictures and state its mosaic in the rig."},
 }};

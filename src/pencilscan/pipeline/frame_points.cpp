@@ -128,6 +128,8 @@ FrameResult match_on_surface(const Rig& rig, FrameResult result, const PointOpti
     const std::vector<LocalSurface> surfaces =
         match_guided(rig, points.families, taken_presence(points.detections), points.graphs,
                      points.labeling, guided, dense_points(rig, shape.depth.maps, *shape.scene));
+    for (Warning& warning : missing_lines_warnings(rig, points.labeling.expected))
+      points.warnings.push_back(std::move(warning));
     std::vector<MeasuredPoint> triangulated =
         triangulate(rig, points.graphs, points.labeling, options.triangulation);
     SettledPoints settled = settle_on_surface(

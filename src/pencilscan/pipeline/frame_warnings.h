@@ -29,6 +29,11 @@ namespace pencilscan {
 /// as the frame corrects them.
 [[nodiscard]] Warning rig_warning(const CrossingDisagreement& crossings, bool is_corrected);
 
+/// Projectors that have hardly any of the lines that the measured surface lets expect, where the
+/// others have theirs.
+[[nodiscard]] std::vector<Warning> missing_lines_warnings(const Rig& rig,
+                                                          std::span<const ExpectedLines> expected);
+
 /// That depths of different cameras are not those of one surface, by so many deviations.
 [[nodiscard]] Warning views_warning(double deviations);
 

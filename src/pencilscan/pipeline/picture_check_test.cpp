@@ -180,6 +180,19 @@ TEST_F(PictureCheck, ExchangedColorsAreNamed) {
   EXPECT_EQ(said_of(frame).size(), 6U);
 }
 
+TEST_F(PictureCheck, AProjectorWithAnotherPatternIsNamed) {
+  const auto named = [](const Rig& rig, const Frame& frame) {
+    std::vector<std::string> devices;
+    for (const Warning& warning : reconstruct_frame(rig, frame).points.warnings)
+      if (warning.code == WarningCode::kMissingLines) devices.push_back(warning.device);
+    return devices;
+  };
+  EXPECT_THAT(named(*rig_, *frame_), IsEmpty());
+  Rig other = *rig_;
+  other.projectors[2].patterns[0].offset_px += 12;  // half a pitch
+  EXPECT_THAT(named(other, *frame_), testing::ElementsAre(rig_->projectors[2].name));
+}
+
 TEST_F(PictureCheck, MosaicsThatAreNotStatedOrOthersAreNamed) {
   for (const char* name : {"RGGB", "BGGR", "GRBG", "GBRG"}) {
     const Mosaic mosaic = *Mosaic::from_name(name);
