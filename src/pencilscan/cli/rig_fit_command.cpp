@@ -11,6 +11,7 @@
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/pipeline/frame_source.h"
 #include "pencilscan/pipeline/rig_fit.h"
+#include "pencilscan/pipeline/sensor_frame.h"
 
 namespace pencilscan::cli {
 namespace {
@@ -21,7 +22,7 @@ std::vector<FrameCurves> curves_of(const Rig& rig, const FrameSource& frames, st
   std::vector<FrameCurves> curves;
   for (std::size_t i = 0; i < count; ++i) {
     progress("lines of the frames", static_cast<double>(i) / static_cast<double>(count));
-    PointResult detected = detect_frame(rig, frames.read(rig, i * frames.size() / count));
+    PointResult detected = detect_stored_frame(rig, frames.read(rig, i * frames.size() / count));
     curves.push_back({std::move(detected.families), std::move(detected.graphs)});
   }
   progress("crossings", 0);

@@ -86,4 +86,9 @@ SensorFrame sensor_frame(Rig rig, Frame frame) {
   return result;
 }
 
+PointResult detect_stored_frame(const Rig& rig, Frame frame, const PointOptions& options) {
+  const SensorFrame sensor = sensor_frame(rig, std::move(frame));
+  return detect_frame(sensor.rig, sensor.frame, options);
+}
+
 }  // namespace pencilscan

@@ -15,4 +15,8 @@ struct SensorFrame {
 
 [[nodiscard]] SensorFrame sensor_frame(Rig rig, Frame frame);
 
+/// Curves of a frame as it was read, for those who want nothing else of it.
+[[nodiscard]] PointResult detect_stored_frame(const Rig& rig, Frame frame,
+                                              const PointOptions& options = {});
+
 }  // namespace pencilscan

@@ -21,6 +21,7 @@
 #include "pencilscan/pipeline/frame_source.h"
 #include "pencilscan/pipeline/rig_refinement.h"
 #include "pencilscan/pipeline/run_folder.h"
+#include "pencilscan/pipeline/sensor_frame.h"
 #include "pencilscan/pipeline/sequence_inputs.h"
 #include "pencilscan/pipeline/surface_chain.h"
 
@@ -113,7 +114,7 @@ Rig refined_rig(const Rig& rig, const FrameSource& frames, const fs::path& out,
     tell_steps(progress, "lines for the rig: frame", names.size(), picked.size());
     PointOptions joint = options.output.frame.points;
     joint.method = JointOptions{};
-    PointResult detected = detect_frame(rig, frames.read(rig, i), joint);
+    PointResult detected = detect_stored_frame(rig, frames.read(rig, i), joint);
     curves.push_back({std::move(detected.families), std::move(detected.graphs)});
     names.push_back(frames.name(i));
   }
