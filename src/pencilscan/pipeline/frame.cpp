@@ -29,6 +29,14 @@ std::string why_nothing(const PointResult& result) {
   return why;
 }
 
+/// Heights of lines in the light that the pictures were stored in: those of another frame compare.
+void restore_light(const Frame& frame, PointResult& result) {
+  for (std::size_t c = 0; c < frame.gains.size(); ++c) {
+    for (Curve& curve : result.graphs[c].curves)
+      for (CurvePoint& point : curve.points) point.amplitude /= frame.gains[c];
+  }
+}
+
 }  // namespace
 
 FrameResult reconstruct_frame(const Rig& stated, const Frame& frame, const FrameOptions& options,
@@ -61,13 +69,17 @@ FrameResult measure_frame(const Rig& rig, const Frame& frame, PointResult lines,
   result.points = place_points(
       rig, std::move(lines), looks_again ? before_surface(options.points) : options.points, clock);
   if (result.points.points.empty()) throw NothingFound(why_nothing(result.points));
-  if (!options.meshes) return result;
+  if (!options.meshes) {
+    restore_light(frame, result.points);
+    return result;
+  }
   const Frame right = without(frame, result.points.left_out);
   result.shape = measure_shape(rig, right, result.points, options.shape, links, clock);
   if (links.only_hands_on) return result;
   result = match_on_surface(rig, std::move(result), options.points, clock);
   clock("confirmation",
         [&] { result = finish_shape(rig, std::move(result), options.shape.fusion); });
+  restore_light(frame, result.points);
   return count_motion(rig, std::move(result));
 }
 

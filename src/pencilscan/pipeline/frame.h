@@ -42,6 +42,7 @@ struct Frame {
   std::vector<cv::Mat> plain;
   std::optional<FrameTiming> timing;  ///< where the pictures have time stamps
   std::vector<Warning> notes;         ///< what is known of the pictures before they are looked at
+  std::vector<float> gains;  ///< per camera, of the light in `images` over that stored; empty: 1
 };
 
 /// What decides the labelled points.

@@ -119,6 +119,14 @@ TEST_F(Laws, TheGainDecidesNothing) {
   EXPECT_GT(agreement(same.points.points, other.points.points), 0.98);
 }
 
+double height_of_lines(const FrameResult& result) {
+  std::vector<double> heights;
+  for (const Curve& curve : result.points.graphs[0].curves)
+    for (const CurvePoint& point : curve.points)
+      heights.push_back(static_cast<double>(point.amplitude));
+  return upper_median(std::move(heights));
+}
+
 /// Sensors of 10 or 12 bits leave their values in the low ones of 16.
 TEST_F(Laws, TheBitsOfTheSensorDecideNothing) {
   const FrameResult same = reconstruct_frame(*rig_, *frame_, points_alone());
@@ -131,6 +139,8 @@ TEST_F(Laws, TheBitsOfTheSensorDecideNothing) {
       frame_->images[c].convertTo(stored.images[c], CV_16U, full - kBlack, kBlack);
     const FrameResult other = reconstruct_frame(rig, stored, points_alone());
     EXPECT_GT(agreement(same.points.points, other.points.points), 0.99) << full;
+    const double gain = height_of_lines(same) / height_of_lines(other);
+    EXPECT_NEAR(gain * full / 65535, 1, 0.1) << "heights are those of the stored light";
   }
 }
 

@@ -1,6 +1,7 @@
 #include "pencilscan/pipeline/sensor_frame.h"
 
 #include <algorithm>
+#include <cmath>
 #include <opencv2/core.hpp>
 #include <optional>
 #include <string>
@@ -41,12 +42,15 @@ void fill_range(Rig& rig, Frame& frame) {
   const double range = range_of(frame.images);
   const double plain_range = range_of(frame.plain);
   if (range == 1 && plain_range == 1) return;
+  frame.gains.assign(rig.cameras.size(), 1);
   for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
     Camera& camera = rig.cameras[c];
     const bool has_plain = c < frame.plain.size() && !frame.plain[c].empty();
     const bool are_of_16_bits = (frame.images[c].empty() || is_of_16_bits(frame.images[c])) &&
                                 (!has_plain || is_of_16_bits(frame.plain[c]));
     if (!are_of_16_bits || camera.black_level >= std::min(range, plain_range)) continue;
+    const double gain = (1 - camera.black_level) / (range - camera.black_level);
+    frame.gains[c] = static_cast<float>(std::pow(gain, camera.gamma));
     if (!frame.images[c].empty()) fill_range(range, camera.black_level, frame.images[c]);
     if (has_plain) fill_range(plain_range, camera.black_level, frame.plain[c]);
     camera.black_level = 0;
