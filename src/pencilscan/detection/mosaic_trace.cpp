@@ -189,29 +189,35 @@ Greens greens_of(const Mosaic& mosaic) {
 
 Greens greens_of(const cv::Mat& samples) {
   PENCILSCAN_CHECK(samples.channels() == 1);
-  // One of the differences; pictures of three channels and of grey cameras are within .001.
-  constexpr double kLeastShare = 0.02;
-  constexpr double kDeviations = 8;
-  constexpr int kEvery = 8;  // rows of which two are looked at
-  std::array<PhaseSum, 2> of_parity;
-  for (int y = 0; y + 2 <= samples.rows; y += kEvery) {
-    const cv::Mat rows = unit_values(samples.rowRange(y, y + 2));
-    const float* above = rows.ptr<float>(0);
-    const float* below = rows.ptr<float>(1);
-    for (int x = 0; x + 1 < rows.cols; ++x) {
-      // y is even: the places of the first difference have the parity of x, of the second the
-      // other.
-      of_parity[static_cast<std::size_t>(x % 2)].add(std::abs(above[x] - below[x + 1]));
-      of_parity[static_cast<std::size_t>((x + 1) % 2)].add(std::abs(above[x + 1] - below[x]));
+  constexpr int kBlock = 32;
+  constexpr double kMostShare = 0.6;  // of the difference of the other diagonal
+  constexpr double kDeviations = 4;
+  double odd = 0;   // sum of the differences of the two places with x + y odd, ...
+  double even = 0;  // ... and even
+  PhaseSum apart;   // of these two
+  for (int y = 0; y + kBlock <= samples.rows; y += kBlock) {
+    const cv::Mat rows = unit_values(samples.rowRange(y, y + kBlock));
+    for (int x = 0; x + kBlock <= rows.cols; x += kBlock) {
+      std::array<float, 4> sums{};
+      for (int v = 0; v < kBlock; ++v) {
+        const float* row = rows.ptr<float>(v) + x;
+        float* of_row = sums.data() + static_cast<std::size_t>(2 * (v % 2));
+        for (int u = 0; u < kBlock; u += 2) {
+          of_row[0] += row[u];
+          of_row[1] += row[u + 1];
+        }
+      }
+      const float of_odd = std::abs(sums[1] - sums[2]);
+      const float of_even = std::abs(sums[0] - sums[3]);
+      odd += static_cast<double>(of_odd);
+      even += static_cast<double>(of_even);
+      apart.add(of_even - of_odd);
     }
   }
-  const auto& [even, odd] = of_parity;
-  const double apart = even.mean() - odd.mean();
-  const double error = std::hypot(even.error(), odd.error());
-  if (!(std::abs(apart) > kDeviations * error) ||
-      std::abs(apart) < kLeastShare * std::max(even.mean(), odd.mean()))
+  if (apart.count == 0 || std::min(odd, even) > kMostShare * std::max(odd, even) ||
+      std::abs(apart.mean()) < kDeviations * apart.error())
     return Greens::kNone;
-  return apart > 0 ? Greens::kOdd : Greens::kEven;
+  return odd < even ? Greens::kOdd : Greens::kEven;
 }
 
 std::optional<Mosaic> mosaic_behind(const Camera& camera, const cv::Mat& stored) {

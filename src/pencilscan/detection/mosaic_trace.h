@@ -19,8 +19,9 @@ enum class Greens {
   kEven,  ///< x + y is even: GRBG, GBRG
 };
 [[nodiscard]] Greens greens_of(const Mosaic& mosaic);
-/// Those of a picture of one channel, any depth: of the two diagonals of its 2 x 2 places, greens
-/// differ less from each other than red from blue. Without a mosaic, neither differs more.
+/// Those of a picture of one channel, any depth: over blocks of 32 x 32 px the two green places
+/// have the same mean, and red has not that of blue. Nothing where noise hides it, or without a
+/// mosaic.
 [[nodiscard]] Greens greens_of(const cv::Mat& samples);
 
 /// The mosaic whose samples stand unchanged in a picture as stored (three channels of any depth):
