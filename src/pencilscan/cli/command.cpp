@@ -11,6 +11,8 @@
 
 #include "pencilscan/core/formatted.h"
 #include "pencilscan/io/file.h"
+#include "pencilscan/planning/conventions.h"
+#include "pencilscan/planning/units.h"
 
 namespace pencilscan::cli {
 namespace {
@@ -70,6 +72,12 @@ void add_overwrite(CLI::App& command, bool& overwrite, const std::string& text) 
 
 void warn_of(const std::optional<std::string>& warning) {
   if (warning) std::cerr << "pencilscan: warning: " << *warning << "\n";
+}
+
+void warn_of_rig(const Rig& rig) {
+  warn_of(volume_unit_warning(rig));
+  warn_of(pose_convention_warning(rig));
+  warn_of(intrinsics_convention_warning(rig));
 }
 
 void print_figures(const CommonOptions& options, const nlohmann::ordered_json& figures) {

@@ -8,6 +8,7 @@
 
 #include "pencilscan/cli/arguments.h"
 #include "pencilscan/core/progress.h"
+#include "pencilscan/rig/rig.h"
 
 namespace pencilscan::cli {
 
@@ -30,6 +31,8 @@ void add_overwrite(CLI::App& command, bool& overwrite, const std::string& text);
 
 /// Prints a warning to stderr, where there is one.
 void warn_of(const std::optional<std::string>& warning);
+/// Of a volume in another unit, and of poses and intrinsics of another convention.
+void warn_of_rig(const Rig& rig);
 
 /// Prints figures to stdout as aligned "key value" lines and writes --json when asked for.
 void print_figures(const CommonOptions& options, const nlohmann::ordered_json& figures);

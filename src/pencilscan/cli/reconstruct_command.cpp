@@ -9,8 +9,6 @@
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/io/file.h"
 #include "pencilscan/pipeline/sequence.h"
-#include "pencilscan/planning/conventions.h"
-#include "pencilscan/planning/units.h"
 
 namespace pencilscan::cli {
 namespace {
@@ -57,10 +55,7 @@ void reconstruct(const ReconstructOptions& options) {
   if (!options.shard.empty())
     sequence.shard = shard_from_text(options.shard, process_environment());
   sequence.program = own_hash();
-  const Rig rig = read_rig(options.rig);
-  warn_of(volume_unit_warning(rig));
-  warn_of(pose_convention_warning(rig));
-  warn_of(intrinsics_convention_warning(rig));
+  warn_of_rig(read_rig(options.rig));
   const auto [outcomes, refinement, warnings] =
       reconstruct_sequence(options.rig, options.frames, options.out, sequence,
                            stderr_progress("frames that are done are kept, and the same command "

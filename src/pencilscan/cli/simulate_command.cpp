@@ -14,7 +14,6 @@
 #include "pencilscan/io/image.h"
 #include "pencilscan/io/mesh_file.h"
 #include "pencilscan/io/partial_folder.h"
-#include "pencilscan/planning/conventions.h"
 #include "pencilscan/planning/units.h"
 #include "pencilscan/recording/pack.h"
 #include "pencilscan/simulation/photography.h"
@@ -217,9 +216,7 @@ void run_simulate(SimulateOptions options) {
   options.photo.seed = options.common.seed;
   options.photo.interpolated = Mosaic::from_name(options.interpolated);
   const Rig rig = read_rig(options.rig_path);
-  warn_of(volume_unit_warning(rig));
-  warn_of(pose_convention_warning(rig));
-  warn_of(intrinsics_convention_warning(rig));
+  warn_of_rig(rig);
   const TriangleMesh mesh = placed_mesh(options, rig);
   if (options.export_povray) check_povray_can_show(rig, options.surface, options.rig_path);
   check_output(options);
