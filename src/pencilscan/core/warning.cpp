@@ -20,6 +20,8 @@ const char* to_string(WarningCode code) {
       return "gamma";
     case WarningCode::kRigIsOff:
       return "rig-is-off";
+    case WarningCode::kDeviceIsOff:
+      return "device-is-off";
     case WarningCode::kPointsLeftOut:
       return "points-left-out";
     case WarningCode::kTooFewPoints:

@@ -16,6 +16,7 @@ enum class WarningCode {
   kColorsFilledIn,  ///< pictures went through a mosaic and an interpolation
   kGamma,           ///< pictures are not coded as the rig says; figure "gamma" of the first camera
   kRigIsOff,        ///< figures "median_px", "expected_px": how crossing lines miss each other
+  kDeviceIsOff,     ///< the same of one device's crossings, the others' meet
   kPointsLeftOut,   ///< coordinates are not finite or absurd
   kTooFewPoints,    ///< for a surface
   kUnsupported,     ///< hardly any point has another curve beside it

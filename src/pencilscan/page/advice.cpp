@@ -18,7 +18,7 @@ struct Known {
 };
 
 /// What to do about warnings, by their code (core/warning.h).
-constexpr std::array<Known, 13> kKnown = {{
+constexpr std::array<Known, 14> kKnown = {{
     {"saturated",
      "Close the aperture or shorten the exposure until the brightest lines stay below "
      "full scale, and capture again."},
@@ -37,6 +37,9 @@ constexpr std::array<Known, 13> kKnown = {{
     {"rig-is-off",
      "Run reconstruct with --refine-rig, or calibrate again if devices were "
      "moved."},
+    {"device-is-off",
+     "Run rig check with --frames: it says how far the device moved. Put it back, or run "
+     "reconstruct with --refine-rig."},
     {"views-disagree",
      "Compare the cameras' pictures below with where the cameras stand; if they are right, check "
      "the calibration (rig check)."},

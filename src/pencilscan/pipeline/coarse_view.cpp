@@ -140,7 +140,11 @@ void to_fine(const CoarseView& view, PointResult& result) {
     scale(d < view.binning.size() ? view.binning[d] : view.unit, result.device_crossings[d]);
   for (Warning& warning : result.warnings) {
     if (warning.code == WarningCode::kRigIsOff)
-      warning = rig_warning(result.crossings, result.corrected.has_value());
+      warning = rig_warning(result.crossings, result.rig_in_frame);
+    if (warning.code == WarningCode::kDeviceIsOff) {
+      if (auto again = device_warning(view.rig, result.device_crossings))
+        warning = std::move(*again);
+    }
   }
 }
 

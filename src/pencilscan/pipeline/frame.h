@@ -81,6 +81,13 @@ struct FrameLinks {
   bool only_hands_on = false;
 };
 
+/// The rig that a frame's lines were named with.
+enum class RigInFrame {
+  kAsGiven,
+  kCorrected,        ///< and crossings meet with it
+  kPartlyCorrected,  ///< and crossings meet better with it, or more curves have a name
+};
+
 /// Labelled points of one frame and everything that led to them. Each stage fills in its part.
 struct PointResult {
   std::vector<ColorFamily> families;
@@ -92,6 +99,7 @@ struct PointResult {
   std::vector<CrossingDisagreement> device_crossings;  ///< the same: cameras, then projectors
   /// The rig as the frame corrects it, which lines were named with, where the one given is off.
   std::optional<Rig> corrected;
+  RigInFrame rig_in_frame = RigInFrame::kAsGiven;
   bool is_on_surface = false;    ///< matched once more, and settled, on the dense surface
   std::size_t contradicted = 0;  ///< labelled curve points that the dense surface contradicted
   std::vector<MeasuredPoint> points;

@@ -66,7 +66,12 @@ std::optional<Rig> label_lines(const Rig& rig, const Frame& frame, const PointOp
   result.labeling = std::move(naming.labeling);
   result.crossings = naming.crossings;
   result.device_crossings = std::move(naming.device_crossings);
-  if (naming.warning) result.warnings.push_back(std::move(*naming.warning));
+  result.rig_in_frame = naming.rig_in_frame;
+  if (naming.warning) {
+    result.warnings.push_back(std::move(*naming.warning));
+  } else if (std::optional<Warning> warning = device_warning(rig, result.device_crossings)) {
+    result.warnings.push_back(std::move(*warning));
+  }
   return std::move(naming.corrected);
 }
 

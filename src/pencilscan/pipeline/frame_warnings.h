@@ -25,9 +25,13 @@ namespace pencilscan {
                                                    std::span<const CameraDetection> detections,
                                                    std::span<const GridGraph> graphs);
 
-/// Crossings miss each other by more than noise. `is_corrected`: lines were named with the devices
-/// as the frame corrects them.
-[[nodiscard]] Warning rig_warning(const CrossingDisagreement& crossings, bool is_corrected);
+/// Crossings miss each other by more than noise; what was done about it.
+[[nodiscard]] Warning rig_warning(const CrossingDisagreement& crossings, RigInFrame rig_in_frame);
+
+/// The one device whose crossings miss each other by far more than noise, where the rig as a whole
+/// does not (per device: cameras, then projectors). Counts alike in all resolutions.
+[[nodiscard]] std::optional<Warning> device_warning(
+    const Rig& rig, std::span<const CrossingDisagreement> device_crossings);
 
 /// Projectors that have hardly any of the lines that the measured surface lets expect, where the
 /// others have theirs.

@@ -85,11 +85,12 @@ LineNaming name_lines(const Rig& rig, const std::vector<ColorFamily>& families,
     if (is_off ? agrees || is_better : agrees && names_more) {
       result.labeling = std::move(again);
       result.corrected = std::move(found.rig);
+      result.rig_in_frame = agrees ? RigInFrame::kCorrected : RigInFrame::kPartlyCorrected;
       judge(rig, graphs, result);
     }
   }
   if (is_off || result.corrected)
-    result.warning = rig_warning(result.crossings, result.corrected.has_value());
+    result.warning = rig_warning(result.crossings, result.rig_in_frame);
   return result;
 }
 

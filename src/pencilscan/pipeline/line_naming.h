@@ -14,6 +14,7 @@ struct LineNaming {
   std::optional<Rig> corrected;  ///< that the labels were made with, where it is not the one given
   CrossingDisagreement crossings;                      ///< of the labels, with the rig as given
   std::vector<CrossingDisagreement> device_crossings;  ///< the same; empty without crossings
+  RigInFrame rig_in_frame = RigInFrame::kAsGiven;
   std::optional<Warning> warning;
 };
 

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "pencilscan/joint/joint.h"
+#include "pencilscan/refinement/moved_devices.h"
 
 namespace pencilscan {
 namespace {
@@ -35,9 +36,25 @@ struct Attempt {
   RigCorrection correction;
   RigRefinement refinement;
   std::vector<CrossingTrack> tracks;  ///< of the last labels
+  std::vector<std::size_t> moved;     ///< RefineRigOptions::moved
   bool agrees = false;
   std::size_t points = 0;
 };
+
+/// Where few devices moved and all others are as calibrated, refinement starts with those put back.
+void put_back_few(const Rig& calibrated, std::span<const CrossingTrack> tracks, Attempt& attempt,
+                  RefineRigOptions& refine) {
+  constexpr std::size_t kFewOf = 4;
+  const MovedDevices found = find_moved_devices(calibrated, tracks);
+  const std::size_t devices = device_count(calibrated);
+  if (found.moved.empty() || kFewOf * found.moved.size() > devices) return;
+  attempt.correction.assign(devices, PoseCorrection{});
+  for (const DeviceMove& move : found.moved) {
+    attempt.correction[move.device] = move.correction;
+    attempt.moved.push_back(move.device);
+  }
+  refine.moved = attempt.moved;
+}
 
 Attempt attempt(const Rig& calibrated, std::span<const FrameCurves> frames, double tolerance,
                 const RigRefinementOptions& options) {
@@ -55,6 +72,7 @@ Attempt attempt(const Rig& calibrated, std::span<const FrameCurves> frames, doub
     joint.projection_sigma_px = tolerance;
     const auto labelings = label(refinement.rig, frames, joint);
     const auto tracks = tracks_of(refinement.rig, frames, labelings, options.tracks);
+    if (refinement.rounds.empty()) put_back_few(calibrated, tracks, result, refine);
     RefineRigResult refined = refine_rig(calibrated, tracks, result.correction, refine);
     refinement.report = std::move(refined.report);
     if (!refinement.report.refined) return result;
@@ -103,7 +121,9 @@ RigRefinement refine_rig_on_frames(const Rig& stated, std::span<const FrameCurve
   }
   RigRefinement result = std::move(best->refinement);
   if (result.report.refined) {
-    RefineRigResult last = refine_rig(calibrated, best->tracks, best->correction, options.refine);
+    RefineRigOptions refine = options.refine;
+    refine.moved = best->moved;
+    RefineRigResult last = refine_rig(calibrated, best->tracks, best->correction, refine);
     result.report = std::move(last.report);
     if (result.report.refined) result.rig = corrected_rig(calibrated, last.correction);
   }

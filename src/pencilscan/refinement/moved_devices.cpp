@@ -128,13 +128,13 @@ class Mover {
   }
   /// Chooses among what the crossings cannot tell; far wider than calibrations err.
   [[nodiscard]] Normal prior(std::size_t device, const PoseCorrection& at) const {
-    constexpr double kWidth = 10;
     const Device& d = device_at(rig_, device);
     const double per_px = (d.center() - working_volume(rig_).center).norm() / d.focal_px();
     Vec6 precision;
-    precision.head<3>().setConstant(1 / std::pow(kWidth * options_.refine.rotation_sigma_px, 2));
+    precision.head<3>().setConstant(1 /
+                                    std::pow(kMovedFarther * options_.refine.rotation_sigma_px, 2));
     precision.tail<3>().setConstant(
-        1 / std::pow(kWidth * options_.refine.translation_sigma_px * per_px, 2));
+        1 / std::pow(kMovedFarther * options_.refine.translation_sigma_px * per_px, 2));
     const Vec6 x = vector_of(at);
     Normal normal;
     normal.matrix = precision.asDiagonal();

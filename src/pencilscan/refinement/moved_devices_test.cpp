@@ -61,6 +61,34 @@ TEST(MovedDevices, TwoThatMovedAreBothNamed) {
   EXPECT_EQ(found.moved[1].device, 2U);
 }
 
+TEST(MovedDevices, OneThatMovedFarIsNotSharedByTheOthersOfARefinement) {
+  RingScene scene;
+  const auto tracks = scene.tracks(3, 0.1, 1);
+  constexpr std::size_t kMoved = 1;
+  RigCorrection correction(device_count(scene.rig));
+  correction[kMoved].translation_mm = Vec3(0, 0, 20);  // what a zoom looks like
+  const Rig stated = corrected_rig(scene.rig, correction);
+  const MovedDevices found = find_moved_devices(stated, tracks);
+  ASSERT_THAT(found.moved, SizeIs(1));
+  EXPECT_EQ(found.moved[0].device, kMoved);
+  RigCorrection start(device_count(stated));
+  start[kMoved] = found.moved[0].correction;
+  RefineRigOptions options;
+  const auto farthest_other = [](const RefineRigReport& report) {
+    double farthest = 0;
+    for (std::size_t d = 0; d < report.devices.size(); ++d)
+      if (d != kMoved) farthest = std::max(farthest, report.devices[d].translation_mm);
+    return farthest;
+  };
+  const double shared = farthest_other(refine_rig(stated, tracks, start, options).report);
+  options.moved = {kMoved};
+  const RefineRigResult refined = refine_rig(stated, tracks, start, options);
+  ASSERT_TRUE(refined.report.refined) << refined.report.reason;
+  EXPECT_GT(shared, 1);
+  EXPECT_LT(farthest_other(refined.report), 0.3);
+  EXPECT_NEAR(refined.correction[kMoved].translation_mm.z(), -20, 2);
+}
+
 TEST(MovedDevices, TooFewCrossingsAccuseNobody) {
   RingScene scene;
   const Rig stated = stated_rig(scene, 0, 2, 1);

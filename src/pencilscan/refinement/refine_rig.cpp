@@ -22,22 +22,29 @@ using Parameters = std::array<double, 6>;  ///< of one device, in prior standard
 
 /// Prior standard deviations of every device.
 struct Scales {
-  double rotation_px;
-  std::vector<double> translation_mm;  ///< per device
+  std::vector<double> rotation_px;     ///< per device
+  std::vector<double> translation_mm;  ///< likewise
+  std::vector<double> mm_per_px;       ///< likewise: of the volume's centre in its image
 
-  Scales(const Rig& rig, const RefineRigOptions& options) : rotation_px(options.rotation_sigma_px) {
+  Scales(const Rig& rig, const RefineRigOptions& options)
+      : rotation_px(device_count(rig), options.rotation_sigma_px) {
     const Vec3 center = working_volume(rig).center;
     for (std::size_t d = 0; d < device_count(rig); ++d) {
       const Device& device = device_at(rig, d);
-      translation_mm.push_back(options.translation_sigma_px * (device.center() - center).norm() /
-                               device.focal_px());
+      mm_per_px.push_back((device.center() - center).norm() / device.focal_px());
+      translation_mm.push_back(options.translation_sigma_px * mm_per_px.back());
+    }
+    for (const std::size_t d : options.moved) {
+      rotation_px[d] *= kMovedFarther;
+      translation_mm[d] *= kMovedFarther;
     }
   }
   [[nodiscard]] PoseCorrection correction(std::size_t device, const double* p) const {
-    return {rotation_px * Vec3(p[0], p[1], p[2]), translation_mm[device] * Vec3(p[3], p[4], p[5])};
+    return {rotation_px[device] * Vec3(p[0], p[1], p[2]),
+            translation_mm[device] * Vec3(p[3], p[4], p[5])};
   }
   [[nodiscard]] Parameters parameters(std::size_t device, const PoseCorrection& c) const {
-    const Vec3 r = c.rotation_px / rotation_px;
+    const Vec3 r = c.rotation_px / rotation_px[device];
     const Vec3 t = c.translation_mm / translation_mm[device];
     return {r.x(), r.y(), r.z(), t.x(), t.y(), t.z()};
   }
@@ -46,7 +53,7 @@ struct Scales {
     Eigen::VectorXd values(6 * static_cast<Eigen::Index>(translation_mm.size()));
     for (std::size_t d = 0; d < translation_mm.size(); ++d) {
       const auto row = 6 * static_cast<Eigen::Index>(d);
-      values.segment<3>(row).setConstant(rotation_px);
+      values.segment<3>(row).setConstant(rotation_px[d]);
       values.segment<3>(row + 3).setConstant(translation_mm[d]);
     }
     return values;
@@ -76,7 +83,7 @@ class TrackCost : public ceres::CostFunction {
       Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, 6, Eigen::RowMajor>> out(
           jacobians[d], residual_.rows(), 6);
       out = value->jacobian.middleCols<6>(6 * static_cast<Eigen::Index>(d));
-      out.leftCols<3>() *= scales_.rotation_px;
+      out.leftCols<3>() *= scales_.rotation_px[residual_.devices()[d]];
       out.rightCols<3>() *= scales_.translation_mm[residual_.devices()[d]];
     }
     return true;
@@ -315,8 +322,7 @@ RefineRigResult refine_rig(const Rig& calibrated, std::span<const CrossingTrack>
     report.devices[d].refined = used.is_refined[d] != 0;
     report.devices[d].rotation_px = correction[d].rotation_px.norm();
     report.devices[d].translation_mm = correction[d].translation_mm.norm();
-    report.devices[d].translation_px =
-        options.translation_sigma_px * report.devices[d].translation_mm / scales.translation_mm[d];
+    report.devices[d].translation_px = report.devices[d].translation_mm / scales.mm_per_px[d];
   }
   return result;
 }

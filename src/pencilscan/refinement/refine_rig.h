@@ -27,6 +27,10 @@ struct RefineRigOptions {
   /// Likewise of the translation, as the shift of the volume's centre in the image; > 0. At 1.1 m
   /// and f = 2300 px, 1 px is 0.48 mm.
   double translation_sigma_px = 1;
+  /// Devices that moved after the calibration (find_moved_devices), cameras, then projectors: both
+  /// deviations are kMovedFarther times as wide for them, so that others do not share what they
+  /// did.
+  std::vector<std::size_t> moved;
   double line_sigma_px = 0.05;  ///< of a projected line's coordinate, projector px; > 0
   double loss_scale = 3;        ///< of Cauchy's loss, in deviations of the residuals as found; > 0
   int max_stages = 5;           ///< the deviation is found anew before each
@@ -39,6 +43,8 @@ struct RefineRigOptions {
   std::size_t max_tracks = 20000;  ///< an even subset of the tracks is used
   int max_iterations = 30;
 };
+
+inline constexpr double kMovedFarther = 10;  ///< than calibrations err
 
 struct DeviceRefinement {
   std::string name;
