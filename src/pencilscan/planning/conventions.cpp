@@ -21,6 +21,16 @@ RigidTransform with_center(const RigidTransform& pose) {
   return {pose.rotation, -pose.rotation * pose.translation};
 }
 
+/// Of a frame whose y goes up and whose z goes back to the one of rig.json, or the other way round.
+RigidTransform with_y_up(const RigidTransform& pose) {
+  const Mat3 flip = Vec3(1, -1, -1).asDiagonal();
+  return {flip * pose.rotation, flip * pose.translation};
+}
+
+RigidTransform as_camera_to_world_with_y_up(const RigidTransform& pose) {
+  return with_y_up(as_camera_to_world(pose));
+}
+
 template <class Visit>
 void for_each_device(Rig& rig, Visit visit) {
   for (Camera& camera : rig.cameras) visit(static_cast<Device&>(camera));
@@ -61,6 +71,11 @@ std::optional<std::string> pose_convention_warning(const Rig& rig) {
   constexpr std::array kReadings = std::to_array<Reading>({
       {as_camera_to_world, "R and t are camera-to-world", "write R' and -R't"},
       {with_center, "t is the devices' centre", "write -R t"},
+      {with_y_up, "devices look along -z with y up (OpenGL, Blender)",
+       "change the sign of the last two rows of R and t"},
+      {as_camera_to_world_with_y_up,
+       "R and t are camera-to-world and devices look along -z with y up (OpenGL, Blender)",
+       "write R' and -R't, then change the sign of their last two rows"},
   });
   for (const Reading& reading : kReadings) {
     const double share = share_that_looks(rig, reading.meant);

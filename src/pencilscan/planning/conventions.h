@@ -11,7 +11,8 @@
 namespace pencilscan {
 
 /// Where hardly any device looks at the place that they have in common, and nearly all would if R
-/// and t were camera-to-world, or t the devices' centres: that, and what the file wants.
+/// and t were camera-to-world, t the devices' centres, or devices looked along -z: that, and what
+/// the file wants.
 [[nodiscard]] std::optional<std::string> pose_convention_warning(const Rig& rig);
 
 /// A device that sees more than 150 degrees by its focal length, or a camera whose principal point

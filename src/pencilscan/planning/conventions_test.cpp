@@ -32,6 +32,20 @@ TEST(PoseConvention, OtherReadingsAreNamed) {
     };
     EXPECT_THAT(pose_convention_warning(changed(center, has_volume)).value_or(""),
                 HasSubstr("centre"));
+    const auto flipped = [](Device& device) {
+      const Mat3 flip = Vec3(1, -1, -1).asDiagonal();
+      RigidTransform& pose = device.device_from_world;
+      pose = {flip * pose.rotation, flip * pose.translation};
+    };
+    EXPECT_THAT(pose_convention_warning(changed(flipped, has_volume)).value_or(""),
+                HasSubstr("if devices look along -z"));
+    const auto of_blender = [](Device& device) {
+      const Mat3 flip = Vec3(1, -1, -1).asDiagonal();
+      const RigidTransform pose = device.device_from_world;
+      device.device_from_world = {pose.rotation.transpose() * flip, device.center()};
+    };
+    EXPECT_THAT(pose_convention_warning(changed(of_blender, has_volume)).value_or(""),
+                HasSubstr("camera-to-world and devices look along -z"));
   }
 }
 

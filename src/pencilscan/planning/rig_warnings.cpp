@@ -4,6 +4,7 @@
 #include "pencilscan/core/formatted.h"
 #include "pencilscan/planning/conventions.h"
 #include "pencilscan/planning/rig_check.h"
+#include "pencilscan/planning/units.h"
 
 namespace pencilscan {
 namespace {
@@ -70,6 +71,7 @@ class Collector {
   }
 
   void check_conventions() {
+    if (auto warning = pose_unit_warning(rig_)) warn(false, "unit", *std::move(warning));
     if (auto warning = pose_convention_warning(rig_)) warn(true, "convention", *std::move(warning));
     if (auto warning = intrinsics_convention_warning(rig_))
       warn(true, "convention", *std::move(warning));

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "pencilscan/core/median.h"
+#include "pencilscan/rig/device_list.h"
 
 namespace pencilscan {
 namespace {
@@ -128,6 +129,25 @@ std::optional<std::string> object_unit_warning(const TriangleMesh& object, const
     text += ": --fit makes it fit, --scale multiplies it";
   }
   return text;
+}
+
+std::optional<std::string> pose_unit_warning(const Rig& rig) {
+  // A lens of a camera is some millimetres wide and a projector's more; no pattern is seen from a
+  // kilometre.
+  constexpr double kNearestMm = 10;
+  constexpr double kFarthestMm = 1e6;
+  if (!rig.unit_known || device_count(rig) < 2) return std::nullopt;
+  double farthest = 0;
+  for (std::size_t a = 0; a < device_count(rig); ++a) {
+    for (std::size_t b = 0; b < a; ++b)
+      farthest =
+          std::max(farthest, (device_at(rig, a).center() - device_at(rig, b).center()).norm());
+  }
+  if (farthest >= kNearestMm && farthest <= kFarthestMm) return std::nullopt;
+  std::string text = "the devices that are farthest apart are so by " + rounded(farthest) + " mm";
+  text += farthest < kNearestMm ? ": t is probably in metres: multiply it by 1000"
+                                : ": t is probably in micrometres: multiply it by 0.001";
+  return text + ", with the volume and the floor, or state \"unit\": \"unknown\"";
 }
 
 std::optional<std::string> volume_unit_warning(const Rig& rig) {

@@ -23,4 +23,8 @@ namespace pencilscan {
 /// right, where the factor is one between units. Nothing where it is plausible, or derived.
 [[nodiscard]] std::optional<std::string> volume_unit_warning(const Rig& rig);
 
+/// Why the devices of a rig in millimetres cannot stand where it says: all lenses lie within a
+/// centimetre, or two lie a kilometre apart; with the unit that t is probably in.
+[[nodiscard]] std::optional<std::string> pose_unit_warning(const Rig& rig);
+
 }  // namespace pencilscan

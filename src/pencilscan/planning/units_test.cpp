@@ -62,6 +62,17 @@ TEST(ObjectUnit, WhatNoUnitExplainsIsStillToldToFit) {
   EXPECT_THAT(*warning, HasSubstr("--fit"));
 }
 
+TEST(PoseUnit, MetresAndMicrometresAreNamedWhereTheRigSaysMillimetres) {
+  EXPECT_FALSE(pose_unit_warning(ring()));
+  EXPECT_FALSE(pose_unit_warning(scaled(ring(), 0.03)));
+  EXPECT_FALSE(pose_unit_warning(scaled(ring(), 30)));
+  EXPECT_THAT(pose_unit_warning(scaled(ring(), 0.001)).value_or(""), HasSubstr("metres"));
+  EXPECT_THAT(pose_unit_warning(scaled(ring(), 1000)).value_or(""), HasSubstr("micrometres"));
+  Rig of_unknown_unit = scaled(ring(), 0.001);
+  of_unknown_unit.unit_known = false;
+  EXPECT_FALSE(pose_unit_warning(of_unknown_unit));
+}
+
 TEST(VolumeUnit, RingsAndTheirScaledCopiesArePlausible) {
   EXPECT_FALSE(volume_unit_warning(ring()));
   for (const double factor : {1e-3, 1 / 25.4, 30.0})
