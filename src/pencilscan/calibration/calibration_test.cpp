@@ -9,6 +9,7 @@
 #include "pencilscan/calibration/calibrate.h"
 #include "pencilscan/calibration/calibration_report.h"
 #include "pencilscan/calibration/given_values.h"
+#include "pencilscan/calibration/mirrored.h"
 #include "pencilscan/calibration/pair_matches.h"
 #include "pencilscan/calibration/sample_input.h"
 
@@ -45,6 +46,28 @@ TEST(Calibrate, RingIsFoundFromImageSizesDespiteOutliers) {
   }
   EXPECT_TRUE(result.rig.unit_known);
   EXPECT_LT(projection_error(truth, result.rig), 1.0);
+}
+
+std::vector<Track> mirrored_by(const Rig& rig, std::vector<Track> tracks, std::size_t device) {
+  for (Track& track : tracks) {
+    for (TrackView& view : track.views)
+      if (view.device == device) view.pixel.x() = device_at(rig, device).width - 1 - view.pixel.x();
+  }
+  return tracks;
+}
+
+TEST(FindMirrored, ADeviceThatMirrorsItsPictureIsNamedAndARightOneIsNot) {
+  const Rig truth = ring(3, 3);
+  const auto tracks = tracks_of(truth, {.count = 500});
+  const auto right = input_of(truth, tracks, true);
+  EXPECT_FALSE(find_mirrored(right, calibrate(right, kQuick), kQuick));
+  for (const std::size_t device : {1U, 4U}) {
+    const auto input = input_of(truth, mirrored_by(truth, tracks, device), true);
+    const auto finding = find_mirrored(input, calibrate(input, kQuick), kQuick);
+    ASSERT_TRUE(finding) << device;
+    EXPECT_THAT(finding->what, HasSubstr(device_at(truth, device).name));
+    EXPECT_EQ(finding->grade, Grade::kUnusable);
+  }
 }
 
 TEST(Calibrate, KnownCamerasAreKeptAndGiveAPreciseRig) {

@@ -1,8 +1,12 @@
 #include "pencilscan/calibration/from_captures.h"
 
+#include <algorithm>
+#include <map>
 #include <nlohmann/json.hpp>
+#include <string>
 
 #include "pencilscan/boards/board.h"
+#include "pencilscan/calibration/mirrored.h"
 #include "pencilscan/gray/gray_decode.h"
 #include "pencilscan/gray/image_order.h"
 #include "pencilscan/rig/device_list.h"
@@ -10,11 +14,32 @@
 namespace pencilscan {
 namespace {
 
+/// Pairs whose images are in a wrong order, by what explains it.
+using WrongOrders = std::map<std::string, std::vector<std::string>>;
+
+std::vector<Finding> findings_of(const WrongOrders& orders, std::size_t pairs) {
+  constexpr std::size_t kNamed = 3;
+  std::vector<Finding> findings;
+  for (const auto& [order, names] : orders) {
+    std::string who = "all " + std::to_string(pairs) + " pairs";
+    const bool is_all = names.size() == pairs && pairs > 1;
+    if (!is_all) {
+      who = names.front();
+      for (std::size_t i = 1; i < std::min(names.size(), kNamed); ++i) who += ", " + names[i];
+      if (names.size() > kNamed) who += " and " + std::to_string(names.size() - kNamed) + " more";
+    }
+    findings.push_back({is_all ? Grade::kUnusable : Grade::kDoubtful,
+                        "the images of " + who + " are in the wrong order: " + order,
+                        "put them in the documented order; they were left out"});
+  }
+  return findings;
+}
+
 /// Decodes one pair and adds its correspondences, unless the codes make no sense; looks for the
 /// board where all of the panel is lit.
 DecodeSummary decode_pair(const CapturePair& pair, std::size_t capture, const Rig& rig,
                           TrackBuilder& tracks, ColorCollector& colors, BoardFinder* boards,
-                          std::vector<Finding>& findings) {
+                          WrongOrders& wrong_orders) {
   const Projector& projector = rig.projectors[pair.projector];
   const GrayStack stack = read_gray_stack(pair, rig);
   if (boards != nullptr) boards->look(capture, pair.camera, stack.white);
@@ -25,11 +50,9 @@ DecodeSummary decode_pair(const CapturePair& pair, std::size_t capture, const Ri
       projector.width, projector.height, pair.inverses,
       [&](std::size_t i) { return read_gray_image(pair, rig, i); }, view);
   if (!summary.wrong_order.empty()) {
-    findings.push_back({Grade::kDoubtful,
-                        "the images of " + projector.name + "/" + rig.cameras[pair.camera].name +
-                            " (--captures number " + std::to_string(capture + 1) +
-                            ") are in the wrong order: " + summary.wrong_order,
-                        "put them in the documented order; they were left out"});
+    wrong_orders[summary.wrong_order].push_back(
+        projector.name + "/" + rig.cameras[pair.camera].name + " (--captures number " +
+        std::to_string(capture + 1) + ")");
     return summary;
   }
   const std::size_t before = tracks.samples();
@@ -62,7 +85,7 @@ CapturesCalibration calibrate_captures(const UncalibratedRig& devices,
   track_options.max_tracks = options.max_tracks;
   TrackBuilder tracks(input.rig, track_options);
   ColorCollector colors(input.rig);
-  std::vector<Finding> findings;
+  WrongOrders wrong_orders;
   std::vector<std::vector<CapturePair>> captures;
   for (const std::filesystem::path& folder : folders)
     captures.push_back(list_captures(folder, input.rig));
@@ -72,9 +95,10 @@ CapturesCalibration calibrate_captures(const UncalibratedRig& devices,
                         static_cast<double>(i) / static_cast<double>(captures[k].size())) /
                            static_cast<double>(captures.size()));
       all.decoded.push_back(decode_pair(captures[k][i], k, input.rig, tracks, colors,
-                                        boards ? &*boards : nullptr, findings));
+                                        boards ? &*boards : nullptr, wrong_orders));
     }
   }
+  std::vector<Finding> findings = findings_of(wrong_orders, all.decoded.size());
   input.tracks = tracks.tracks();
   if (boards) {
     input.board_views = boards->views();
@@ -97,6 +121,8 @@ CapturesCalibration calibrate_captures(const UncalibratedRig& devices,
     all.uncertainty = uncertainty(all.result.problem, all.result.adjustment, options.seed);
   all.loop = close_loop(all.result);
   if (const auto finding = judge_loop(all.result, all.loop)) findings.push_back(*finding);
+  if (const auto finding = find_mirrored(input, all.result, calibrate_options, progress))
+    findings.insert(findings.begin(), *finding);
   all.verdict = judge(input, all.result, all.uncertainty, std::move(findings));
   tell("judging", 1);
   return all;

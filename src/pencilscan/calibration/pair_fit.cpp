@@ -17,7 +17,11 @@ bool PairFit::explains(const DevicePair& pair, const PairMatch& match) const {
   const Vec3 baseline = (center_of(p) - center_of(c)).normalized();
   const Vec3 a = (world_from_[pair.first] * device_ray(c, match.in_camera)).normalized();
   const Vec3 b = (world_from_[pair.second] * device_ray(p, match.in_projector)).normalized();
-  return std::abs(baseline.cross(a).normalized().dot(b)) * p.inner[kFx] < tolerance_px_;
+  const Vec3 normal = baseline.cross(a);
+  const bool is_near = std::abs(normal.normalized().dot(b)) * p.inner[kFx] < tolerance_px_;
+  // On one side of the baseline, and nearing each other away from it.
+  const bool is_in_front = normal.dot(baseline.cross(b)) > 0 && baseline.dot(a) > baseline.dot(b);
+  return is_near && is_in_front;
 }
 
 double PairFit::share(const std::vector<PairMatch>& matches, std::size_t camera,

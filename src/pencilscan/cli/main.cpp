@@ -4,6 +4,7 @@
 #include <memory>
 #include <string>
 
+#include "pencilscan/bundle/solver_messages.h"
 #include "pencilscan/cli/command.h"
 #include "pencilscan/cli/complaint.h"
 #include "pencilscan/cli/help_format.h"
@@ -49,6 +50,7 @@ int run(int argc, char** argv) {
 int main(int argc, char** argv) {
   using namespace pencilscan;
   keep_freed_memory();
+  silence_solver_messages();
   // A write beyond the file size limit shall fail like a full disk instead of ending the program.
   std::signal(SIGXFSZ, SIG_IGN);
   try {

@@ -1,5 +1,6 @@
 #include "pencilscan/gray/gray_decode.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -309,6 +310,10 @@ TEST(ImageOrder, WrongOrdersAreNamed) {
             "the files are in reverse order");
   EXPECT_EQ(explanation([&](std::size_t i) { return right(i < 2 ? 1 - i : i); }),
             "black comes before white");
+  EXPECT_THAT(explanation([&](std::size_t i) { return right(i < 1 ? i : i - 1); }),
+              testing::HasSubstr("one before"));
+  EXPECT_THAT(explanation([&](std::size_t i) { return right(i < 2 ? 1 : i - 2); }),
+              testing::HasSubstr("two before"));
 }
 
 }  // namespace

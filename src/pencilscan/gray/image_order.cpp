@@ -1,6 +1,8 @@
 #include "pencilscan/gray/image_order.h"
 
+#include <algorithm>
 #include <array>
+#include <numeric>
 
 #include "pencilscan/gray/local_map.h"
 #include "pencilscan/pattern/gray_code.h"
@@ -14,6 +16,15 @@ constexpr double kSensibleShare = 0.5;
 
 double sensible_share(const DecodedView& view) { return view.valid_share() * smooth_share(view); }
 
+/// Rows taken for columns are smooth, too, but most panels are no squares.
+bool leaves_panel(const DecodedView& view) {
+  constexpr double kMuch = 0.03;  // of the lit pixels; of a right capture, next to none
+  const std::size_t unlit = view.counts[static_cast<std::size_t>(PixelState::kUnlit)];
+  const std::size_t off = view.counts[static_cast<std::size_t>(PixelState::kOffPanel)];
+  const auto lit = std::accumulate(view.counts.begin(), view.counts.end(), std::size_t{0}) - unlit;
+  return static_cast<double>(off) > kMuch * static_cast<double>(lit);
+}
+
 /// The file that holds image i of the sequence, in a capture of some wrong order.
 struct WrongOrder {
   const char* words;
@@ -22,7 +33,7 @@ struct WrongOrder {
 
 std::size_t swap_pair(std::size_t i) { return i < 2 ? i : 2 + ((i - 2) ^ 1U); }
 
-constexpr std::array<WrongOrder, 6> kWrongOrders{{
+constexpr std::array<WrongOrder, 8> kWrongOrders{{
     {"each inverse comes before its pattern",
      [](std::size_t i, std::size_t, std::size_t, std::size_t step) {
        return step == 2 ? swap_pair(i) : i;
@@ -33,6 +44,14 @@ constexpr std::array<WrongOrder, 6> kWrongOrders{{
      [](std::size_t i, std::size_t, std::size_t, std::size_t) { return i ^ 1U; }},
     {"the files are in reverse order",
      [](std::size_t i, std::size_t count, std::size_t, std::size_t) { return count - 1 - i; }},
+    {"each picture shows what was projected one before: the camera or the projector is late",
+     [](std::size_t i, std::size_t count, std::size_t, std::size_t) {
+       return std::min(i + 1, count - 1);
+     }},
+    {"each picture shows what was projected two before: the camera or the projector is late",
+     [](std::size_t i, std::size_t count, std::size_t, std::size_t) {
+       return std::min(i + 2, count - 1);
+     }},
     {"the bits go from the least to the most significant",
      [](std::size_t i, std::size_t count, std::size_t column_bits, std::size_t step) {
        if (i < 2) return i;
@@ -57,13 +76,15 @@ constexpr std::array<WrongOrder, 6> kWrongOrders{{
 std::string explain_wrong_order(int panel_width, int panel_height, bool inverses,
                                 const GrayImageSource& image, const DecodedView& decoded,
                                 const GrayDecodeOptions& options) {
-  if (sensible_share(decoded) > kSenselessShare && decoded.inverted_share < 0.5) return {};
+  const double sensible = sensible_share(decoded);
+  if (sensible > kSenselessShare && decoded.inverted_share < 0.5 && !leaves_panel(decoded))
+    return {};
   const auto columns = static_cast<std::size_t>(gray_code_bits(panel_width));
   const auto rows = static_cast<std::size_t>(gray_code_bits(panel_height));
   const std::size_t step = inverses ? 2 : 1;
   const std::size_t count = 2 + step * (columns + rows);
   std::string explanation;
-  double most = kSensibleShare;
+  double most = std::max(kSensibleShare, sensible);
   for (const WrongOrder& order : kWrongOrders) {
     const GrayStack stack =
         make_gray_stack(panel_width, panel_height, inverses,

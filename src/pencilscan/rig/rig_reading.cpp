@@ -60,6 +60,18 @@ std::string parse_name(const JsonField& field) {
   return name;
 }
 
+/// A calibration cannot start from a focal length in millimetres.
+void check_is_in_pixels(const JsonField& field, const Device& device) {
+  constexpr double kLeastPerWidth = 0.13;  // sees 150 degrees, more than these lens models hold for
+  for (std::size_t k = 0; k < 2; ++k) {
+    const double size = k == 0 ? device.width : device.height;
+    if (device.K(static_cast<int>(k), static_cast<int>(k)) < kLeastPerWidth * size)
+      field.entries(3)[k].entries(3)[k].fail(
+          "must be in pixels (millimetres over the width of a pixel): this would see more than 150 "
+          "degrees");
+  }
+}
+
 /// What cameras and projectors have in common. With `given`, the calibration may be missing.
 void parse_device(const JsonField& field, Device& device, GivenCalibration* given) {
   device.name = parse_name(field.at("name"));
@@ -69,6 +81,7 @@ void parse_device(const JsonField& field, Device& device, GivenCalibration* give
     *given = {field.has("K"), field.has("distortion"), field.has("R") || field.has("t")};
   }
   if (given == nullptr || given->K) device.K = parse_camera_matrix(field.at("K"));
+  if (given != nullptr && given->K) check_is_in_pixels(field.at("K"), device);
   if (given == nullptr || given->distortion) {
     const auto distortion = field.at("distortion").entries();
     if (distortion.size() != Distortion::kBrown && distortion.size() != Distortion::kCoefficients)

@@ -356,6 +356,19 @@ TEST_F(RigFile, DevicesMayLackTheirCalibration) {
   EXPECT_THROW((void)read_rig(folder_ / "devices.json"), InputError);
 }
 
+TEST_F(RigFile, AGivenFocalLengthInMillimetresIsRefused) {
+  write_text(folder_ / "devices.json",
+             R"({"format": "rig/1", "unit": "mm",
+  "cameras": [{"name": "a", "width": 640, "height": 480, "K": [[8, 0, 320], [0, 8, 240], [0, 0, 1]]}],
+  "projectors": [{"name": "p", "width": 64, "height": 32}]})");
+  try {
+    (void)read_devices(folder_ / "devices.json");
+    FAIL() << "accepted";
+  } catch (const InputError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("cameras[0].K[0][0] = 8: must be in pixels"));
+  }
+}
+
 TEST(WorkingVolume, IsWhereTheAxesMeet) {
   Rig rig = example_rig();
   const Sphere stated = working_volume(rig);
