@@ -155,6 +155,17 @@ TEST(Verdict, SwappedFoldersAreNamed) {
               HasSubstr("the folders proj1/cam1 and proj1/cam2 are swapped"));
 }
 
+TEST(Verdict, FoldersSwappedInOneCaptureAreNamedWithIt) {
+  const Rig truth = ring(4, 4);
+  auto tracks = tracks_of(truth, {.count = 2500});
+  auto second = tracks_of(truth, {.count = 2500, .seed = 5});
+  for (Track& track : second) track.capture = 1;
+  second = with_exchanged(second, {1, 5}, {2, 5});
+  tracks.insert(tracks.end(), second.begin(), second.end());
+  EXPECT_THAT(findings_of(truth, tracks),
+              HasSubstr("the folders proj1/cam1 and proj1/cam2 (--captures number 2) are swapped"));
+}
+
 /// These draw cam2 to a wrong place, from where right pairs contradict.
 TEST(Verdict, SwappedFoldersAreNamedThoughTheyMisplaceADevice) {
   const Rig truth = ring(4, 4);

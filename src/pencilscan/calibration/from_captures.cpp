@@ -121,9 +121,11 @@ CapturesCalibration calibrate_captures(const UncalibratedRig& devices,
     all.uncertainty = uncertainty(all.result.problem, all.result.adjustment, options.seed);
   all.loop = close_loop(all.result);
   if (const auto finding = judge_loop(all.result, all.loop)) findings.push_back(*finding);
-  if (const auto finding = find_mirrored(input, all.result, calibrate_options, progress))
-    findings.insert(findings.begin(), *finding);
   all.verdict = judge(input, all.result, all.uncertainty, std::move(findings));
+  if (all.verdict.grade == Grade::kUnusable) {
+    if (auto finding = find_mirrored(input, all.result, calibrate_options, progress))
+      all.verdict.findings.insert(all.verdict.findings.begin(), std::move(*finding));
+  }
   tell("judging", 1);
   return all;
 }

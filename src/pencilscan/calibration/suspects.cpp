@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <optional>
 #include <set>
 
 #include "pencilscan/bundle/bundle_device.h"
@@ -21,26 +22,55 @@ std::string folder(const Rig& rig, const DevicePair& pair) {
   return device_at(rig, pair.second).name + "/" + device_at(rig, pair.first).name;
 }
 
-std::vector<Finding> find_swaps(const CalibrationInput& input, const Matches& matches,
-                                const PairFit& fit, std::set<DevicePair>& bad) {
-  std::vector<Finding> findings;
-  const std::vector<DevicePair> all(bad.begin(), bad.end());
+std::string number_of(std::size_t capture) {
+  return "--captures number " + std::to_string(capture + 1);
+}
+
+using Captures = std::map<DevicePair, std::vector<std::size_t>>;
+
+/// What contradicts: whole pairs, or some captures of a pair alone.
+struct Contradicting {
+  std::set<DevicePair> pairs;
+  Captures captures;  ///< of those pairs of which only some captures do
+
+  [[nodiscard]] bool is_in(const DevicePair& pair, std::optional<std::size_t> capture) const {
+    if (!pairs.contains(pair)) return false;
+    const auto some = captures.find(pair);
+    if (some == captures.end()) return !capture;
+    return capture && std::count(some->second.begin(), some->second.end(), *capture) > 0;
+  }
+  void take_out(const DevicePair& pair, std::optional<std::size_t> capture) {
+    const auto some = captures.find(pair);
+    if (capture && some != captures.end()) std::erase(some->second, *capture);
+    if (some != captures.end() && !some->second.empty()) return;
+    captures.erase(pair);
+    pairs.erase(pair);
+  }
+};
+
+/// Folders that were exchanged, in one capture, or in all where none is given.
+void find_swaps(const CalibrationInput& input, const Matches& matches, const PairFit& fit,
+                std::optional<std::size_t> capture, Contradicting& bad,
+                std::vector<Finding>& findings) {
+  const auto fits = [&](const DevicePair& pair, const DevicePair& place) {
+    return fit.share(matches.at(pair), place.first, place.second, nullptr,
+                     capture.value_or(SIZE_MAX)) >= kFitsShare;
+  };
+  const std::vector<DevicePair> all(bad.pairs.begin(), bad.pairs.end());
   for (std::size_t i = 0; i < all.size(); ++i) {
     for (std::size_t j = i + 1; j < all.size(); ++j) {
-      if (!bad.contains(all[i]) || !bad.contains(all[j])) continue;
-      if (fit.share(matches.at(all[i]), all[j].first, all[j].second) < kFitsShare ||
-          fit.share(matches.at(all[j]), all[i].first, all[i].second) < kFitsShare)
-        continue;
+      if (!bad.is_in(all[i], capture) || !bad.is_in(all[j], capture)) continue;
+      if (!fits(all[i], all[j]) || !fits(all[j], all[i])) continue;
       findings.push_back({Grade::kDoubtful,
                           "the folders " + folder(input.rig, all[i]) + " and " +
                               folder(input.rig, all[j]) +
+                              (capture ? " (" + number_of(*capture) + ")" : "") +
                               " are swapped: each fits the rig in the other's place",
                           "exchange the two folders and calibrate again"});
-      bad.erase(all[i]);
-      bad.erase(all[j]);
+      bad.take_out(all[i], capture);
+      bad.take_out(all[j], capture);
     }
   }
-  return findings;
 }
 
 std::string join(const std::vector<std::string>& names) {
@@ -48,8 +78,6 @@ std::string join(const std::vector<std::string>& names) {
   for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
   return text;
 }
-
-using Captures = std::map<DevicePair, std::vector<std::size_t>>;
 
 /// The device that most of the contradicting pairs have in common; of several, the one whose pairs
 /// fit worst altogether.
@@ -96,13 +124,13 @@ Contradictions find_contradictions(const CalibrationInput& input, const Calibrat
   if (!result.solved) return {};
   const Matches matches = matches_by_pair(input.tracks);
   const PairFit fit(result.problem.devices, std::max(2.0, 8 * result.rms_px));
-  std::set<DevicePair> bad;
-  Captures captures;  // where only some contradict
+  Contradicting bad;
+  std::set<std::size_t> numbers_of_bad;
   for (const auto& [pair, list] : matches) {
     if (!fit.placed(pair.first) || !fit.placed(pair.second)) continue;
     if (list.size() >= kLeastMatches &&
         fit.share(list, pair.first, pair.second) < kContradictsShare) {
-      bad.insert(pair);
+      bad.pairs.insert(pair);
       continue;
     }
     std::set<std::size_t> numbers;
@@ -111,16 +139,21 @@ Contradictions find_contradictions(const CalibrationInput& input, const Calibrat
       std::size_t count = 0;
       const double share = fit.share(list, pair.first, pair.second, &count, capture);
       if (count < kLeastMatches || share >= kContradictsShare) continue;
-      bad.insert(pair);
-      captures[pair].push_back(capture);
+      bad.pairs.insert(pair);
+      bad.captures[pair].push_back(capture);
+      numbers_of_bad.insert(capture);
     }
   }
-  Contradictions found{find_swaps(input, matches, fit, bad), {}};
+  Contradictions found;
+  find_swaps(input, matches, fit, std::nullopt, bad, found.findings);
+  for (const std::size_t capture : numbers_of_bad)
+    find_swaps(input, matches, fit, capture, bad, found.findings);
   // Pairs without sense in themselves (their fundamental matrix fits few) are named elsewhere.
   for (const PairGeometry& geometry : result.pairs)
-    if (geometry.inlier_share() < 0.35) bad.erase({geometry.camera, geometry.projector});
-  for (const DevicePair& pair : bad) found.unexplained[pair] = captures[pair];
-  if (!bad.empty()) found.findings.push_back(name_mover(input, matches, fit, found.unexplained));
+    if (geometry.inlier_share() < 0.35) bad.pairs.erase({geometry.camera, geometry.projector});
+  for (const DevicePair& pair : bad.pairs) found.unexplained[pair] = bad.captures[pair];
+  if (!bad.pairs.empty())
+    found.findings.push_back(name_mover(input, matches, fit, found.unexplained));
   return found;
 }
 

@@ -103,6 +103,8 @@ class Judge {
   }
 
   void judge_pairs() {
+    for (const Finding& finding : find_contradictions(input_, result_).findings)
+      findings_.push_back(finding);
     for (const PairGeometry& pair : result_.pairs) {
       if (pair.matches < 24 || pair.inlier_share() >= options_.low_inlier_share) continue;
       add(Grade::kDoubtful,
@@ -111,8 +113,6 @@ class Judge {
               " fit a rigid scene seen by one camera and one projector",
           "look at these images: something moved, or files are mixed up");
     }
-    for (const Finding& finding : find_contradictions(input_, result_).findings)
-      findings_.push_back(finding);
   }
 
   void judge_residuals() {
