@@ -5,9 +5,10 @@ from __future__ import annotations
 import json
 import math
 import os
-from typing import Any, Union
+from typing import Any, Mapping, Union
 
 from . import _core
+from ._errors import InputError
 
 PathLike = Union[str, "os.PathLike[str]"]
 
@@ -75,6 +76,25 @@ def _unpickled(contents: dict) -> Rig:
 
 def as_rig(rig: Union[Rig, dict, PathLike]) -> Rig:
     return rig if isinstance(rig, Rig) else Rig(rig)
+
+
+def as_pictures(rig: Rig, images: Any, argument: str = "images") -> _core.Pictures:
+    """By camera name, or a list with one picture (or None) per camera, in the rig's order."""
+    if images is None:
+        return _core.Pictures({})
+    if not isinstance(images, Mapping):
+        names = rig.cameras
+        if not isinstance(images, (list, tuple)):
+            raise InputError(
+                argument, "", type(images).__name__,
+                "must be a dict of pictures by camera name, or a list of them",
+            )
+        if len(images) != len(names):
+            raise InputError(
+                argument, "length", str(len(images)), f"must be {len(names)}, the rig's cameras"
+            )
+        images = dict(zip(names, images))
+    return _core.Pictures({name: image for name, image in images.items() if image is not None})
 
 
 def read_rig(path: PathLike) -> Rig:

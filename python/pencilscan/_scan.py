@@ -10,7 +10,7 @@ import numpy as np
 
 from . import _core
 from ._errors import InputError, StageError
-from ._rig import PathLike, Rig, as_rig
+from ._rig import PathLike, Rig, as_pictures, as_rig
 
 Progress = Callable[[str, float], Optional[bool]]
 MeshLike = Union["Mesh", PathLike, tuple, Any]
@@ -315,7 +315,7 @@ class Result:
 
 def reconstruct(
     rig: Union[Rig, dict, PathLike],
-    images: Mapping[str, np.ndarray],
+    images: Union[Mapping[str, np.ndarray], Sequence[Optional[np.ndarray]]],
     method: Union[str, Callable[..., Any]] = "joint",
     mesh: bool = True,
     progress: Optional[Progress] = None,
@@ -334,7 +334,7 @@ def reconstruct(
     rig
         The calibrated devices.
     images
-        Array per camera name: (height, width, 3) RGB or (height, width); uint8 or uint16, or
+        Array per camera name, or a list in the order of the rig's cameras: (height, width, 3) RGB or (height, width); uint8 or uint16, or
         float32 in [0, 1]; as the camera gave them. Float arrays of three channels are used where
         they lie. OpenCV's BGR becomes RGB by `image[..., ::-1]`. Cameras may be absent.
     method
@@ -381,9 +381,10 @@ def reconstruct(
             detection, method(detection), mesh, progress, depth=depth, depth_maps=depth_maps,
             threads=threads,
         )
+    rig = as_rig(rig)
     return Result(
         _core.reconstruct(
-            as_rig(rig)._core, _core.Pictures(dict(images)), _core.Pictures(dict(plain or {})),
+            rig._core, as_pictures(rig, images), as_pictures(rig, plain, "plain"),
             method, multiview_cost, mesh, depth, depth_maps, frame, threads, progress,
         )
     )

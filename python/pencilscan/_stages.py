@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any, Mapping, Optional, Union
+from typing import Any, Mapping, Optional, Sequence, Union
 
 import numpy as np
 
 from . import _core
 from ._errors import InputError
-from ._rig import PathLike, Rig, as_rig
+from ._rig import PathLike, Rig, as_pictures, as_rig
 from ._scan import Crossings, Curves, Progress, Result, _Table
 
 
@@ -132,7 +132,7 @@ class Labels(_Table):
 
 def detect(
     rig: Union[Rig, dict, PathLike],
-    images: Mapping[str, np.ndarray],
+    images: Union[Mapping[str, np.ndarray], Sequence[Optional[np.ndarray]]],
     method: str = "joint",
     *,
     identities: bool = False,
@@ -152,9 +152,10 @@ def detect(
     identities
         Decide projector, pattern and local ID of each curve in any case.
     """
+    rig = as_rig(rig)
     return Detection(
         _core.detect(
-            as_rig(rig)._core, _core.Pictures(dict(images)), _core.Pictures(dict(plain or {})),
+            rig._core, as_pictures(rig, images), as_pictures(rig, plain, "plain"),
             method, identities, frame, threads, progress,
         )
     )

@@ -357,6 +357,20 @@ class PackageTest(unittest.TestCase):
         self.assertIn("must be joint", str(self.complaint(
             lambda: ps.reconstruct(rig, frame, method="magic"))))
 
+    def test_pictures_may_be_a_list_in_the_rigs_order(self) -> None:
+        rig, frame = self.scene.rig, self.scene.frame
+        named = ps.reconstruct(rig, frame, mesh=False)
+        listed = ps.reconstruct(rig, [frame[name] for name in rig.cameras], mesh=False)
+        np.testing.assert_array_equal(listed.points.xyz, named.points.xyz)
+        first = {name: image for name, image in frame.items() if name != rig.cameras[-1]}
+        without = ps.reconstruct(rig, [first.get(name) for name in rig.cameras], mesh=False)
+        np.testing.assert_array_equal(
+            without.points.xyz, ps.reconstruct(rig, first, mesh=False).points.xyz)
+        self.assertIn("length = 1: must be", str(self.complaint(
+            lambda: ps.reconstruct(rig, [frame["cam0"]]))))
+        self.assertIn("must be a dict", str(self.complaint(
+            lambda: ps.reconstruct(rig, frame["cam0"]))))
+
     def test_complaints_about_meshes_and_options(self) -> None:
         far = ps.Mesh(ps.make_sphere(10).vertices + 1e5, ps.make_sphere(10).faces)
         self.assertIn("view", str(self.complaint(lambda: ps.simulate(self.scene.rig, far))))

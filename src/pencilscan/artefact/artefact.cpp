@@ -10,6 +10,7 @@
 #include "pencilscan/artefact/trimmed.h"
 #include "pencilscan/core/check.h"
 #include "pencilscan/core/error.h"
+#include "pencilscan/core/formatted.h"
 
 namespace pencilscan {
 namespace {
@@ -17,8 +18,15 @@ namespace {
 constexpr std::size_t kWorstShown = 10;
 
 [[noreturn]] void no_fit(const ArtefactPoints& points, const char* shape) {
+  Vec3 low = Vec3::Constant(std::numeric_limits<double>::infinity()), high = -low;
+  for (const Vec3& x : points.points) {
+    low = low.cwiseMin(x);
+    high = high.cwiseMax(x);
+  }
   throw StageError(points.source + ": no " + shape + " fits " +
-                   std::to_string(points.points.size()) + " points");
+                   std::to_string(points.points.size()) + " points, which reach over " +
+                   formatted((high - low).maxCoeff(), "%.3g") +
+                   " mm (lengths are taken as millimetres)");
 }
 
 std::size_t removed_of(std::size_t count) {
