@@ -52,6 +52,24 @@ double share_that_looks(Rig rig, RigidTransform (*meant)(const RigidTransform&))
   return count > 0 ? looking / count : 1;
 }
 
+/// Whether the lens model shows nearly all of the picture: beyond where it folds back, pixels see
+/// nothing. Fits of wide lenses may fold in the very corners.
+bool shows_picture(const Device& device) {
+  constexpr double kNearPx = 1;
+  constexpr double kNearlyAll = 0.85;
+  const Vec2 middle(0.5 * device.width, 0.5 * device.height);
+  const Mat3 from_pixel = device.K.inverse();
+  for (const double across : {-kNearlyAll, 0.0, kNearlyAll}) {
+    for (const double down : {-kNearlyAll, 0.0, kNearlyAll}) {
+      const Vec2 pixel = middle + Vec2(across, down).cwiseProduct(middle);
+      const Vec2 seen = (from_pixel * pixel.homogeneous()).head<2>();
+      const Vec2 back = distort(device.distortion, undistort(device.distortion, seen));
+      if (!((back - seen).norm() * device.focal_px() < kNearPx)) return false;
+    }
+  }
+  return true;
+}
+
 std::string degrees(double radians) { return formatted(radians * 180 / std::numbers::pi, "%.0f"); }
 
 }  // namespace
@@ -98,6 +116,22 @@ std::optional<std::string> intrinsics_convention_warning(const Rig& rig) {
       warning = "K of " + device.name + " has a focal length of " + formatted(device.K(0, 0)) +
                 " px for " + std::to_string(device.width) + " columns: it sees " + degrees(angle) +
                 " degrees. K is in pixels: millimetres over the width of a pixel";
+      return;
+    }
+    // Decentring of lenses is below a hundredth; k3 taken for p1 is not.
+    constexpr double kLargestTangential = 0.02;
+    const double tangential =
+        std::max(std::abs(device.distortion[2]), std::abs(device.distortion[3]));
+    if (tangential > kLargestTangential) {
+      warning = "distortion of " + device.name + " has p1 = " + formatted(device.distortion[2]) +
+                ", p2 = " + formatted(device.distortion[3]) +
+                ", as no lens has: the order is k1, k2, p1, p2, k3";
+      return;
+    }
+    if (!shows_picture(device)) {
+      warning = "distortion of " + device.name +
+                " folds the picture back before its rim: it is of another model (the order is k1, "
+                "k2, p1, p2, k3, on coordinates divided by the depth), or of another K";
       return;
     }
     const Vec2 center(device.K(0, 2) / device.width, device.K(1, 2) / device.height);

@@ -16,7 +16,8 @@ namespace pencilscan {
 [[nodiscard]] std::optional<std::string> pose_convention_warning(const Rig& rig);
 
 /// A device that sees more than 150 degrees by its focal length, or a camera whose principal point
-/// lies at its picture's rim: K is in pixels.
+/// lies at its picture's rim: K is in pixels. A lens that is no lens: coefficients in another order
+/// than OpenCV's, or of another model.
 [[nodiscard]] std::optional<std::string> intrinsics_convention_warning(const Rig& rig);
 
 }  // namespace pencilscan

@@ -62,5 +62,20 @@ TEST(IntrinsicsConvention, OtherUnitsAreNamed) {
   EXPECT_FALSE(intrinsics_convention_warning(rig));
 }
 
+TEST(IntrinsicsConvention, LensesThatAreNoneAreNamed) {
+  Rig rig = make_ring({});
+  rig.cameras[1].distortion = {-0.25, 0.1, 1e-3, -5e-4, -0.02};
+  EXPECT_FALSE(intrinsics_convention_warning(rig));
+  Camera wide = rig.cameras[1];
+  wide.K(0, 0) = wide.K(1, 1) = 0.6 * wide.width;
+  wide.distortion = {-0.3, 0.1, 0, 0, -0.015};
+  rig.cameras[4] = wide;
+  EXPECT_FALSE(intrinsics_convention_warning(rig));
+  rig.cameras[1].distortion = {-0.25, 0.1, -0.05, 1e-3, -5e-4};  // k3 third
+  EXPECT_THAT(intrinsics_convention_warning(rig).value_or(""), HasSubstr("as no lens has"));
+  rig.cameras[1].distortion = {-12, 5, 0, 0, 0};
+  EXPECT_THAT(intrinsics_convention_warning(rig).value_or(""), HasSubstr("folds"));
+}
+
 }  // namespace
 }  // namespace pencilscan
