@@ -74,6 +74,38 @@ std::vector<std::vector<cv::Mat>> taken_presence(std::span<CameraDetection> dete
   return presence;
 }
 
+/// The camera whose depths lie apart though its crossings meet: what it sees is in its place for
+/// the projectors, but not where the others see it.
+std::optional<std::size_t> of_another_moment(const ViewsApart& apart, const PointResult& result) {
+  constexpr double kMeetsPx = 0.25;  // half of a bump that is to be told from it
+  const auto camera = apart.single();
+  const auto all = static_cast<std::ptrdiff_t>(result.left_out.size());
+  const bool are_most_left =
+      2 * (std::count(result.left_out.begin(), result.left_out.end(), 1) + 1) < all;
+  if (!camera || !are_most_left || result.corrected || *camera >= result.device_crossings.size())
+    return std::nullopt;
+  const auto& shift = result.device_crossings[*camera].shift_px;
+  return shift && shift->norm() < kMeetsPx ? camera : std::nullopt;
+}
+
+void leave_out(const Rig& rig, std::size_t c, const ViewsApart& apart, PointResult& result) {
+  result.left_out[c] = 1;
+  result.detections[c] = {};
+  result.graphs[c] = {};
+  result.graphs[c].camera = static_cast<int>(c);
+  Labeling& labeling = result.labeling;
+  labeling.runs[c].clear();
+  if (c < labeling.tentative.size()) labeling.tentative[c].clear();
+  if (c < labeling.undecided.size()) labeling.undecided[c].clear();
+  if (c < labeling.denied.size()) labeling.denied[c].clear();
+  result.warnings.push_back(another_moment_warning(rig, c, *apart.with[c], *apart.without[c]));
+}
+
+std::vector<MeasuredPoint> without_camera(std::vector<MeasuredPoint> points, std::size_t camera) {
+  std::erase_if(points, [&](const MeasuredPoint& p) { return p.camera == camera; });
+  return points;
+}
+
 }  // namespace
 
 PointOptions before_surface(PointOptions options) {
@@ -101,14 +133,23 @@ PointResult place_points(const Rig& rig, PointResult lines, const PointOptions& 
           std::max(triangulation.projection_sigma_px, plane_error_px(result.crossings));
       settle.errors_are_shared = true;
     }
-    result.points = triangulate(rig, result.graphs, result.labeling, triangulation);
-    if (result.corrected) surfaces = local_surfaces(rig, result.points, options.guided.surface);
-    if (!is_guided) return;
-    result.points = settle_points(rig, std::move(result.points), surfaces, settle);
-    const auto apart = views_apart(rig, result.points, surfaces);
+    const auto place = [&] {
+      result.points = triangulate(rig, result.graphs, result.labeling, triangulation);
+      if (result.corrected) surfaces = local_surfaces(rig, result.points, options.guided.surface);
+      if (!is_guided) return ViewsApart{};
+      result.points = settle_points(rig, std::move(result.points), surfaces, settle);
+      return views_apart(rig, result.points, surfaces);
+    };
+    ViewsApart apart = place();
+    while (const auto camera = of_another_moment(apart, result)) {
+      leave_out(rig, *camera, apart, result);
+      surfaces = local_surfaces(rig, without_camera(std::move(result.points), *camera),
+                                options.guided.surface);
+      apart = place();
+    }
     // Where the rig is off, that was said.
-    if (!result.corrected && apart.value_or(0) > kMostApart)
-      result.warnings.push_back(views_warning(*apart));
+    if (!result.corrected && apart.all.value_or(0) > kMostApart)
+      result.warnings.push_back(views_warning(*apart.all));
   });
   return result;
 }

@@ -189,6 +189,21 @@ std::vector<Warning> missing_lines_warnings(const Rig& rig,
   return warnings;
 }
 
+Warning another_moment_warning(const Rig& rig, std::size_t camera, double with_others,
+                               double among_others) {
+  const std::string& name = rig.cameras[camera].name;
+  return {WarningCode::kWrongPicture,
+          "camera " + name + ": what it sees lies apart from what the others see by " +
+              formatted(with_others, "%.1f") +
+              " times as much as the pictures explain (the others' "
+              "among each other by " +
+              formatted(among_others, "%.1f") +
+              "): its picture is of another moment (a late trigger, a dropped picture) or another "
+              "camera's, or the camera was moved; reconstructed without it",
+          name,
+          {{"deviations", with_others}, {"deviations_among_others", among_others}}};
+}
+
 Warning views_warning(double deviations) {
   return {WarningCode::kViewsDisagree,
           "what the cameras see lies apart by " + formatted(deviations, "%.1f") +

@@ -38,6 +38,11 @@ namespace pencilscan {
 [[nodiscard]] std::vector<Warning> missing_lines_warnings(const Rig& rig,
                                                           std::span<const ExpectedLines> expected);
 
+/// That what one camera sees lies apart from what the others see, by so many deviations, and they
+/// among each other by so few.
+[[nodiscard]] Warning another_moment_warning(const Rig& rig, std::size_t camera, double with_others,
+                                             double among_others);
+
 /// That depths of different cameras are not those of one surface, by so many deviations.
 [[nodiscard]] Warning views_warning(double deviations);
 

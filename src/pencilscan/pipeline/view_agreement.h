@@ -50,12 +50,20 @@ class ViewAgreement {
 /// cameras exchanged before a ball 11 and more.
 inline constexpr double kMostApart = 3;
 
-/// By how much more the depths of different cameras lie apart than their deviations explain (1.48
-/// times the median of the normalised differences); nothing where they hardly overlap. `surfaces`:
-/// what each camera's points show. What lies farther apart than half a line spacing is another
-/// surface.
-[[nodiscard]] std::optional<double> views_apart(const Rig& rig,
-                                                std::span<const MeasuredPoint> points,
-                                                std::span<const LocalSurface> surfaces);
+/// By how much more depths of different cameras lie apart than their deviations explain (1.48 times
+/// the median of the normalised differences); nothing where they hardly overlap.
+struct ViewsApart {
+  std::optional<double> all;
+  std::vector<std::optional<double>> with;     ///< of each camera, against all others
+  std::vector<std::optional<double>> without;  ///< of all others, among each other
+
+  /// The one camera that lies apart from others that agree: its picture is of another moment, or
+  /// it stands elsewhere.
+  [[nodiscard]] std::optional<std::size_t> single() const;
+};
+/// `surfaces`: what each camera's points show. What lies farther apart than half a line spacing is
+/// another surface.
+[[nodiscard]] ViewsApart views_apart(const Rig& rig, std::span<const MeasuredPoint> points,
+                                     std::span<const LocalSurface> surfaces);
 
 }  // namespace pencilscan

@@ -55,29 +55,42 @@ TEST(ViewAgreement, CamerasThatSeeOneBallAgreeAndThoseThatSeeTwoDoNot) {
   EXPECT_LT(none.same, one.same / 10);
 }
 
+/// How far cameras lie apart before a ball, of which one sees it `lines` line spacings aside.
+ViewsApart apart_before_ball(const Rig& rig, std::size_t camera_aside, double lines) {
+  constexpr float kSigma = 0.05F;
+  Random random(3);
+  std::vector<MeasuredPoint> points;
+  for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
+    const Camera& camera = rig.cameras[c];
+    const double aside = c == camera_aside ? lines * line_spacing(rig) : 0;
+    for (MeasuredPoint p : seen_points(camera, {aside, 0, 0})) {
+      const Vec3 way = (position_of(p) - camera.center()).normalized();
+      set_position(position_of(p) + random.normal(0, kSigma) * way, p);
+      p.camera = static_cast<std::uint8_t>(c);
+      p.sigma = kSigma;
+      points.push_back(p);
+    }
+  }
+  return views_apart(rig, points, local_surfaces(rig, points, {}));
+}
+
 TEST(ViewAgreement, TwoBallsAFractionOfALineApartLieManyDeviationsApart) {
   const Rig rig = sample::small_rig(480, 360, 110);
-  constexpr float kSigma = 0.05F;
-  const auto apart = [&](double lines) {
-    Random random(3);
-    std::vector<MeasuredPoint> points;
-    for (std::uint8_t c = 0; c < 2; ++c) {
-      const Camera& camera = rig.cameras[c];
-      for (MeasuredPoint p : seen_points(camera, {c == 0 ? lines * line_spacing(rig) : 0, 0, 0})) {
-        const Vec3 way = (position_of(p) - camera.center()).normalized();
-        set_position(position_of(p) + random.normal(0, kSigma) * way, p);
-        p.camera = c;
-        p.sigma = kSigma;
-        points.push_back(p);
-      }
-    }
-    return views_apart(rig, points, local_surfaces(rig, points, {}));
-  };
-  EXPECT_LT(apart(0).value(), 1.2);
-  EXPECT_GT(apart(0.2).value(), kMostApart);
+  EXPECT_LT(apart_before_ball(rig, 0, 0).all.value(), 1.2);
+  const ViewsApart apart = apart_before_ball(rig, 0, 0.2);
+  EXPECT_GT(apart.all.value(), kMostApart);
+  EXPECT_FALSE(apart.single().has_value());  // of two, nobody knows which
   // Out of each other's sight nothing can be said.
   const std::vector<MeasuredPoint> of_one = seen_points(rig.cameras[0], Vec3::Zero());
-  EXPECT_FALSE(views_apart(rig, of_one, local_surfaces(rig, of_one, {})).has_value());
+  EXPECT_FALSE(views_apart(rig, of_one, local_surfaces(rig, of_one, {})).all.has_value());
+}
+
+TEST(ViewAgreement, TheOneOfThreeCamerasThatLiesApartIsNamed) {
+  Rig rig = sample::small_rig(480, 360, 110);
+  rig.cameras.push_back(sample::device_at<Camera>({560, 0, 120}, "cam2", 480, 360, 900));
+  EXPECT_FALSE(apart_before_ball(rig, 0, 0).single().has_value());
+  for (const std::size_t camera : {0U, 1U, 2U})
+    EXPECT_EQ(apart_before_ball(rig, camera, 0.1).single(), camera);
 }
 
 TEST(ViewAgreement, NamesTheCamerasOfDoubtfulPairs) {
