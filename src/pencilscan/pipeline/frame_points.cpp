@@ -98,7 +98,7 @@ void leave_out(const Rig& rig, std::size_t c, const ViewsApart& apart, PointResu
   if (c < labeling.tentative.size()) labeling.tentative[c].clear();
   if (c < labeling.undecided.size()) labeling.undecided[c].clear();
   if (c < labeling.denied.size()) labeling.denied[c].clear();
-  result.warnings.push_back(another_moment_warning(rig, c, *apart.with[c], *apart.without[c]));
+  result.warnings.push_back(another_moment_warning(rig, c, apart, true));
 }
 
 std::vector<MeasuredPoint> without_camera(std::vector<MeasuredPoint> points, std::size_t camera) {
@@ -141,12 +141,15 @@ PointResult place_points(const Rig& rig, PointResult lines, const PointOptions& 
       return views_apart(rig, result.points, surfaces);
     };
     ViewsApart apart = place();
-    while (const auto camera = of_another_moment(apart, result)) {
+    std::optional<std::size_t> camera = of_another_moment(apart, result);
+    while (camera && *apart.with[*camera] > kMostApart) {
       leave_out(rig, *camera, apart, result);
       surfaces = local_surfaces(rig, without_camera(std::move(result.points), *camera),
                                 options.guided.surface);
       apart = place();
+      camera = of_another_moment(apart, result);
     }
+    if (camera) result.warnings.push_back(another_moment_warning(rig, *camera, apart, false));
     // Where the rig is off, that was said.
     if (!result.corrected && apart.all.value_or(0) > kMostApart)
       result.warnings.push_back(views_warning(*apart.all));

@@ -189,19 +189,20 @@ std::vector<Warning> missing_lines_warnings(const Rig& rig,
   return warnings;
 }
 
-Warning another_moment_warning(const Rig& rig, std::size_t camera, double with_others,
-                               double among_others) {
+Warning another_moment_warning(const Rig& rig, std::size_t camera, const ViewsApart& apart,
+                               bool is_left_out) {
   const std::string& name = rig.cameras[camera].name;
-  return {WarningCode::kWrongPicture,
-          "camera " + name + ": what it sees lies apart from what the others see by " +
-              formatted(with_others, "%.1f") +
-              " times as much as the pictures explain (the others' "
-              "among each other by " +
-              formatted(among_others, "%.1f") +
-              "): its picture is of another moment (a late trigger, a dropped picture) or another "
-              "camera's, or the camera was moved; reconstructed without it",
-          name,
-          {{"deviations", with_others}, {"deviations_among_others", among_others}}};
+  return {
+      is_left_out ? WarningCode::kWrongPicture : WarningCode::kViewsDisagree,
+      "camera " + name + ": what it sees lies apart from what the others see by " +
+          formatted(*apart.with[camera], "%.1f") +
+          " times as much as the pictures explain (the others' among each other by " +
+          formatted(*apart.without[camera], "%.1f") +
+          "): its picture is of another moment (a late trigger, a dropped picture)" +
+          (is_left_out ? " or another camera's, or the camera was moved; reconstructed without it"
+                       : ", or it stands a little elsewhere than the rig says"),
+      name,
+      {{"deviations", *apart.with[camera]}, {"deviations_among_others", *apart.without[camera]}}};
 }
 
 Warning views_warning(double deviations) {

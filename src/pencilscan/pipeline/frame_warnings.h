@@ -6,6 +6,7 @@
 
 #include "pencilscan/core/warning.h"
 #include "pencilscan/pipeline/frame.h"
+#include "pencilscan/pipeline/view_agreement.h"
 
 namespace pencilscan {
 
@@ -38,10 +39,9 @@ namespace pencilscan {
 [[nodiscard]] std::vector<Warning> missing_lines_warnings(const Rig& rig,
                                                           std::span<const ExpectedLines> expected);
 
-/// That what one camera sees lies apart from what the others see, by so many deviations, and they
-/// among each other by so few.
-[[nodiscard]] Warning another_moment_warning(const Rig& rig, std::size_t camera, double with_others,
-                                             double among_others);
+/// That what one camera sees lies apart from what the others see, and that it was left out, or not.
+[[nodiscard]] Warning another_moment_warning(const Rig& rig, std::size_t camera,
+                                             const ViewsApart& apart, bool is_left_out);
 
 /// That depths of different cameras are not those of one surface, by so many deviations.
 [[nodiscard]] Warning views_warning(double deviations);
