@@ -334,9 +334,10 @@ def reconstruct(
     rig
         The calibrated devices.
     images
-        Array per camera name, or a list in the order of the rig's cameras: (height, width, 3) RGB or (height, width); uint8 or uint16, or
-        float32 in [0, 1]; as the camera gave them. Float arrays of three channels are used where
-        they lie. OpenCV's BGR becomes RGB by `image[..., ::-1]`. Cameras may be absent.
+        Array per camera name, or a list in the order of the rig's cameras: (height, width, 3) RGB
+        or (height, width); uint8 or uint16, or float32 in [0, 1]; as the camera gave them. Float
+        arrays of three channels are used where they lie. OpenCV's BGR becomes RGB by
+        `image[..., ::-1]`. Cameras may be absent.
     method
         joint, or the paper's linear and multiview, or single-projector. Or a function of yours, which
         decides the lines: it gets what `detect(..., identities=True)` gives and returns `Labels`;

@@ -38,13 +38,11 @@ Explained explained(const CalibrationInput& input, const CalibrationResult& resu
   std::vector<double> all(devices, 0);
   double good_sum = 0;
   double sum = 0;
-  const PairFit* fit = nullptr;
-  const PairFit found(result.problem.devices, kExplainedPx);
-  if (result.solved) fit = &found;
+  const PairFit fit(result.problem.devices, kExplainedPx);
   for (const auto& [pair, matches] : matches_by_pair(input.tracks)) {
     const auto count = static_cast<double>(matches.size());
-    const bool is_placed = fit != nullptr && fit->placed(pair.first) && fit->placed(pair.second);
-    const double share = is_placed ? fit->share(matches, pair.first, pair.second) : 0;
+    const bool is_placed = result.solved && fit.placed(pair.first) && fit.placed(pair.second);
+    const double share = is_placed ? fit.share(matches, pair.first, pair.second) : 0;
     for (const std::size_t d : {pair.first, pair.second}) {
       good[d] += share * count;
       all[d] += count;
@@ -52,11 +50,11 @@ Explained explained(const CalibrationInput& input, const CalibrationResult& resu
     good_sum += share * count;
     sum += count;
   }
-  Explained result_shares;
+  Explained shares;
   for (std::size_t d = 0; d < devices; ++d)
-    result_shares.of_device.push_back(all[d] > 0 ? good[d] / all[d] : 1);
-  result_shares.of_all = sum > 0 ? good_sum / sum : 1;
-  return result_shares;
+    shares.of_device.push_back(all[d] > 0 ? good[d] / all[d] : 1);
+  shares.of_all = sum > 0 ? good_sum / sum : 1;
+  return shares;
 }
 
 std::vector<Track> some_of(const std::vector<Track>& tracks, std::size_t count) {

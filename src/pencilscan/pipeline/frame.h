@@ -151,6 +151,9 @@ struct NothingFound : StageError {
                                        const PointOptions& options = {},
                                        const StageClock& clock = {});
 
+/// Leaves a picture out: what was found in it, and the labels of that.
+void forget_camera(std::size_t camera, PointResult& result);
+
 /// What the pictures themselves say: warnings; those that are plainly wrong are left out.
 [[nodiscard]] PointResult check_pictures(const Rig& rig, const Frame& frame, PointResult curves);
 

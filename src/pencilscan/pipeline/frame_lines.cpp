@@ -16,11 +16,7 @@ namespace {
 /// Forgets what the cameras of the findings saw.
 void leave_out(const Rig& rig, const std::vector<PictureFinding>& findings, PointResult& result) {
   for (const PictureFinding& finding : findings) {
-    const auto c = static_cast<std::size_t>(finding.camera);
-    result.left_out[c] = 1;
-    result.detections[c] = {};
-    result.graphs[c] = {};
-    result.graphs[c].camera = finding.camera;
+    forget_camera(static_cast<std::size_t>(finding.camera), result);
     result.warnings.push_back(
         {WarningCode::kWrongPicture, describe(rig, finding), rig.camera(finding.camera).name});
   }
@@ -76,6 +72,20 @@ std::optional<Rig> label_lines(const Rig& rig, const Frame& frame, const PointOp
 }
 
 }  // namespace
+
+void forget_camera(std::size_t camera, PointResult& result) {
+  result.left_out[camera] = 1;
+  result.detections[camera] = {};
+  result.graphs[camera] = {};
+  result.graphs[camera].camera = static_cast<int>(camera);
+  const auto clear = [camera](auto& per_camera) {
+    if (camera < per_camera.size()) per_camera[camera].clear();
+  };
+  clear(result.labeling.runs);
+  clear(result.labeling.tentative);
+  clear(result.labeling.undecided);
+  clear(result.labeling.denied);
+}
 
 PointResult check_pictures(const Rig& rig, const Frame& frame, PointResult curves) {
   if (std::optional<Warning> warning = interpolation_warning(rig, curves.detections))

@@ -88,19 +88,6 @@ std::optional<std::size_t> of_another_moment(const ViewsApart& apart, const Poin
   return shift && shift->norm() < kMeetsPx ? camera : std::nullopt;
 }
 
-void leave_out(const Rig& rig, std::size_t c, const ViewsApart& apart, PointResult& result) {
-  result.left_out[c] = 1;
-  result.detections[c] = {};
-  result.graphs[c] = {};
-  result.graphs[c].camera = static_cast<int>(c);
-  Labeling& labeling = result.labeling;
-  labeling.runs[c].clear();
-  if (c < labeling.tentative.size()) labeling.tentative[c].clear();
-  if (c < labeling.undecided.size()) labeling.undecided[c].clear();
-  if (c < labeling.denied.size()) labeling.denied[c].clear();
-  result.warnings.push_back(another_moment_warning(rig, c, apart, true));
-}
-
 std::vector<MeasuredPoint> without_camera(std::vector<MeasuredPoint> points, std::size_t camera) {
   std::erase_if(points, [&](const MeasuredPoint& p) { return p.camera == camera; });
   return points;
@@ -143,7 +130,8 @@ PointResult place_points(const Rig& rig, PointResult lines, const PointOptions& 
     ViewsApart apart = place();
     std::optional<std::size_t> camera = of_another_moment(apart, result);
     while (camera && *apart.with[*camera] > kMostApart) {
-      leave_out(rig, *camera, apart, result);
+      result.warnings.push_back(another_moment_warning(rig, *camera, apart, true));
+      forget_camera(*camera, result);
       surfaces = local_surfaces(rig, without_camera(std::move(result.points), *camera),
                                 options.guided.surface);
       apart = place();

@@ -42,8 +42,7 @@ struct Attempt {
 };
 
 /// Where few devices moved and all others are as calibrated, refinement starts with those put back.
-void put_back_few(const Rig& calibrated, std::span<const CrossingTrack> tracks, Attempt& attempt,
-                  RefineRigOptions& refine) {
+void put_back_few(const Rig& calibrated, std::span<const CrossingTrack> tracks, Attempt& attempt) {
   constexpr std::size_t kFewOf = 4;
   const MovedDevices found = find_moved_devices(calibrated, tracks);
   const std::size_t devices = device_count(calibrated);
@@ -53,7 +52,6 @@ void put_back_few(const Rig& calibrated, std::span<const CrossingTrack> tracks, 
     attempt.correction[move.device] = move.correction;
     attempt.moved.push_back(move.device);
   }
-  refine.moved = attempt.moved;
 }
 
 Attempt attempt(const Rig& calibrated, std::span<const FrameCurves> frames, double tolerance,
@@ -72,7 +70,10 @@ Attempt attempt(const Rig& calibrated, std::span<const FrameCurves> frames, doub
     joint.projection_sigma_px = tolerance;
     const auto labelings = label(refinement.rig, frames, joint);
     const auto tracks = tracks_of(refinement.rig, frames, labelings, options.tracks);
-    if (refinement.rounds.empty()) put_back_few(calibrated, tracks, result, refine);
+    if (refinement.rounds.empty()) {
+      put_back_few(calibrated, tracks, result);
+      refine.moved = result.moved;
+    }
     RefineRigResult refined = refine_rig(calibrated, tracks, result.correction, refine);
     refinement.report = std::move(refined.report);
     if (!refinement.report.refined) return result;
