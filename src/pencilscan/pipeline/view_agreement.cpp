@@ -130,11 +130,12 @@ std::optional<std::size_t> ViewsApart::single() const {
   // frame late before an object that bends has 1.4 to 2.2, and 1.7 to 2.8 times.
   constexpr double kApart = 1.5;
   constexpr double kFarther = 1.8;  // than the others among each other
+  // A right camera beside a wrong one may lie as far apart. Without the wrong one the others agree.
   std::optional<std::size_t> found;
   for (std::size_t c = 0; c < with.size(); ++c) {
     if (!with[c] || !without[c]) continue;
     if (*with[c] > kApart && *with[c] > kFarther * *without[c] &&
-        (!found || *with[c] > *with[*found]))
+        (!found || *without[c] < *without[*found]))
       found = c;
   }
   return found;
