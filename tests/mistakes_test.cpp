@@ -163,6 +163,48 @@ TEST_F(Newcomer, IsToldOfObjectsInAnotherUnit) {
   EXPECT_THAT(fitted.error, Not(HasSubstr("warning")));
 }
 
+TEST_F(Newcomer, MayBringLightOfAnotherRenderer) {
+  ASSERT_EQ(run("rig ring --out r.json --cameras 2 --projectors 2 --camera-width 64 "
+                "--camera-height 64 --camera-focal-px 115")
+                .code,
+            0);
+  write("mesh.obj",
+        "v -60 -60 -50\nv 60 -60 -50\nv 0 70 -50\nv 0 0 80\n"
+        "f 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n");
+  const std::string simulate = "simulate --rig r.json --mesh mesh.obj --samples 1 ";
+  ASSERT_EQ(run(simulate + "--bits 16 --out own").code, 0);
+  // Light without a sensor is the picture; the same sensor makes the same of the same light.
+  const Outcome through = run(simulate + "--light own/frames --bits 16 --out through");
+  ASSERT_EQ(through.code, 0) << through.error;
+  for (const char* camera : {"frames/000000/cam0.png", "frames/000000/cam1.png"}) {
+    EXPECT_EQ(slurp(folder_ / "through" / camera), slurp(folder_ / "own" / camera));
+  }
+  expect_bad(simulate + "--light own/frames --frame-count 2 --out o", "own/frames/000001/cam0.png");
+  expect_bad(simulate + "--light own/frames --motion-mm-s 1 0 0 --out o", "--motion-mm-s");
+  write("own/frames/000000/cam0.png", slurp(folder_ / "own/truth/mesh.ply"));
+  const Outcome broken = run(simulate + "--light own/frames --out o");
+  EXPECT_EQ(broken.code, 2);
+  EXPECT_THAT(broken.error, HasSubstr("own/frames/000000/cam0.png: must be a PNG"));
+}
+
+TEST_F(Newcomer, WritesScenesForOtherRenderers) {
+  ASSERT_EQ(run("rig ring --out r.json --cameras 1 --projectors 2 --camera-width 64 "
+                "--camera-height 64 --camera-focal-px 115 --projector-width 64 "
+                "--projector-height 64")
+                .code,
+            0);
+  write("mesh.obj",
+        "v -60 -60 -50\nv 60 -60 -50\nv 0 70 -50\nv 0 0 80\n"
+        "f 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n");
+  const std::string simulate = "simulate --rig r.json --mesh mesh.obj --samples 1 ";
+  ASSERT_EQ(run(simulate + "--export-blender --frame-count 2 --out made").code, 0);
+  for (const char* file : {"render.py", "scene.json", "film/proj0.png", "film/proj1.png",
+                           "objects/000000.ply", "objects/000001.ply"}) {
+    EXPECT_TRUE(std::filesystem::exists(folder_ / "made/blender" / file)) << file;
+  }
+  expect_bad(simulate + "--export-blender --texture stripes --out o", "--texture");
+}
+
 TEST_F(Newcomer, IsToldThatTheMemoryDoesNotSuffice) {
 #ifdef __SANITIZE_ADDRESS__
   GTEST_SKIP() << "the sanitizer itself takes more memory than the limit of this test";

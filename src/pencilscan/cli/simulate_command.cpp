@@ -16,6 +16,7 @@
 #include "pencilscan/io/partial_folder.h"
 #include "pencilscan/planning/units.h"
 #include "pencilscan/recording/pack.h"
+#include "pencilscan/simulation/blender.h"
 #include "pencilscan/simulation/photography.h"
 #include "pencilscan/simulation/povray.h"
 #include "pencilscan/simulation/truth.h"
@@ -46,6 +47,8 @@ struct SimulateOptions {
   bool color_captures = false;
   bool truth_maps = false;
   bool export_povray = false;
+  bool export_blender = false;
+  std::string light;         ///< folder of another renderer's pictures; empty: our own
   std::string interpolated;  ///< name of a mosaic; empty: three channels
   std::optional<int> jpeg;   ///< quality
 
@@ -96,7 +99,7 @@ void check_output(const SimulateOptions& options) {
 
 /// Puts a whole scene where it belongs, instead of an earlier one; the rig last.
 void publish(const fs::path& made, const fs::path& out) {
-  for (const char* name : {"frames", "truth", "captures", "povray"}) {
+  for (const char* name : {"frames", "truth", "captures", "povray", "blender"}) {
     fs::remove_all(out / name);
     if (fs::exists(made / name)) fs::rename(made / name, out / name);
   }
@@ -128,9 +131,50 @@ void write_truth_maps(const fs::path& folder, const Rig& rig, std::size_t c,
 
 Vec3 vector_of(const std::vector<double>& three) { return {three[0], three[1], three[2]}; }
 
+/// Where another renderer left the light of a camera in a frame.
+fs::path light_file(const SimulateOptions& options, const std::string& frame,
+                    const Camera& camera) {
+  const fs::path folder = fs::path(options.light) / frame;
+  const std::optional<fs::path> file = find_image(folder, camera.name);
+  if (!file) {
+    throw InputError("--light", "", (folder / (camera.name + ".png")).string(),
+                     "must be there: one picture of linear light per frame and camera");
+  }
+  return *file;
+}
+
+/// What --light needs is there, and nothing is asked for that would have to be in it.
+void check_light(const SimulateOptions& options, const Rig& rig) {
+  const auto moves = [](const std::vector<double>& speed) { return !vector_of(speed).isZero(0); };
+  if (moves(options.speed_mm_s) || moves(options.spin_deg_s)) {
+    throw InputError("--light", "", options.light,
+                     "must stand without --motion-mm-s and --spin-deg-s: light is as it was made");
+  }
+  for (int frame = 0; frame < options.frame_count; ++frame) {
+    for (const Camera& camera : rig.cameras)
+      (void)light_file(options, six_digits(static_cast<std::size_t>(frame)), camera);
+  }
+}
+
+/// Linear light that another renderer made. InputError where it is no picture of that size.
+cv::Mat read_light(const fs::path& file, const Camera& camera) {
+  cv::Mat light = read_image(file);
+  if (light.cols != camera.width || light.rows != camera.height) {
+    throw InputError(file.string(), "size",
+                     std::to_string(light.cols) + " x " + std::to_string(light.rows),
+                     "must be that of " + camera.name + " in the rig, " +
+                         std::to_string(camera.width) + " x " + std::to_string(camera.height));
+  }
+  return light;
+}
+
 void write_frames(const SimulateOptions& options, const Rig& rig, const TriangleMesh& mesh,
                   const Progress& progress) {
   const fs::path out(options.out);
+  if (options.export_blender) {
+    write_blender_scene(out / "blender", rig, options.surface, panel_film(options.photo),
+                        scene_light(options.photo));
+  }
   const Motion motion{options.rotate_deg * M_PI / 180, vector_of(options.translate_mm),
                       working_volume(rig).center};
   const double seconds = options.exposure_ms / 1000;
@@ -150,7 +194,11 @@ void write_frames(const SimulateOptions& options, const Rig& rig, const Triangle
       const auto image =
           static_cast<std::uint32_t>(static_cast<std::size_t>(frame) * rig.cameras.size() + c);
       tell_steps(progress, "rendering frames: image", image, total);
-      const cv::Mat picture = photograph(rig, c, moments, options.photo, image);
+      const cv::Mat picture =
+          options.light.empty()
+              ? photograph(rig, c, moments, options.photo, image)
+              : apply_sensor(read_light(light_file(options, name, camera), camera),
+                             camera_sensor(options.photo, camera), options.photo.seed, image);
       const fs::path stem = out / "frames" / name / camera.name;
       if (options.jpeg) {
         write_jpeg(stem.string() + ".jpg", picture, *options.jpeg);
@@ -162,6 +210,7 @@ void write_frames(const SimulateOptions& options, const Rig& rig, const Triangle
     if (options.export_povray) {
       write_povray_scene(out / "povray" / name, rig, object, scene_light(options.photo));
     }
+    if (options.export_blender) write_blender_object(out / "blender", name, object);
   }
   tell_steps(progress, "rendering frames: image", total, total);
 }
@@ -218,7 +267,9 @@ void run_simulate(SimulateOptions options) {
   const Rig rig = read_rig(options.rig_path);
   warn_of_rig(rig);
   const TriangleMesh mesh = placed_mesh(options, rig);
+  if (!options.light.empty()) check_light(options, rig);
   if (options.export_povray) check_povray_can_show(rig, options.surface, options.rig_path);
+  if (options.export_blender) check_blender_can_show(rig, options.surface, options.rig_path);
   check_output(options);
   const fs::path out = options.out;
   const PartialFolder making(out / kMakingFolder);
@@ -372,6 +423,11 @@ void add_simulate_command(CLI::App& app) {
                     "Also write depth, line coordinates, lit masks and cosines");
   command->add_flag("--export-povray", options->export_povray,
                     "Also write the scene for POV-Ray 3.7");
+  command->add_flag("--export-blender", options->export_blender,
+                    "Also write the scene for Blender 3.4: blender -b -P blender/render.py");
+  command->add_option("--light", options->light,
+                      "Linear light that another renderer made, FOLDER/000000/<camera>.png, "
+                      "instead of our own rendering; the sensor is simulated");
   add_scene_options(*command, *options);
   add_device_options(*command, *options);
   add_common_options(*command, options->common,

@@ -51,6 +51,12 @@ RenderOptions scene_light(const PhotographyOptions& options) {
   return render;
 }
 
+FilmOptions panel_film(const PhotographyOptions& options) {
+  FilmOptions film = options.film;
+  film.black_level = options.black_level.value_or(0);
+  return film;
+}
+
 std::vector<SimulatedObject> through_exposure(const TriangleMesh& mesh, const Reflectance& surface,
                                               const RigidTransform& middle,
                                               const ExposurePath& motion, double footprint_mm) {
@@ -74,9 +80,7 @@ cv::Mat photograph(const Rig& rig, std::size_t c, std::span<const SimulatedObjec
                    const PhotographyOptions& options, std::uint32_t image) {
   PENCILSCAN_CHECK(!moments.empty());
   const Camera& camera = rig.cameras[c];
-  FilmOptions film = options.film;
-  film.black_level = options.black_level.value_or(0);
-  const std::vector<PanelLight> lights = lights_for(camera, rig, film);
+  const std::vector<PanelLight> lights = lights_for(camera, rig, panel_film(options));
   const RenderOptions render = scene_light(options);
   cv::Mat light = render_camera(rig, c, moments.front(), lights, render);
   for (const SimulatedObject& moment : moments.subspan(1))

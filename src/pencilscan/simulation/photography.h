@@ -36,6 +36,9 @@ struct PhotographyOptions {
 /// options.render with the ambient light of the preset, unless it is stated.
 [[nodiscard]] RenderOptions scene_light(const PhotographyOptions& options);
 
+/// options.film with the black level that is stated for it.
+[[nodiscard]] FilmOptions panel_film(const PhotographyOptions& options);
+
 /// An object at even steps through an exposure; `middle`: where half of the exposure has it. No
 /// vertex steps by more than half a footprint (mm), below what a pixel resolves: the mean of the
 /// moments' light is that of the exposure. One moment where nothing moves.
