@@ -14,6 +14,7 @@
 #include "pencilscan/io/file.h"
 #include "pencilscan/io/image.h"
 #include "pencilscan/labeling/point_file.h"
+#include "pencilscan/planning/units.h"
 #include "pencilscan/report/rig_picture.h"
 #include "pencilscan/rig/device_list.h"
 #include "pencilscan/rig/devices_file.h"
@@ -143,6 +144,8 @@ void run_import(const ImportCommand& command) {
   const std::string missing = missing_values(rig);
   if (!missing.empty())
     std::cerr << "note: " << missing << ": the file is for calibrate --devices, no rig yet\n";
+  else if (const auto warning = pose_unit_warning(rig.rig))
+    warn_of(*warning + ": --unit says what the files are in");
   print_figures(command.common, {{"rig", command.out},
                                  {"cameras", rig.rig.cameras.size()},
                                  {"projectors", rig.rig.projectors.size()},

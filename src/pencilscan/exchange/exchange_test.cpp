@@ -109,6 +109,37 @@ TEST_F(Exchange, StereoFilesJoinRoundTheRig) {
   EXPECT_LT((back.rig.projectors[1].device_from_world.rotation - expected.rotation).norm(), 1e-12);
 }
 
+TEST_F(Exchange, AFileOfRAndTAloneJoinsTheDevicesThatItIsGiven) {
+  const auto without = [](std::string text, const std::vector<std::string>& keys) {
+    for (const std::string& key : keys) text.replace(text.find("\n" + key + ":") + 1, 1, "q");
+    return text;
+  };
+  const Camera& camera = rig_.cameras[0];
+  const Projector& projector = rig_.projectors[0];
+  const fs::path step =
+      write("extrinsics.yml", without(opencv_stereo_text(camera, projector, OpencvSyntax::kYaml),
+                                      {"K1", "K2", "D1", "D2"}));
+  for (const bool is_first : {true, false}) {
+    ExchangedRig files;
+    if (is_first) read_opencv(step, {camera.name, projector.name}, files);
+    for (const Device* device :
+         {static_cast<const Device*>(&camera), static_cast<const Device*>(&projector)}) {
+      const std::string text = without(opencv_text(*device, OpencvSyntax::kYaml), {"R", "T"});
+      read_opencv(write(device->name + ".yml", text), {}, files);
+    }
+    if (!is_first) read_opencv(step, {camera.name, projector.name}, files);
+    const UncalibratedRig back = joined(files);
+    ASSERT_EQ(back.given.size(), 2U);
+    for (const GivenCalibration& given : back.given) EXPECT_TRUE(given.K && given.pose);
+    const RigidTransform expected =
+        projector.device_from_world * camera.device_from_world.inverse();
+    EXPECT_LT((back.rig.projectors[0].device_from_world.translation - expected.translation).norm(),
+              1e-9);
+  }
+  ExchangedRig nameless;
+  expect_bad([&] { read_opencv(step, {}, nameless); }, "give the names of their two devices");
+}
+
 TEST_F(Exchange, UsualSpellingsAreRead) {
   // A stereo calibration as OpenCV's sample writes it, in metres, without sizes.
   const fs::path sample = write("stereo.yml", R"(%YAML:1.0

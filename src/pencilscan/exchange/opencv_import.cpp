@@ -226,6 +226,10 @@ const std::vector<std::array<StereoKeys, 2>>& stereo_spellings() {
   return kSpellings;
 }
 
+std::optional<RigidTransform> read_step(const OpencvReader& file) {
+  return file.pose({"R", "rotation", "stereo_R"}, {"T", "translation", "stereo_T"});
+}
+
 bool read_stereo(const OpencvReader& file, ExchangedRig& rig) {
   for (const auto& spelling : stereo_spellings()) {
     if (file.find(spelling[0].K).empty() || file.find(spelling[1].K).empty()) continue;
@@ -245,8 +249,7 @@ bool read_stereo(const OpencvReader& file, ExchangedRig& rig) {
       file.read_size({keys.is_projector ? "proj_width" : "image_width"},
                      {keys.is_projector ? "proj_height" : "image_height"}, sizes, d.device);
     }
-    const auto step = file.pose({"R", "rotation", "stereo_R"}, {"T", "translation", "stereo_T"});
-    if (step) rig.relative.push_back({names[0], names[1], *step});
+    if (const auto step = read_step(file)) rig.relative.push_back({names[0], names[1], *step});
     return true;
   }
   return false;
@@ -284,15 +287,37 @@ bool read_single(const OpencvReader& file, ExchangedRig& rig) {
   return true;
 }
 
+/// R and T of a pair whose K stand in other files, as OpenCV's own sample of stereo calibration
+/// writes them.
+bool read_extrinsics(const OpencvReader& file, const std::vector<std::string>& names,
+                     ExchangedRig& rig) {
+  const auto step = read_step(file);
+  if (!step) return false;
+  if (names.size() != 2) {
+    file.fail("camera_matrix", "missing",
+              "R and T stand alone: give the names of their two devices, NAME,NAME=FILE, beside "
+              "the files of K");
+  }
+  for (const std::string& name : names) {
+    ExchangedDevice& d = rig.devices.emplace_back();
+    d.source = file.path();
+    d.device.name = name;
+  }
+  rig.relative.push_back({names[0], names[1], *step});
+  return true;
+}
+
 }  // namespace
 
 void read_opencv(const std::filesystem::path& path, const std::vector<std::string>& names,
                  ExchangedRig& rig) {
   const OpencvReader file(path);
   ExchangedRig found;
-  if (!read_stereo(file, found) && !read_single(file, found))
+  if (!read_stereo(file, found) && !read_single(file, found) &&
+      !read_extrinsics(file, names, found)) {
     file.fail("camera_matrix", "missing",
-              "must hold camera_matrix, or K1 and K2 of a stereo calibration");
+              "must hold camera_matrix, K1 and K2 of a stereo calibration, or R and T of one");
+  }
   if (!names.empty() && names.size() != found.devices.size())
     throw InputError(
         "command line", "--opencv", path.string(),
