@@ -8,6 +8,7 @@
 #include "pencilscan/core/median.h"
 #include "pencilscan/core/tally.h"
 #include "pencilscan/depth/pruning.h"
+#include "pencilscan/rig/object_space.h"
 
 namespace pencilscan {
 namespace {
@@ -50,7 +51,10 @@ class Comparison {
  public:
   Comparison(const Rig& rig, std::span<const int> pattern_projector, std::span<const DepthMap> maps,
              const ConsistencyOptions& options)
-      : rig_(rig), pattern_projector_(pattern_projector), maps_(maps), options_(options) {
+      : rig_(rig),
+        pattern_projector_(pattern_projector),
+        maps_(maps),
+        margin_(std::max(options.margin, options.margin_lines * line_spacing(rig))) {
     id_of_.resize(maps.size());
     for (std::size_t m = 0; m < maps.size(); ++m) {
       id_of_[m].assign(maps[m].nodes.size(), -1);
@@ -149,10 +153,10 @@ class Comparison {
       const double sigma =
           static_cast<double>(node(i).sigma + node(static_cast<std::size_t>(other)).sigma);
       const Link link{static_cast<std::uint32_t>(other), static_cast<std::uint16_t>(m)};
-      if (std::abs(nearest) < 0.5 * options_.margin + 3 * sigma) {
+      if (std::abs(nearest) < 0.5 * margin_ + 3 * sigma) {
         links.support[i].push_back(
             {link.other, link.group, disagreement(i, static_cast<std::size_t>(next), there)});
-      } else if (nearest > options_.margin + 4 * sigma && count >= 3) {
+      } else if (nearest > margin_ + 4 * sigma && count >= 3) {
         links.contradiction[i].push_back(link);
       }
     }
@@ -202,7 +206,7 @@ class Comparison {
       if (lit.node < 0 || lit.node == static_cast<std::int32_t>(i)) return;
       const double sigma =
           static_cast<double>(node(i).sigma + node(static_cast<std::size_t>(lit.node)).sigma);
-      if (static_cast<double>(lit.z - z_of[i]) < 2 * options_.margin + 4 * sigma) return;
+      if (static_cast<double>(lit.z - z_of[i]) < 2 * margin_ + 4 * sigma) return;
       links.contradiction[i].push_back(
           {static_cast<std::uint32_t>(lit.node), static_cast<std::uint16_t>(maps_.size() + p)});
     });
@@ -211,7 +215,7 @@ class Comparison {
   const Rig& rig_;
   std::span<const int> pattern_projector_;
   std::span<const DepthMap> maps_;
-  ConsistencyOptions options_;
+  double margin_;
   std::vector<Node> nodes_;
   std::vector<std::vector<std::int32_t>> id_of_;
 };

@@ -10,7 +10,8 @@
 namespace pencilscan {
 
 struct ConsistencyOptions {
-  double margin = 3;  ///< footprints by which a segment must pass through a surface, > 0
+  double margin = 3;           ///< footprints by which a segment must pass through a surface, > 0
+  double margin_lines = 0.25;  ///< line spacings, if that is more
   double contradiction_weight = 3;  ///< of one contradiction against one support
   double min_confidence = 0.5;
   int rounds = 6;

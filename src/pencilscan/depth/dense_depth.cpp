@@ -158,8 +158,22 @@ double cost(const WindowFit& fit) { return static_cast<double>(fit.misfit); }
 /// surface grows as r^4: the best r goes as the fifth root of the noise.
 DepthOptions options_for(const CameraLight& light, DepthOptions options) {
   constexpr double kWider = 1.1487;  // 2^(1/5)
+  constexpr int kWidestHalf = 10;    // of what a window may be (dense_depth.h)
+  constexpr int kLargestStride = 8;
+  const int narrow = 2 * options.half + 1;
   if (light.of_mosaic)
     options.half = static_cast<int>(std::lround((options.half + 0.5) * kWider - 0.5));
+  options.max_move =
+      std::max(options.max_move, options.max_move_lines * static_cast<double>(light.spacing_px));
+  // A window holds a line with half as much of the dark on both its sides. One that holds an edge
+  // alone takes any error of the line's width for depth (docs/depth.md).
+  const int of_line = std::min(static_cast<int>(std::lround(light.line_px)), kWidestHalf);
+  if (of_line > options.half) {
+    options.half = of_line;
+    // As dense in windows as before; wider windows beside these need an even number.
+    const int even = options.stride * (2 * of_line + 1) / narrow / 2 * 2;
+    options.stride = std::clamp(even, options.stride, kLargestStride);
+  }
   return options;
 }
 

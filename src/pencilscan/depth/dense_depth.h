@@ -21,9 +21,11 @@ struct DepthOptions {
   double max_sigma_lines = 0.08;        ///< of the best pattern
   double min_cosine = 0.2;              ///< of the incidence to the camera
   double max_move = 2;                  ///< footprints; of a node started from the closed surface
+  double max_move_lines = 0.16;         ///< line spacings, if that is more
 };
 
-/// The options as they are for one camera's pictures: windows behind a mosaic are wider.
+/// The options as they are for one camera's pictures: windows behind a mosaic are wider, and so are
+/// those of wide lines.
 [[nodiscard]] DepthOptions options_for(const CameraLight& light, DepthOptions options);
 
 /// A window whose depth is known about: pictures show their blur and noise there.

@@ -33,12 +33,6 @@ CameraDepthReport camera_report(const DepthMap& map, double blur_px) {
   return report;
 }
 
-/// How far apart lines are where a camera sees the volume's centre.
-double spacing_px(const Rig& rig, const Camera& camera) {
-  const double distance = (camera.center() - working_volume(rig).center).norm();
-  return line_spacing(rig) * camera.focal_px() / distance;
-}
-
 }  // namespace
 
 DepthResult measure_depth(const Rig& rig, const std::vector<ColorFamily>& families,
@@ -67,6 +61,8 @@ DepthResult measure_depth(const Rig& rig, const std::vector<ColorFamily>& famili
     light.families = detections[c].presence;
     light.sampled = std::move(sampled);
     light.valid = unsaturated(images[c]);
+    light.spacing_px = static_cast<float>(pixels_at_center(rig, camera, line_spacing(rig)));
+    light.line_px = static_cast<float>(pixels_at_center(rig, camera, line_width(rig)));
     light.of_mosaic = camera.mosaic || detections[c].is_filled_in;
     const DepthOptions depth = options_for(light, options.depth);
     for (std::size_t f = 0; f < families.size(); ++f) {
@@ -79,7 +75,7 @@ DepthResult measure_depth(const Rig& rig, const std::vector<ColorFamily>& famili
     measure_light(pilot_windows(light, static_cast<int>(c), points, depth), depth, light);
     result.maps[i] = dense_depth(light, static_cast<int>(c), points, space, depth);
     with_wider_windows(
-        light, binning_for(spacing_px(rig, camera), depth), result.maps[i],
+        light, binning_for(static_cast<double>(light.spacing_px), depth), result.maps[i],
         [&](const CameraLight& wide, DepthMap& map) { grow(wide, space, depth, map); });
   });
   result.report.seconds_depth = watch.seconds();
@@ -114,7 +110,7 @@ void guided_depth(const Rig& rig, const RayScene& surface, const DepthStageOptio
       };
       complete(light, completing);
       // Where a surface turns from its projector, lines lie farther apart.
-      const int widest = std::max(2, binning_for(spacing_px(rig, *light.camera), depth));
+      const int widest = std::max(2, binning_for(static_cast<double>(light.spacing_px), depth));
       with_wider_windows(light, widest, completing, complete);
       return count;
     };

@@ -130,7 +130,8 @@ ExposureMotion motion_in_exposure(const Rig& rig, const DepthStageOptions& optio
       for (const NodeLines& entry : of_camera) all.push_back(entry.blur);
     }
     std::vector<double> expected;
-    motion = exposure_motion(all, window_overlap(result.maps.front(), options.depth.half, stride),
+    const int half = options_for(result.lights.front(), options.depth).half;
+    motion = exposure_motion(all, window_overlap(result.maps.front(), half, stride),
                              unknown_blur_px2(result.lights), round == 0 ? &expected : nullptr);
     if (expected.empty()) break;
     std::size_t next = 0;

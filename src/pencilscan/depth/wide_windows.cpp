@@ -45,6 +45,8 @@ CameraLight binned_light(const CameraLight& light, int binning) {
   cv::Mat invalid;
   light.valid.convertTo(invalid, CV_32F, -1, 1);
   cv::bitwise_and(binned(invalid, binning) == 0, 1, result.valid);
+  result.spacing_px = light.spacing_px / static_cast<float>(binning);
+  result.line_px = light.line_px / static_cast<float>(binning);
   result.of_mosaic = light.of_mosaic;
   const auto blur2 = static_cast<double>(light.blur_px * light.blur_px);
   result.blur_px = static_cast<float>(std::sqrt(blur2 + binning_blur_px2(binning)) / binning);

@@ -32,6 +32,8 @@ struct CameraLight {
   /// Per family: CV_8U, 0 where a mosaic has no sample of its presence; empty: all pixels have.
   std::vector<cv::Mat> sampled;
   cv::Mat valid;                  ///< CV_8U, 0 where saturated
+  float spacing_px = 0;           ///< of lines, where the camera sees the volume's centre
+  float line_px = 0;              ///< their width there
   bool of_mosaic = false;         ///< raw, or its colours were filled in
   bool is_measured = false;       ///< blur and noise are what enough of its windows show
   float blur_px = 0.8F;           ///< standard deviation of camera and projector blur together

@@ -9,6 +9,7 @@
 #include "pencilscan/detection/ghosts.h"
 #include "pencilscan/detection/mosaic_trace.h"
 #include "pencilscan/rig/camera_light.h"
+#include "pencilscan/rig/object_space.h"
 
 namespace pencilscan {
 namespace {
@@ -51,11 +52,13 @@ CameraDetection detect_curves(const Camera& camera, const Rig& rig,
   result.unmixing = estimate_unmixing(camera, rig, families, registered(camera, linear, area.tl()));
   const cv::Mat rgb = projector_light(camera, linear, result.unmixing, area.tl());
   // Find and trace the curves of each family, then fit them together.
+  RidgeOptions ridge = options.ridge;
+  ridge.usual_px = pixels_at_center(rig, camera, line_width(rig));
   std::vector<std::vector<Curve>> curves_of(families.size());
   result.presence.resize(families.size());
   parallel_for(families.size(), [&](std::size_t f) {
     const cv::Mat presence = presence_image(rgb, families[f]);
-    const std::vector<Ridgel> ridgels = find_ridgels(presence, options.ridge);
+    const std::vector<Ridgel> ridgels = find_ridgels(presence, ridge);
     std::vector<Curve> curves = trace_curves(ridgels, presence.size(), options.trace);
     for (Curve& curve : curves) curve.family = static_cast<int>(f);
     RefineOptions refine = options.refine;

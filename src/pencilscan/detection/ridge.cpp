@@ -160,11 +160,22 @@ class RidgeFilter {
   int border_;
 };
 
+/// Of the filter's scale: the widest line that an image shows best (ridge_scales.h).
+constexpr double kWidest = 3.3;
+
+/// The size that shows the usual line best, also where the surface turns away by 53 degrees.
+std::size_t usual_size(const RidgeOptions& options, std::size_t sizes) {
+  constexpr double kTurned = 0.6;
+  std::size_t size = 0;
+  for (double widest = kWidest * options.sigma_across_px;
+       size + 1 < sizes && kTurned * options.usual_px > widest; widest *= 2)
+    ++size;
+  return size;
+}
+
 }  // namespace
 
 std::vector<Ridgel> find_ridgels(const cv::Mat& presence, const RidgeOptions& options) {
-  // Of the filter's scale: the widest line that an image shows best (ridge_scales.h).
-  constexpr double kWidest = 3.3;
   constexpr int kSmallestPx = 16;  // image: smaller than the filter, it shows no line
   const RidgeFilter filter(options);
   std::vector<SizedRidgels> sizes;
@@ -181,7 +192,7 @@ std::vector<Ridgel> find_ridgels(const cv::Mat& presence, const RidgeOptions& op
     image = half_size;
   }
   const float weakest = static_cast<float>(options.relative_threshold) * strong;
-  return choose_sizes(sizes, weakest);
+  return choose_sizes(sizes, weakest, usual_size(options, sizes.size()));
 }
 
 int sizes_of(const std::vector<Ridgel>& ridgels) {

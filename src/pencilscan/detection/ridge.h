@@ -21,6 +21,7 @@ struct RidgeOptions {
   double noise_factor = 5.0;     ///< threshold in standard deviations of the background's response
   double relative_threshold = 0.05;  ///< of the strong (99th percentile) response at any size
   double widest_px = 40;             ///< lines up to this width are found; > 0
+  double usual_px = 0;               ///< width of most lines, as the rig states it; 0: not known
 };
 
 /// Ridgels of one presence image, in (x, y, direction) space: where two lines of one colour cross,

@@ -147,16 +147,16 @@ std::vector<char> majority(const std::vector<char>& votes) {
 /// noise. All in pixels of the full image; `finer_image` has twice the size.
 ///
 /// Where two sizes show a line about equally well, noise would choose now one, now the other: most
-/// of the ridgels before and after on the line decide.
+/// of the ridgels before and after on the line decide. `is_usual`: every line that it shows is one.
 void add_wider(const std::vector<Ridgel>& wide, const cv::Mat& finer_image, cv::Size full_size,
-               std::vector<Ridgel>& ridgels) {
+               bool is_usual, std::vector<Ridgel>& ridgels) {
   if (wide.empty()) return;
   FinerLook finer(ridgels, finer_image, 0.5F * wide.front().scale, full_size);
   std::vector<Ridgel> result;
   std::vector<char> votes;
   for (const std::vector<std::size_t>& chain : link_ridgels(wide, full_size)) {
     votes.clear();
-    for (const std::size_t i : chain) votes.push_back(finer.is_best(wide[i]) ? 1 : 0);
+    for (const std::size_t i : chain) votes.push_back(is_usual || finer.is_best(wide[i]) ? 1 : 0);
     const std::vector<char> elected = majority(votes);
     for (std::size_t k = 0; k < chain.size(); ++k) {
       if (elected[k] == 0) continue;
@@ -273,18 +273,19 @@ float sampled_share_of_wide(const std::vector<SizedRidgels>& sizes, float weakes
 
 }  // namespace
 
-std::vector<Ridgel> choose_sizes(const std::vector<SizedRidgels>& sizes, float weakest) {
+std::vector<Ridgel> choose_sizes(const std::vector<SizedRidgels>& sizes, float weakest,
+                                 std::size_t usual) {
   const SizedRidgels& full = sizes[0];
   if (sizes.size() == 1) return full.ridgels;
   // Mostly, a look at a sample is enough.
-  if (sampled_share_of_wide(sizes, weakest) >= 0.5F * kWidePicture) {
+  if (usual > 0 || sampled_share_of_wide(sizes, weakest) >= 0.5F * kWidePicture) {
     std::vector<Ridgel> chosen = full.ridgels;
     float scale = 2;
     for (std::size_t k = 1; k < sizes.size(); ++k, scale *= 2) {
       add_wider(at_full_size(sizes[k].ridgels, scale, weakest), sizes[k - 1].image,
-                full.image.size(), chosen);
+                full.image.size(), k <= usual, chosen);
     }
-    if (share_of_wide(chosen) >= kWidePicture) return chosen;
+    if (usual > 0 || share_of_wide(chosen) >= kWidePicture) return chosen;
   }
   return merged_scales(full.image, full.ridgels, enlarged(sizes[1].ridgels));
 }

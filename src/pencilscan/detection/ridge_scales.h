@@ -25,8 +25,10 @@ struct SizedRidgels {
 ///
 /// A pattern has lines of one width, so a picture of one has narrow ones or wide ones. In a picture
 /// of narrow lines, half the size adds what the full size does not show, nothing else. In one of
-/// wide lines every size competes, and ridgels weaker than `weakest` do not take part.
+/// wide lines every size competes, and ridgels weaker than `weakest` do not take part. Where the
+/// usual line is seen best at sizes[usual], what sizes up to that one show are lines: where two
+/// sizes show them about equally well, competition would cut them into pieces.
 [[nodiscard]] std::vector<Ridgel> choose_sizes(const std::vector<SizedRidgels>& sizes,
-                                               float weakest);
+                                               float weakest, std::size_t usual = 0);
 
 }  // namespace pencilscan

@@ -40,10 +40,8 @@ LitCells lit_cells(const Rig& rig, int camera, std::span<const Curve> curves,
                    std::span<const cv::Mat> presence) {
   LitCells cells;
   if (curves.empty() || presence.empty()) return cells;
-  const Camera& device = rig.camera(camera);
-  const double distance = (device.center() - working_volume(rig).center).norm();
   const double cell_px =
-      std::max(1.0, kCellSpacings * line_spacing(rig) * device.focal_px() / distance);
+      std::max(1.0, pixels_at_center(rig, rig.camera(camera), kCellSpacings * line_spacing(rig)));
   const cv::Size image = presence.front().size();
   const cv::Size size(std::max(1, static_cast<int>(std::lround(image.width / cell_px))),
                       std::max(1, static_cast<int>(std::lround(image.height / cell_px))));

@@ -7,17 +7,29 @@
 
 namespace pencilscan {
 
-double line_spacing(const Rig& rig) {
+namespace {
+
+/// The median over the patterns of a length on the panel, as the volume's centre sees it.
+double length_at_center(const Rig& rig, double LinePattern::*length_px) {
   const Vec3 center = working_volume(rig).center;
-  std::vector<double> spacings;
+  std::vector<double> lengths;
   for (const Projector& projector : rig.projectors) {
     const double distance = (projector.center() - center).norm();
     for (const LinePattern& pattern : projector.patterns) {
       const auto axis = static_cast<Eigen::Index>(pattern.axis);
-      spacings.push_back(pattern.pitch_px * distance / projector.K(axis, axis));
+      lengths.push_back(pattern.*length_px * distance / projector.K(axis, axis));
     }
   }
-  return spacings.empty() ? 0 : upper_median(std::move(spacings));
+  return lengths.empty() ? 0 : upper_median(std::move(lengths));
+}
+
+}  // namespace
+
+double line_spacing(const Rig& rig) { return length_at_center(rig, &LinePattern::pitch_px); }
+double line_width(const Rig& rig) { return length_at_center(rig, &LinePattern::line_width_px); }
+
+double pixels_at_center(const Rig& rig, const Device& device, double length) {
+  return length * device.focal_px() / (device.center() - working_volume(rig).center).norm();
 }
 
 ObjectSpace::ObjectSpace(const Rig& rig, double volume_margin)

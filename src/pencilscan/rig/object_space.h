@@ -9,6 +9,10 @@ namespace pencilscan {
 /// Distance of neighbouring light sheets at the volume's centre, in the rig's unit: the median over
 /// the patterns; 0 without any.
 [[nodiscard]] double line_spacing(const Rig& rig);
+/// Likewise how wide a line is there.
+[[nodiscard]] double line_width(const Rig& rig);
+/// What a length at the volume's centre, square to the line of sight, covers on a device, px.
+[[nodiscard]] double pixels_at_center(const Rig& rig, const Device& device, double length);
 
 /// Where the object can be: in the volume, with a margin, and more than a line spacing above the
 /// floor where the rig states one.
