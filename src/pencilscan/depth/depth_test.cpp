@@ -241,6 +241,27 @@ TEST(DenseDepth, ASurfaceNearbyGivesDepthBackAndOneThatIsOffDoesNot) {
   EXPECT_EQ(found_of_hole(45), 0u);
 }
 
+TEST(DenseDepth, WindowsHoldAWholeLine) {
+  CameraLight light;
+  light.spacing_px = 11.4F;
+  light.line_px = 3.8F;
+  const DepthOptions usual = options_for(light, {});
+  EXPECT_EQ(usual.half, DepthOptions{}.half);
+  EXPECT_EQ(usual.stride, DepthOptions{}.stride);
+  EXPECT_EQ(usual.max_move, DepthOptions{}.max_move);
+  light.spacing_px = 24.5F;
+  light.line_px = 8.2F;
+  const DepthOptions wide = options_for(light, {});
+  EXPECT_EQ(wide.half, 8);
+  EXPECT_EQ(wide.stride, 6);  // even: wider windows beside these join 2 x 2 pixels
+  EXPECT_NEAR(wide.max_move, 0.16 * 24.5, 1e-5);
+  light.of_mosaic = true;
+  EXPECT_EQ(options_for(light, {}).half, 8);
+  light.line_px = 30;
+  EXPECT_EQ(options_for(light, {}).half, 10);
+  EXPECT_LE(options_for(light, {}).stride, 8);
+}
+
 TEST(DenseDepth, BlurIsFound) {
   const DepthResult result = ball_scene().measure();
   ASSERT_EQ(result.report.cameras.size(), ball_scene().rig.cameras.size());

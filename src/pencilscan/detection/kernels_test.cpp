@@ -198,6 +198,25 @@ TEST(FindRidgels, CoarseSizesChangeNothingInAPictureOfNarrowLinesAndShowWideOnes
   EXPECT_EQ(sizes_of(find_ridgels(blurred_box(30, 6, 0.4, size, 0.005))), 4);
 }
 
+TEST(FindRidgels, LinesThatTheRigSaysAreWideAreNotCutBetweenTwoSizes) {
+  // As wide as where the next size begins to show lines better.
+  const cv::Mat image = blurred_box(4.3, 0.9, 0.4, {260, 200}, 0.02);
+  const auto share_of_half_size = [&](double usual_px) {
+    RidgeOptions options;
+    options.usual_px = usual_px;
+    double half = 0;
+    double all = 0;
+    for (const Ridgel& r : find_ridgels(image, options)) {
+      all += static_cast<double>(r.scale);
+      half += r.scale == 2 ? 2 : 0;
+    }
+    return half / all;
+  };
+  EXPECT_LT(share_of_half_size(4.3), 0.1);  // a picture of narrow lines
+  EXPECT_LT(share_of_half_size(7.0), 0.1);
+  EXPECT_GT(share_of_half_size(7.6), 0.9);
+}
+
 // From lines that are as narrow as a picture can show them to those that are ten times as wide as
 // usual, sharp or without any flat top.
 TEST(RefineCurves, ALineOfAnyWidthIsOneCurveInItsMiddle) {
