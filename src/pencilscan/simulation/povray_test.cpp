@@ -9,63 +9,22 @@
 
 #include "pencilscan/core/error.h"
 #include "pencilscan/io/image.h"
+#include "pencilscan/simulation/other_renderers_fixture.h"
 
 namespace pencilscan {
 namespace {
 
 namespace fs = std::filesystem;
 
-Rig two_projectors() {
-  Rig rig;
-  Camera camera;
-  camera.name = "cam0";
-  camera.width = 200;
-  camera.height = 150;
-  camera.K << 400, 0, 93, 0, 410, 80, 0, 0, 1;
-  camera.device_from_world = look_at({900, 100, 300}, Vec3::Zero(), 0.2);
-  rig.cameras.push_back(camera);
-  for (const double side : {-1.0, 1.0}) {
-    Projector projector;
-    projector.name = side < 0 ? "proj0" : "proj1";
-    projector.width = 320;
-    projector.height = 240;
-    projector.K << 640, 0, 150, 0, 640, 118, 0, 0, 1;
-    projector.device_from_world = look_at({800, 500 * side, 250}, Vec3::Zero(), 0.3 * side);
-    LinePattern pattern;
-    pattern.pitch_px = 24;
-    pattern.line_width_px = 9;
-    if (side > 0) {
-      pattern.axis = Axis::kRow;
-      pattern.colors = {"red", "yellow"};
-      projector.distortion = {0.4, 0, 0.01, -0.02, 0};
-    }
-    projector.patterns = {pattern};
-    rig.projectors.push_back(projector);
-  }
-  rig.volume = Sphere{Vec3::Zero(), 120};
-  return rig;
-}
-
-/// A ball in front of a board, so that shadows fall.
-SimulatedObject ball_and_board() {
-  TriangleMesh mesh = make_box({10, 500, 500}, {-80, 0, 0});
-  const TriangleMesh ball = make_sphere(70, 40);
-  const int base = static_cast<int>(mesh.vertices.size());
-  mesh.vertices.insert(mesh.vertices.end(), ball.vertices.begin(), ball.vertices.end());
-  for (const auto& f : ball.faces) mesh.faces.push_back({f[0] + base, f[1] + base, f[2] + base});
-  Reflectance surface;
-  surface.smooth = false;
-  surface.specular = 0.2;
-  surface.texture = {TextureKind::kStripes, 0.5, 60};
-  return SimulatedObject(mesh, surface);
-}
-
 TEST(WritePovrayScene, PovrayRendersTheSamePicture) {
   if (std::system("command -v povray > /dev/null 2>&1") != 0) GTEST_SKIP() << "no povray here";
   const fs::path folder =
       fs::temp_directory_path() / ("pencilscan_povray_" + std::to_string(::getpid()));
   const Rig rig = two_projectors();
-  const SimulatedObject object = ball_and_board();
+  Reflectance surface;
+  surface.specular = 0.2;
+  surface.texture = {TextureKind::kStripes, 0.5, 60};
+  const SimulatedObject object = ball_and_board(surface);
   write_povray_scene(folder, rig, object);
   const std::string command = "cd '" + folder.string() + "' && povray cam0.ini > log.txt 2>&1";
   ASSERT_EQ(std::system(command.c_str()), 0) << "see " << folder;
