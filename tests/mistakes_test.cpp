@@ -22,6 +22,16 @@ class Newcomer : public ProgramTest {
           "v -60 -60 -50\nv 60 -60 -50\nv 0 70 -50\nv 0 0 80\n"
           "f 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n");
   }
+  /// A rig of two small cameras and projectors before that mesh, and what simulates it.
+  std::string small_scene() {
+    EXPECT_EQ(run("rig ring --out r.json --cameras 2 --projectors 2 --camera-width 64 "
+                  "--camera-height 64 --camera-focal-px 115 --projector-width 64 "
+                  "--projector-height 64")
+                  .code,
+              0);
+    write_mesh();
+    return "simulate --rig r.json --mesh mesh.obj --samples 1 ";
+  }
   /// `arguments` refuse to replace `file`, leave it alone, and replace it with --overwrite.
   void expect_kept(const std::string& arguments, const std::string& file) {
     fs::create_directories((folder_ / file).parent_path());
@@ -164,14 +174,7 @@ TEST_F(Newcomer, IsToldOfObjectsInAnotherUnit) {
 }
 
 TEST_F(Newcomer, MayBringLightOfAnotherRenderer) {
-  ASSERT_EQ(run("rig ring --out r.json --cameras 2 --projectors 2 --camera-width 64 "
-                "--camera-height 64 --camera-focal-px 115")
-                .code,
-            0);
-  write("mesh.obj",
-        "v -60 -60 -50\nv 60 -60 -50\nv 0 70 -50\nv 0 0 80\n"
-        "f 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n");
-  const std::string simulate = "simulate --rig r.json --mesh mesh.obj --samples 1 ";
+  const std::string simulate = small_scene();
   ASSERT_EQ(run(simulate + "--bits 16 --out own").code, 0);
   // Light without a sensor is the picture; the same sensor makes the same of the same light.
   const Outcome through = run(simulate + "--light own/frames --bits 16 --out through");
@@ -188,15 +191,7 @@ TEST_F(Newcomer, MayBringLightOfAnotherRenderer) {
 }
 
 TEST_F(Newcomer, WritesScenesForOtherRenderers) {
-  ASSERT_EQ(run("rig ring --out r.json --cameras 1 --projectors 2 --camera-width 64 "
-                "--camera-height 64 --camera-focal-px 115 --projector-width 64 "
-                "--projector-height 64")
-                .code,
-            0);
-  write("mesh.obj",
-        "v -60 -60 -50\nv 60 -60 -50\nv 0 70 -50\nv 0 0 80\n"
-        "f 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n");
-  const std::string simulate = "simulate --rig r.json --mesh mesh.obj --samples 1 ";
+  const std::string simulate = small_scene();
   ASSERT_EQ(run(simulate + "--export-blender --frame-count 2 --out made").code, 0);
   for (const char* file : {"render.py", "scene.json", "film/proj0.png", "film/proj1.png",
                            "objects/000000.ply", "objects/000001.ply"}) {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "pencilscan/cli/command.h"
+#include "pencilscan/cli/rendered_light.h"
 #include "pencilscan/core/counted_progress.h"
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/parallel.h"
@@ -131,45 +132,20 @@ void write_truth_maps(const fs::path& folder, const Rig& rig, std::size_t c,
 
 Vec3 vector_of(const std::vector<double>& three) { return {three[0], three[1], three[2]}; }
 
-/// Where another renderer left the light of a camera in a frame.
-fs::path light_file(const SimulateOptions& options, const std::string& frame,
-                    const Camera& camera) {
-  const fs::path folder = fs::path(options.light) / frame;
-  const std::optional<fs::path> file = find_image(folder, camera.name);
-  if (!file) {
-    throw InputError("--light", "", (folder / (camera.name + ".png")).string(),
-                     "must be there: one picture of linear light per frame and camera");
-  }
-  return *file;
-}
-
-/// What --light needs is there, and nothing is asked for that would have to be in it.
-void check_light(const SimulateOptions& options, const Rig& rig) {
+/// The light of --light; nothing without it. InputError where something is asked for that would
+/// have to be in it.
+std::optional<RenderedLight> rendered_light(const SimulateOptions& options, const Rig& rig) {
+  if (options.light.empty()) return std::nullopt;
   const auto moves = [](const std::vector<double>& speed) { return !vector_of(speed).isZero(0); };
   if (moves(options.speed_mm_s) || moves(options.spin_deg_s)) {
     throw InputError("--light", "", options.light,
                      "must stand without --motion-mm-s and --spin-deg-s: light is as it was made");
   }
-  for (int frame = 0; frame < options.frame_count; ++frame) {
-    for (const Camera& camera : rig.cameras)
-      (void)light_file(options, six_digits(static_cast<std::size_t>(frame)), camera);
-  }
-}
-
-/// Linear light that another renderer made. InputError where it is no picture of that size.
-cv::Mat read_light(const fs::path& file, const Camera& camera) {
-  cv::Mat light = read_image(file);
-  if (light.cols != camera.width || light.rows != camera.height) {
-    throw InputError(file.string(), "size",
-                     std::to_string(light.cols) + " x " + std::to_string(light.rows),
-                     "must be that of " + camera.name + " in the rig, " +
-                         std::to_string(camera.width) + " x " + std::to_string(camera.height));
-  }
-  return light;
+  return RenderedLight(options.light, rig, options.frame_count);
 }
 
 void write_frames(const SimulateOptions& options, const Rig& rig, const TriangleMesh& mesh,
-                  const Progress& progress) {
+                  const std::optional<RenderedLight>& light, const Progress& progress) {
   const fs::path out(options.out);
   if (options.export_blender) {
     write_blender_scene(out / "blender", rig, options.surface, panel_film(options.photo),
@@ -195,10 +171,9 @@ void write_frames(const SimulateOptions& options, const Rig& rig, const Triangle
           static_cast<std::uint32_t>(static_cast<std::size_t>(frame) * rig.cameras.size() + c);
       tell_steps(progress, "rendering frames: image", image, total);
       const cv::Mat picture =
-          options.light.empty()
-              ? photograph(rig, c, moments, options.photo, image)
-              : apply_sensor(read_light(light_file(options, name, camera), camera),
-                             camera_sensor(options.photo, camera), options.photo.seed, image);
+          light ? apply_sensor(light->read(name, camera), camera_sensor(options.photo, camera),
+                               options.photo.seed, image)
+                : photograph(rig, c, moments, options.photo, image);
       const fs::path stem = out / "frames" / name / camera.name;
       if (options.jpeg) {
         write_jpeg(stem.string() + ".jpg", picture, *options.jpeg);
@@ -267,7 +242,7 @@ void run_simulate(SimulateOptions options) {
   const Rig rig = read_rig(options.rig_path);
   warn_of_rig(rig);
   const TriangleMesh mesh = placed_mesh(options, rig);
-  if (!options.light.empty()) check_light(options, rig);
+  const std::optional<RenderedLight> light = rendered_light(options, rig);
   if (options.export_povray) check_povray_can_show(rig, options.surface, options.rig_path);
   if (options.export_blender) check_blender_can_show(rig, options.surface, options.rig_path);
   check_output(options);
@@ -276,7 +251,7 @@ void run_simulate(SimulateOptions options) {
   options.out = making.path();
   write_text(making.path() / "rig.json", read_file(options.rig_path));
   const Progress progress = stderr_progress("nothing of the scene is kept, start again");
-  write_frames(options, rig, mesh, progress);
+  write_frames(options, rig, mesh, light, progress);
   nlohmann::ordered_json figures;
   figures["frames"] = options.frame_count;
   figures["cameras"] = rig.cameras.size();

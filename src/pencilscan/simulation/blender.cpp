@@ -9,6 +9,7 @@
 #include "pencilscan/io/image.h"
 #include "pencilscan/io/mesh_file.h"
 #include "pencilscan/simulation/blender_script.h"
+#include "pencilscan/simulation/other_renderer.h"
 
 namespace pencilscan {
 namespace {
@@ -91,33 +92,15 @@ ordered_json material_of(const Reflectance& surface) {
 }  // namespace
 
 void check_blender_can_show(const Rig& rig, const Reflectance& surface, const fs::path& rig_path) {
-  const auto refuse = [&](const std::string& field, const char* rule) {
-    throw InputError(rig_path.string(), field, "", rule);
-  };
+  check_other_renderer_can_show(rig, rig_path, "--export-blender", "Blender 3.4");
   for (const Camera& camera : rig.cameras) {
-    if (camera.has_distortion()) {
-      refuse(camera.name + ".distortion",
-             "must be zero for --export-blender: its perspective camera has no lens distortion");
-    }
     if (camera.K(0, 1) != 0) {
-      refuse(camera.name + ".K", "must have no skew for --export-blender: its cameras have none");
-    }
-    if (camera.states_color_matrix()) {
-      refuse(camera.name + ".color_matrix",
-             "must be absent for --export-blender: its lights have pure colours");
-    }
-    if (!camera.color_registration.none()) {
-      refuse(camera.name + ".color_registration",
-             "must be absent for --export-blender: it bends all colours alike");
+      throw InputError(rig_path.string(), camera.name + ".K", "",
+                       "must have no skew for --export-blender: its cameras have none");
     }
     if (camera.sees_texture_only) {
-      refuse(camera.name + ".role", "must not be texture for --export-blender: patterns stay on");
-    }
-  }
-  for (const Projector& projector : rig.projectors) {
-    if (!projector.color_registration.none()) {
-      refuse(projector.name + ".color_registration",
-             "must be absent for --export-blender: it bends all colours alike");
+      throw InputError(rig_path.string(), camera.name + ".role", "",
+                       "must not be texture for --export-blender: patterns stay on");
     }
   }
   if (surface.texture.kind != TextureKind::kNone) {

@@ -6,6 +6,7 @@
 
 #include "pencilscan/core/error.h"
 #include "pencilscan/io/file.h"
+#include "pencilscan/simulation/other_renderer.h"
 
 namespace pencilscan {
 namespace {
@@ -146,26 +147,7 @@ void write_camera(std::ostream& out, const Camera& camera) {
 }  // namespace
 
 void check_povray_can_show(const Rig& rig, const Reflectance& surface, const fs::path& rig_path) {
-  for (const Camera& camera : rig.cameras) {
-    if (camera.has_distortion()) {
-      throw InputError(rig_path.string(), camera.name + ".distortion", "",
-                       "must be zero for --export-povray: POV-Ray 3.7 has no distorted camera");
-    }
-    if (camera.states_color_matrix()) {
-      throw InputError(rig_path.string(), camera.name + ".color_matrix", "",
-                       "must be absent for --export-povray: its lights have pure colours");
-    }
-    if (!camera.color_registration.none()) {
-      throw InputError(rig_path.string(), camera.name + ".color_registration", "",
-                       "must be absent for --export-povray: it bends all colours alike");
-    }
-  }
-  for (const Projector& projector : rig.projectors) {
-    if (!projector.color_registration.none()) {
-      throw InputError(rig_path.string(), projector.name + ".color_registration", "",
-                       "must be absent for --export-povray: it bends all colours alike");
-    }
-  }
+  check_other_renderer_can_show(rig, rig_path, "--export-povray", "POV-Ray 3.7");
   if (surface.texture.kind == TextureKind::kNoise) {
     throw InputError("--texture", "", "noise", "cannot be exported to POV-Ray; use another one");
   }
