@@ -17,7 +17,10 @@ namespace pencilscan {
 namespace {
 
 constexpr float kOutlierCost = 0;
-constexpr float kSameLineReward = 2.F;  ///< of consecutive pieces of one curve
+/// Of consecutive pieces of one curve that show the same line. Crossings tell where a curve jumps
+/// from one line to another; where nothing crosses, the curve itself is the best evidence there is.
+constexpr float kSameLineReward = 2;
+constexpr float kSameUncrossedReward = 7;
 
 /// Adds a table over the labels of two pieces, each with "outlier" as its last label (cost 0).
 template <class Cost>
@@ -67,12 +70,13 @@ PairwiseEnergy pairwise_energy(const LabelledPieces& pieces, const JointOptions&
              pieces.labels[static_cast<std::size_t>(x.b)],
              [&](const PieceLabel& a, const PieceLabel& b) { return crossing_cost(a, b, x); });
   }
+  const float same_line = lacks_crossings(pieces.graph) ? kSameUncrossedReward : kSameLineReward;
   for (const auto& [a, b] : pieces.graph.continuations) {
     add_edge(energy, a, b, pieces.labels[static_cast<std::size_t>(a)],
              pieces.labels[static_cast<std::size_t>(b)],
              [&](const PieceLabel& la, const PieceLabel& lb) {
                return la.pattern == lb.pattern && la.line == lb.line
-                          ? -kSameLineReward
+                          ? -same_line
                           : static_cast<float>(options.change_cost);
              });
   }
@@ -118,6 +122,7 @@ std::vector<std::vector<int>> forget_unseen(const std::vector<std::vector<float>
 void add_order(const Rig& rig, const GridGraph& graph, const LabelledPieces& pieces,
                std::span<const NextPiece> beside, PairwiseEnergy& energy) {
   const Camera& camera = rig.camera(graph.camera);
+  const bool decides = lacks_crossings(pieces.graph);
   for (const NextPiece& next : beside) {
     const auto& a = pieces.labels[static_cast<std::size_t>(next.a)];
     const auto& b = pieces.labels[static_cast<std::size_t>(next.b)];
@@ -132,7 +137,7 @@ void add_order(const Rig& rig, const GridGraph& graph, const LabelledPieces& pie
                                 next.tangent.cast<double>(), depth);
         if (next.side < 0) order = -order;
       }
-      return next_piece_cost(la, lb, order);
+      return decides ? next_uncrossed_cost(la, lb, order) : next_piece_cost(la, lb, order);
     });
   }
 }
@@ -184,19 +189,54 @@ std::vector<Decision> decisions_of(const LabelledPieces& pieces, const std::vect
   return decisions;
 }
 
-/// Without crossings only the code tells lines apart: a piece is ambiguous where a line a whole
-/// period away is possible too.
+/// Pieces that follow each other on a curve and were given one line, as [first, last].
+std::vector<std::pair<std::size_t, std::size_t>> same_line_stretches(
+    const LabelledPieces& pieces, const std::vector<Decision>& decisions) {
+  std::vector<std::pair<std::size_t, std::size_t>> stretches;
+  const auto& list = pieces.graph.pieces;
+  const auto label_of = [&](std::size_t p) -> const PieceLabel& {
+    return pieces.labels[p][static_cast<std::size_t>(decisions[p].label)];
+  };
+  for (std::size_t p = 0; p < list.size(); ++p) {
+    if (decisions[p].label < 0) continue;
+    const bool goes_on = p > 0 && !stretches.empty() && stretches.back().second == p - 1 &&
+                         list[p - 1].curve == list[p].curve &&
+                         label_of(p - 1).pattern == label_of(p).pattern &&
+                         label_of(p - 1).line == label_of(p).line;
+    if (goes_on) {
+      stretches.back().second = p;
+    } else {
+      stretches.emplace_back(p, p);
+    }
+  }
+  return stretches;
+}
+
+/// Without crossings only the code tells lines apart: a stretch of a curve is ambiguous where a
+/// line a whole period away is possible too, all along it.
 void leave_periodic(const Rig& rig, const LabelledPieces& pieces,
                     std::vector<Decision>& decisions) {
-  for (std::size_t p = 0; p < decisions.size(); ++p) {
-    if (decisions[p].label < 0) continue;
-    const PieceLabel& best = pieces.labels[p][static_cast<std::size_t>(decisions[p].label)];
+  for (const auto& [first, last] : same_line_stretches(pieces, decisions)) {
+    const PieceLabel& best = pieces.labels[first][static_cast<std::size_t>(decisions[first].label)];
     const int period = rig.pattern(best.pattern).period();
-    for (const PieceLabel& other : pieces.labels[p]) {
-      const int apart = std::abs(other.line - best.line);
-      if (other.pattern == best.pattern && apart > 0 && apart % period == 0)
-        decisions[p].margin = 0;
-    }
+    const auto is_possible = [&](int line) {
+      for (std::size_t p = first; p <= last; ++p) {
+        const auto& labels = pieces.labels[p];
+        if (std::none_of(labels.begin(), labels.end(), [&](const PieceLabel& label) {
+              return label.pattern == best.pattern && label.line == line;
+            }))
+          return false;
+      }
+      return true;
+    };
+    const bool is_ambiguous = std::any_of(pieces.labels[first].begin(), pieces.labels[first].end(),
+                                          [&](const PieceLabel& other) {
+                                            const int apart = std::abs(other.line - best.line);
+                                            return other.pattern == best.pattern && apart > 0 &&
+                                                   apart % period == 0 && is_possible(other.line);
+                                          });
+    if (!is_ambiguous) continue;
+    for (std::size_t p = first; p <= last; ++p) decisions[p].margin = 0;
   }
 }
 
@@ -247,18 +287,24 @@ void leave_unanchored(const LabelledPieces& pieces, std::span<const NextPiece> b
 /// Share of points that are right at this margin: a logistic fit over five rendered scenes (bunny
 /// with and without texture, hand, two balls, cube); benchmarks/accuracy prints the comparison.
 float confidence_of(float margin) { return 1 / (1 + std::exp(0.13F - 0.52F * margin)); }
+/// The same where nothing crosses: lines are wrong together, a few curves at a time, and margins
+/// say less of that. Fitted over twelve objects before one projector, in five settings each; other
+/// draws of them judge it (experiments/one_projector.py).
+float uncrossed_confidence_of(float margin) { return 1 / (1 + std::exp(-1.64F - 0.176F * margin)); }
 
 /// Runs of the decided pieces of one camera, and why the others are not.
 void write_decisions(const LabelledPieces& pieces, const std::vector<Decision>& decisions,
                      const JointOptions& options, std::vector<LabeledRun>& runs,
                      std::vector<LabeledRun>& tentative, std::vector<UndecidedRun>& undecided) {
   const std::vector<char> is_crossed = crossed_pieces(pieces.graph);
+  const bool lacks = lacks_crossings(pieces.graph);
   for (std::size_t p = 0; p < decisions.size(); ++p) {
     const CurvePiece& piece = pieces.graph.pieces[p];
     const auto leave = [&](UndecidedReason reason) {
       undecided.push_back({piece.curve, piece.begin, piece.end, reason});
     };
-    const float confidence = confidence_of(decisions[p].margin);
+    const float margin = decisions[p].margin;
+    const float confidence = lacks ? uncrossed_confidence_of(margin) : confidence_of(margin);
     if (pieces.labels[p].empty()) {
       leave(UndecidedReason::kOutsideVolume);
       continue;
@@ -302,9 +348,11 @@ Labeling solve_joint(const Rig& rig, const std::vector<ColorFamily>& families,
   std::vector<PairwiseEnergy> energies(graphs.size());
   std::vector<std::vector<NextPiece>> beside(graphs.size());
   parallel_for(graphs.size(), [&](std::size_t g) {
-    surroundings[g].emplace(rig.camera(graphs[g].camera), graphs[g], pieces[g]);
+    const Camera& camera = rig.camera(graphs[g].camera);
+    // Where nothing crosses, a step in depth would be taken for a line that was missed.
+    if (!lacks_crossings(pieces[g].graph)) surroundings[g].emplace(camera, graphs[g], pieces[g]);
     energies[g] = pairwise_energy(pieces[g], options);
-    beside[g] = next_pieces(rig.camera(graphs[g].camera), graphs[g], pieces[g].graph);
+    beside[g] = next_pieces(camera, graphs[g], pieces[g].graph, next_line_reach_px(rig, camera));
     add_order(rig, graphs[g], pieces[g], beside[g], energies[g]);
   });
   std::vector<std::vector<Decision>> decisions(graphs.size());
@@ -313,7 +361,7 @@ Labeling solve_joint(const Rig& rig, const std::vector<ColorFamily>& families,
     std::vector<PieceBeliefs> next(graphs.size());
     parallel_for(graphs.size(), [&](std::size_t g) {
       auto evidence = others.costs(g, beliefs);
-      add(surroundings[g]->costs(beliefs[g]), evidence);
+      if (surroundings[g]) add(surroundings[g]->costs(beliefs[g]), evidence);
       set_unary(pieces[g], evidence, energies[g]);
       // Order and code reach a piece over as many neighbours as the code is long, and more.
       const int rounds = lacks_crossings(pieces[g].graph) ? 6 * options.rounds : options.rounds;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <set>
 
+#include "pencilscan/rig/object_space.h"
 #include "pencilscan/view/places.h"
 
 namespace pencilscan {
@@ -19,8 +20,10 @@ struct LinePlace {
 };
 
 constexpr int kNextLineCellPx = 16;
-constexpr float kNextLinePx = 48;
 constexpr float kNearPx = 12;  ///< most next lines are nearer
+
+constexpr float kNext = -1.5F;
+constexpr float kWrongOrder = 3;
 
 }  // namespace
 
@@ -28,8 +31,15 @@ bool lacks_crossings(const PieceGraph& graph) {
   return 10 * graph.crossings.size() < graph.pieces.size();
 }
 
+float next_line_reach_px(const Rig& rig, const Camera& camera) {
+  constexpr double kUsual = 48;
+  constexpr double kSpacings = 4;
+  const double spacing = pixels_at_center(rig, camera, line_spacing(rig));
+  return static_cast<float>(std::max(kUsual, kSpacings * spacing));
+}
+
 std::vector<NextPiece> next_pieces(const Camera& camera, const GridGraph& graph,
-                                   const PieceGraph& pieces) {
+                                   const PieceGraph& pieces, float reach_px) {
   Places<LinePlace> places(camera.width, camera.height, kNextLineCellPx);
   for (std::size_t p = 0; p < pieces.pieces.size(); ++p) {
     const CurvePiece& piece = pieces.pieces[p];
@@ -70,7 +80,7 @@ std::vector<NextPiece> next_pieces(const Camera& camera, const GridGraph& graph,
     };
     for (const float side : {1.F, -1.F}) {
       const LinePlace* found = nearest_within(kNearPx, side);
-      if (found == nullptr) found = nearest_within(kNextLinePx, side);
+      if (found == nullptr) found = nearest_within(reach_px, side);
       if (found == nullptr) continue;
       const int a = static_cast<int>(p);
       if (!seen.insert(std::minmax(a, found->piece)).second) continue;
@@ -81,10 +91,8 @@ std::vector<NextPiece> next_pieces(const Camera& camera, const GridGraph& graph,
 }
 
 float next_piece_cost(const PieceLabel& a, const PieceLabel& b, int order) {
-  constexpr float kNext = -1.5F;
   constexpr float kOneMissed = 0.5F;
   constexpr float kMoreMissed = 2;
-  constexpr float kWrongOrder = 3;
   if (order == 0) return 0;
   if (!(a.pattern == b.pattern)) return kMoreMissed;
   switch ((b.line - a.line) * order) {
@@ -95,6 +103,12 @@ float next_piece_cost(const PieceLabel& a, const PieceLabel& b, int order) {
     default:
       return (b.line - a.line) * order > 0 ? kMoreMissed : kWrongOrder;
   }
+}
+
+float next_uncrossed_cost(const PieceLabel& a, const PieceLabel& b, int order) {
+  if (order == 0 || !(a.pattern == b.pattern)) return 0;
+  const int lines = (b.line - a.line) * order;
+  return lines == 1 ? kNext : lines > 0 ? 0 : kWrongOrder;
 }
 
 }  // namespace pencilscan

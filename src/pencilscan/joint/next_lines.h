@@ -20,13 +20,19 @@ struct NextPiece {
 [[nodiscard]] bool lacks_crossings(const PieceGraph& graph);
 
 /// The neighbours of all pieces that no curve crosses: on each side, the next piece of the same
-/// family. It belongs to another curve, lies 1.5 to 48 px from the piece's middle, at most 1 px
-/// off the normal there, and differs by at most 32 degrees in direction. Each pair comes once.
+/// family. It belongs to another curve, lies 1.5 to `reach_px` from the piece's middle, at most
+/// 1 px off the normal there, and differs by at most 32 degrees in direction. Each pair comes once.
 [[nodiscard]] std::vector<NextPiece> next_pieces(const Camera& camera, const GridGraph& graph,
-                                                 const PieceGraph& pieces);
+                                                 const PieceGraph& pieces, float reach_px);
+/// How far off the next line may be: 48 px, or four line spacings where that is more. Light at 60
+/// degrees doubles the spacing, and one line may be missing.
+[[nodiscard]] float next_line_reach_px(const Rig& rig, const Camera& camera);
 
 /// Cost of these labels for two pieces side by side. `order`: +1 where line numbers grow from a to
 /// b in the image, -1 where they fall, 0 where that is not known.
 [[nodiscard]] float next_piece_cost(const PieceLabel& a, const PieceLabel& b, int order);
+/// The same where nothing crosses. Between lines that do not follow each other there may be a step
+/// in depth of any height: how many are missing says nothing, only their order does.
+[[nodiscard]] float next_uncrossed_cost(const PieceLabel& a, const PieceLabel& b, int order);
 
 }  // namespace pencilscan

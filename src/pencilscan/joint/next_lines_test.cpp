@@ -12,6 +12,7 @@
 
 #include "pencilscan/core/random.h"
 #include "pencilscan/joint/sample_pieces.h"
+#include "pencilscan/rig/object_space.h"
 #include "pencilscan/rig/sample_devices.h"
 
 namespace pencilscan {
@@ -23,12 +24,13 @@ using sample::point_of;
 using sample::random_curves;
 
 /// The nearest piece on one side as next_lines.h defines it; -1: none.
-int plain_next(const GridGraph& graph, const PieceGraph& pieces, std::size_t p, float side) {
+int plain_next(const GridGraph& graph, const PieceGraph& pieces, std::size_t p, float side,
+               float reach) {
   const CurvePiece& own = pieces.pieces[p];
   const CurvePoint& middle = point_of(graph, own, (own.begin + own.end) / 2);
   const Eigen::Vector2f tangent = middle.tangent();
   const Eigen::Vector2f normal(tangent.y(), -tangent.x());
-  float nearest = 48;
+  float nearest = reach;
   int found = -1;
   for (std::size_t o = 0; o < pieces.pieces.size(); ++o) {
     const CurvePiece& other = pieces.pieces[o];
@@ -53,6 +55,7 @@ TEST(NextPieces, AreThoseOfAPlainLoopOverAllPoints) {
   Random random(2);
   std::size_t found = 0;
   for (int scene = 0; scene < 4; ++scene) {
+    const float reach = scene < 2 ? 48 : 20;
     const GridGraph graph = random_curves(camera, 30, random);
     PieceGraph pieces = cut_into_pieces(camera, graph, 14);
     add_random_crossings(6, pieces, random);
@@ -64,14 +67,14 @@ TEST(NextPieces, AreThoseOfAPlainLoopOverAllPoints) {
       const int a = static_cast<int>(p);
       if (crossed.count(a) != 0) continue;
       for (const float side : {1.F, -1.F}) {
-        const int b = plain_next(graph, pieces, p, side);
+        const int b = plain_next(graph, pieces, p, side, reach);
         if (b < 0 || !seen.insert({std::min(a, b), std::max(a, b)}).second) continue;
         const CurvePiece& own = pieces.pieces[p];
         const CurvePoint& middle = point_of(graph, own, (own.begin + own.end) / 2);
         expected.push_back({a, b, middle.position, middle.tangent(), side});
       }
     }
-    const std::vector<NextPiece> result = next_pieces(camera, graph, pieces);
+    const std::vector<NextPiece> result = next_pieces(camera, graph, pieces, reach);
     ASSERT_EQ(result.size(), expected.size());
     for (std::size_t i = 0; i < result.size(); ++i) {
       EXPECT_EQ(result[i].a, expected[i].a);
@@ -116,6 +119,45 @@ TEST(NextPieces, CostIsLeastForTheNextLineAndTheSameFromBothSides) {
   // The wrong order, or the same line twice, is worst.
   EXPECT_GT(next_piece_cost(labels[1], labels[0], 1), next_piece_cost(labels[0], labels[4], 1));
   EXPECT_GT(next_piece_cost(labels[1], labels[1], 1), next_piece_cost(labels[0], labels[8], 1));
+}
+
+TEST(NextPieces, WithoutCrossingsOnlyNextLinesAndOrderCount) {
+  PieceLabel a;
+  a.pattern = {0, 0};
+  a.line = 5;
+  PieceLabel b = a;
+  for (const int order : {1, -1}) {
+    for (int line = 0; line < 11; ++line) {
+      b.line = line;
+      const float cost = next_uncrossed_cost(a, b, order);
+      EXPECT_EQ(cost, next_uncrossed_cost(b, a, -order));
+      const int grows = order * (line - a.line);
+      if (grows == 1) {
+        EXPECT_LT(cost, -1);
+      } else if (grows > 1) {
+        EXPECT_EQ(cost, 0) << grows;  // a step in depth may be of any height
+      } else {
+        EXPECT_GT(cost, 1) << grows;
+      }
+    }
+  }
+  b.line = 6;
+  EXPECT_EQ(next_uncrossed_cost(a, b, 0), 0);
+  b.pattern.pattern = 1;
+  EXPECT_EQ(next_uncrossed_cost(a, b, 1), 0);
+}
+
+TEST(NextPieces, LieWithinFourLineSpacings) {
+  Rig rig =
+      sample::two_by_two(sample::device_at<Camera>({560, -110, 80}, "cam0", 640, 480, 800),
+                         sample::device_at<Projector>({500, 150, 0}, "proj0", 640, 480, 800),
+                         sample::device_at<Projector>({500, 0, 150}, "proj1", 640, 480, 800), 120);
+  for (const double pitch : {8., 40.}) {
+    for (Projector& projector : rig.projectors) projector.patterns[0].pitch_px = pitch;
+    const double spacing = pixels_at_center(rig, rig.cameras[0], line_spacing(rig));
+    EXPECT_FLOAT_EQ(next_line_reach_px(rig, rig.cameras[0]),
+                    pitch < 20 ? 48.F : static_cast<float>(4 * spacing));
+  }
 }
 
 TEST(NextPieces, CountWhereLessThanOneInTenPiecesIsCrossed) {
