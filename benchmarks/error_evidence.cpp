@@ -1,13 +1,16 @@
-// What sigma and confidence of a frame rest on, beside the true errors, for
-// experiments/error_model.py:
+// What sigma and confidence of a frame rest on, beside the true errors:
 //   error_evidence <scene folder: rig.json, frames/000000, truth/mesh.ply> <folder for the answer>
 // surface.f32: a row of 7 floats per measured vertex; points.f32: a row of 8 per point, with the
-// confidence that the lines' margins give. Lengths in footprints.
+// confidence that the lines' margins give. Lengths in footprints (experiments/error_model.py).
+//   error_evidence --lines <scene folder> <folder for the answer>
+// lines.f32: per point of the joint labels, however unsure, before any surface: 1 if its line is
+// right, else 0, and the confidence (experiments/one_projector.py --fit).
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <opencv2/core.hpp>
+#include <string_view>
 #include <vector>
 
 #include "pencilscan/core/error.h"
@@ -42,9 +45,13 @@ std::vector<float> surface_rows(const TruthScene& truth, const SurfaceResult& su
   return rows;
 }
 
+/// Confidences that report less than 1 for errors that no margin tells, without that.
+float confidence_of_lines(const MeasuredPoint& point) {
+  return std::min(1.F, point.confidence + (1 - reported_confidence(1)));
+}
+
 std::vector<float> point_rows(const TruthScene& truth, const PointResult& result, float per_unit) {
   std::vector<float> rows;
-  const float taken_off = 1 - reported_confidence(1);
   const std::vector<PointVerdict> verdicts = judge_points(truth, result.points);
   for (std::size_t i = 0; i < result.evidence.size(); ++i) {
     if (!verdicts[i].counted) continue;
@@ -53,9 +60,33 @@ std::vector<float> point_rows(const TruthScene& truth, const PointResult& result
     rows.insert(rows.end(),
                 {static_cast<float>(verdicts[i].ray_error_mm) * per_unit, e.own, e.surface,
                  e.difference, e.settled ? 1.F : 0.F, verdicts[i].right ? 1.F : 0.F,
-                 std::min(1.F, p.confidence + taken_off), p.sigma * per_unit});
+                 confidence_of_lines(p), p.sigma * per_unit});
   }
   return rows;
+}
+
+void write_lines(const std::filesystem::path& scene, const std::filesystem::path& out) {
+  cv::setNumThreads(1);
+  const Rig rig = read_rig(scene / "rig.json");
+  JointOptions joint;
+  joint.min_confidence = 0;
+  joint.min_uncrossed_confidence = 0;
+  FrameOptions options;
+  options.meshes = false;
+  options.points.method = joint;
+  options.points.guided.passes = 0;
+  const FrameResult result =
+      reconstruct_frame(rig, read_frame(rig, scene / "frames/000000"), options);
+  const TruthScene truth(read_mesh(scene / "truth/mesh.ply"), rig);
+  const std::vector<MeasuredPoint>& points = result.points.points;
+  const std::vector<PointVerdict> verdicts = judge_points(truth, points);
+  std::vector<float> rows;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (!verdicts[i].counted) continue;
+    rows.insert(rows.end(), {verdicts[i].right ? 1.F : 0.F, confidence_of_lines(points[i])});
+  }
+  std::filesystem::create_directories(out);
+  write_floats(out / "lines.f32", rows);
 }
 
 void run(const std::filesystem::path& scene, const std::filesystem::path& out) {
@@ -73,12 +104,13 @@ void run(const std::filesystem::path& scene, const std::filesystem::path& out) {
 }  // namespace pencilscan
 
 int main(int argc, char** argv) {
-  if (argc != 3) {
-    std::fprintf(stderr, "error_evidence <scene folder> <folder for the answer>\n");
+  const bool of_lines = argc == 4 && std::string_view(argv[1]) == "--lines";
+  if (argc != 3 && !of_lines) {
+    std::fprintf(stderr, "error_evidence [--lines] <scene folder> <folder for the answer>\n");
     return 2;
   }
   try {
-    pencilscan::run(argv[1], argv[2]);
+    (of_lines ? pencilscan::write_lines : pencilscan::run)(argv[argc - 2], argv[argc - 1]);
   } catch (const std::exception& error) {
     std::fprintf(stderr, "%s\n", error.what());
     return 1;

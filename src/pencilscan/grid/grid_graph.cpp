@@ -48,6 +48,12 @@ void identify(const Rig& rig, const std::vector<ColorFamily>& families, const Gr
   const Camera& camera = rig.cameras[static_cast<std::size_t>(graph.camera)];
   graph.crossings =
       find_crossings(graph.curves, {camera.width, camera.height}, options.min_angle_rad);
+  // Lines of one pattern do not cross.
+  std::erase_if(graph.crossings, [&](const Crossing& x) {
+    const int family = graph.curves[static_cast<std::size_t>(x.curve_a)].family;
+    return family == graph.curves[static_cast<std::size_t>(x.curve_b)].family &&
+           families[static_cast<std::size_t>(family)].patterns.size() < 2;
+  });
   if (!options.identify) return;
   vote_for_projectors(rig, families, options, graph);
   relations = neighbor_relations(rig, graph);

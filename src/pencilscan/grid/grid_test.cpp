@@ -94,6 +94,24 @@ TEST_F(PlaneGrid, FindsEveryCrossingAndOneComponent) {
   }
 }
 
+TEST_F(PlaneGrid, LinesOfOnePatternDoNotCross) {
+  const auto middle = [&](int p) {
+    const Projector& projector = rig_.projectors[static_cast<std::size_t>(p)];
+    return curve_of(p, projector.line_count(projector.patterns[0]) / 2, 2);
+  };
+  const std::vector<Curve> curves = {middle(0), middle(1)};
+  EXPECT_EQ(build_grid_graph(rig_, families_, 0, curves).crossings.size(), 1U);
+  // A ghost of the first projector's colour where the second one's line is.
+  std::vector<Curve> ghost = curves;
+  ghost[1].family = 0;
+  EXPECT_TRUE(build_grid_graph(rig_, families_, 0, ghost).crossings.empty());
+  // Another projector in this colour could make it a line.
+  rig_.projectors[1].patterns[0].colors = rig_.projectors[0].patterns[0].colors;
+  families_ = color_families(rig_);
+  ASSERT_EQ(families_.size(), 1U);
+  EXPECT_EQ(build_grid_graph(rig_, families_, 0, ghost).crossings.size(), 1U);
+}
+
 TEST_F(PlaneGrid, LocalIdsFollowFromWeakEvidenceAndNeighbours) {
   std::vector<std::pair<int, int>> truth;
   const std::vector<Curve> curves = all_curves(0.15, truth);

@@ -11,6 +11,7 @@
 #include "pencilscan/joint/next_lines.h"
 #include "pencilscan/joint/other_views.h"
 #include "pencilscan/joint/piece_labels.h"
+#include "pencilscan/joint/stretches.h"
 #include "pencilscan/joint/surroundings.h"
 
 namespace pencilscan {
@@ -142,6 +143,14 @@ void add_order(const Rig& rig, const GridGraph& graph, const LabelledPieces& pie
   }
 }
 
+/// Takes back what add_order added.
+void remove_order(const LabelledPieces& pieces, PairwiseEnergy& energy) {
+  const std::size_t own = pieces.graph.crossings.size() + pieces.graph.continuations.size();
+  if (own >= energy.edges.size()) return;
+  energy.tables.resize(energy.edges[own].table);
+  energy.edges.resize(own);
+}
+
 /// Beliefs as probabilities of each label; what is missing to 1 is "outlier".
 PieceBeliefs beliefs_of(const LabelledPieces& pieces, const std::vector<float>& costs) {
   constexpr float kTemperature = 2;  // loops count evidence more than once
@@ -163,81 +172,6 @@ PieceBeliefs beliefs_of(const LabelledPieces& pieces, const std::vector<float>& 
     at += labels.size() + 1;
   }
   return beliefs;
-}
-
-struct Decision {
-  int label = -1;  ///< -1: outlier
-  float margin = 0;
-};
-
-std::vector<Decision> decisions_of(const LabelledPieces& pieces, const std::vector<float>& costs) {
-  std::vector<Decision> decisions;
-  std::size_t at = 0;
-  for (const auto& labels : pieces.labels) {
-    const std::size_t n = labels.size() + 1;
-    std::size_t best = n - 1;
-    for (std::size_t k = 0; k < n; ++k) {
-      if (costs[at + k] < costs[at + best]) best = k;
-    }
-    float second = 1e9F;
-    for (std::size_t k = 0; k < n; ++k) {
-      if (k != best) second = std::min(second, costs[at + k]);
-    }
-    decisions.push_back({best + 1 == n ? -1 : static_cast<int>(best), second - costs[at + best]});
-    at += n;
-  }
-  return decisions;
-}
-
-/// Pieces that follow each other on a curve and were given one line, as [first, last].
-std::vector<std::pair<std::size_t, std::size_t>> same_line_stretches(
-    const LabelledPieces& pieces, const std::vector<Decision>& decisions) {
-  std::vector<std::pair<std::size_t, std::size_t>> stretches;
-  const auto& list = pieces.graph.pieces;
-  const auto label_of = [&](std::size_t p) -> const PieceLabel& {
-    return pieces.labels[p][static_cast<std::size_t>(decisions[p].label)];
-  };
-  for (std::size_t p = 0; p < list.size(); ++p) {
-    if (decisions[p].label < 0) continue;
-    const bool goes_on = p > 0 && !stretches.empty() && stretches.back().second == p - 1 &&
-                         list[p - 1].curve == list[p].curve &&
-                         label_of(p - 1).pattern == label_of(p).pattern &&
-                         label_of(p - 1).line == label_of(p).line;
-    if (goes_on) {
-      stretches.back().second = p;
-    } else {
-      stretches.emplace_back(p, p);
-    }
-  }
-  return stretches;
-}
-
-/// Without crossings only the code tells lines apart: a stretch of a curve is ambiguous where a
-/// line a whole period away is possible too, all along it.
-void leave_periodic(const Rig& rig, const LabelledPieces& pieces,
-                    std::vector<Decision>& decisions) {
-  for (const auto& [first, last] : same_line_stretches(pieces, decisions)) {
-    const PieceLabel& best = pieces.labels[first][static_cast<std::size_t>(decisions[first].label)];
-    const int period = rig.pattern(best.pattern).period();
-    const auto is_possible = [&](int line) {
-      for (std::size_t p = first; p <= last; ++p) {
-        const auto& labels = pieces.labels[p];
-        if (std::none_of(labels.begin(), labels.end(), [&](const PieceLabel& label) {
-              return label.pattern == best.pattern && label.line == line;
-            }))
-          return false;
-      }
-      return true;
-    };
-    const bool is_ambiguous = std::any_of(pieces.labels[first].begin(), pieces.labels[first].end(),
-                                          [&](const PieceLabel& other) {
-                                            const int apart = std::abs(other.line - best.line);
-                                            return other.pattern == best.pattern && apart > 0 &&
-                                                   apart % period == 0 && is_possible(other.line);
-                                          });
-    if (!is_ambiguous) continue;
-    for (std::size_t p = first; p <= last; ++p) decisions[p].margin = 0;
-  }
 }
 
 /// Pieces side by side vouch for each other, also for the lines of another projector. So where no
@@ -284,13 +218,44 @@ void leave_unanchored(const LabelledPieces& pieces, std::span<const NextPiece> b
   }
 }
 
+/// Where nothing crosses, lines are wrong together: a few curves beside a step in depth or beside a
+/// ghost, each of them held by the next. So a line is as sure as the least sure of three opinions:
+/// that of pieces, that of whole stretches, and that of stretches if faint ones are ghosts. Leaves
+/// the energy of the third behind.
+void ask_stretches(const Rig& rig, const GridGraph& graph, const LabelledPieces& pieces,
+                   std::span<const NextPiece> beside, const JointOptions& options,
+                   PairwiseEnergy& energy, std::vector<Decision>& decisions) {
+  const auto margins_without = [&](std::span<const char> left_out) {
+    constexpr int kRounds = 60;  // of messages: across as many curves
+    std::vector<Decision> asked = decisions;
+    for (std::size_t p = 0; p < left_out.size(); ++p) {
+      if (left_out[p] != 0) asked[p].label = -1;
+    }
+    return margins_of_stretches(pieces, energy, asked, kRounds,
+                                static_cast<float>(options.damping));
+  };
+  const std::vector<float> of_all = margins_without({});
+  const std::vector<char> faint = faint_pieces(graph, pieces, beside, decisions);
+  const Camera& camera = rig.camera(graph.camera);
+  remove_order(pieces, energy);
+  add_order(rig, graph, pieces,
+            next_pieces(camera, graph, pieces.graph, next_line_reach_px(rig, camera), faint),
+            energy);
+  const std::vector<float> of_bright = margins_without(faint);
+  for (std::size_t p = 0; p < decisions.size(); ++p) {
+    float& margin = decisions[p].margin;
+    margin = std::min(margin, of_all[p]);
+    if (faint[p] == 0) margin = std::min(margin, of_bright[p]);
+  }
+}
+
 /// Share of points that are right at this margin: a logistic fit over five rendered scenes (bunny
 /// with and without texture, hand, two balls, cube); benchmarks/accuracy prints the comparison.
 float confidence_of(float margin) { return 1 / (1 + std::exp(0.13F - 0.52F * margin)); }
 /// The same where nothing crosses: lines are wrong together, a few curves at a time, and margins
-/// say less of that. Fitted over twelve objects before one projector, in five settings each; other
-/// draws of them judge it (experiments/one_projector.py).
-float uncrossed_confidence_of(float margin) { return 1 / (1 + std::exp(-1.64F - 0.176F * margin)); }
+/// say less of that. Of experiments/one_projector.py --fit, over 36 objects in five settings; other
+/// draws of them judge it.
+float uncrossed_confidence_of(float margin) { return 1 / (1 + std::exp(0.085F - 0.348F * margin)); }
 
 /// Runs of the decided pieces of one camera, and why the others are not.
 void write_decisions(const LabelledPieces& pieces, const std::vector<Decision>& decisions,
@@ -298,6 +263,8 @@ void write_decisions(const LabelledPieces& pieces, const std::vector<Decision>& 
                      std::vector<LabeledRun>& tentative, std::vector<UndecidedRun>& undecided) {
   const std::vector<char> is_crossed = crossed_pieces(pieces.graph);
   const bool lacks = lacks_crossings(pieces.graph);
+  const auto least =
+      static_cast<float>(lacks ? options.min_uncrossed_confidence : options.min_confidence);
   for (std::size_t p = 0; p < decisions.size(); ++p) {
     const CurvePiece& piece = pieces.graph.pieces[p];
     const auto leave = [&](UndecidedReason reason) {
@@ -309,7 +276,7 @@ void write_decisions(const LabelledPieces& pieces, const std::vector<Decision>& 
       leave(UndecidedReason::kOutsideVolume);
       continue;
     }
-    const bool is_sure = confidence >= static_cast<float>(options.min_confidence);
+    const bool is_sure = confidence >= least;
     if (decisions[p].label >= 0) {
       const PieceLabel& label = pieces.labels[p][static_cast<std::size_t>(decisions[p].label)];
       (is_sure ? runs : tentative)
@@ -370,14 +337,17 @@ Labeling solve_joint(const Rig& rig, const std::vector<ColorFamily>& families,
                             : min_sum(energies[g], rounds, static_cast<float>(options.damping));
       next[g] = beliefs_of(pieces[g], costs);
       decisions[g] = decisions_of(pieces[g], costs);
-      if (lacks_crossings(pieces[g].graph)) {
-        leave_periodic(rig, pieces[g], decisions[g]);
-      } else {
-        leave_unanchored(pieces[g], beside[g], decisions[g]);
-      }
     });
     beliefs = std::move(next);
   }
+  parallel_for(graphs.size(), [&](std::size_t g) {
+    if (lacks_crossings(pieces[g].graph)) {
+      ask_stretches(rig, graphs[g], pieces[g], beside[g], options, energies[g], decisions[g]);
+      leave_periodic(rig, pieces[g], decisions[g]);
+    } else {
+      leave_unanchored(pieces[g], beside[g], decisions[g]);
+    }
+  });
   Labeling labeling;
   labeling.runs.resize(rig.cameras.size());
   labeling.tentative.resize(rig.cameras.size());

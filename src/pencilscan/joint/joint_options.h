@@ -27,6 +27,9 @@ struct JointOptions {
   int rounds = 4;                    ///< of messages in a pass
   double damping = 0.3;              ///< share of the old message kept, [0, 1)
   double min_confidence = 0.955;     ///< pieces below stay undecided
+  /// The same where nothing crosses: that a few curves are wrong together is always possible there,
+  /// and few lines were named else.
+  double min_uncrossed_confidence = 0.9;
 
   /// Cost of a crossing whose planes do not meet.
   [[nodiscard]] float disagreement_cost() const;

@@ -39,9 +39,12 @@ float next_line_reach_px(const Rig& rig, const Camera& camera) {
 }
 
 std::vector<NextPiece> next_pieces(const Camera& camera, const GridGraph& graph,
-                                   const PieceGraph& pieces, float reach_px) {
+                                   const PieceGraph& pieces, float reach_px,
+                                   std::span<const char> left_out) {
+  const auto is_left_out = [&](std::size_t p) { return !left_out.empty() && left_out[p] != 0; };
   Places<LinePlace> places(camera.width, camera.height, kNextLineCellPx);
   for (std::size_t p = 0; p < pieces.pieces.size(); ++p) {
+    if (is_left_out(p)) continue;
     const CurvePiece& piece = pieces.pieces[p];
     for (int i = piece.begin; i < piece.end; ++i) {
       const CurvePoint& point =
@@ -54,7 +57,7 @@ std::vector<NextPiece> next_pieces(const Camera& camera, const GridGraph& graph,
   std::set<std::pair<int, int>> seen;
   const std::vector<char> is_crossed = crossed_pieces(pieces);
   for (std::size_t p = 0; p < pieces.pieces.size(); ++p) {
-    if (is_crossed[p] != 0) continue;
+    if (is_crossed[p] != 0 || is_left_out(p)) continue;
     const CurvePiece& piece = pieces.pieces[p];
     const Curve& curve = graph.curves[static_cast<std::size_t>(piece.curve)];
     const CurvePoint& middle =

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include "pencilscan/joint/piece_labels.h"
@@ -22,8 +23,10 @@ struct NextPiece {
 /// The neighbours of all pieces that no curve crosses: on each side, the next piece of the same
 /// family. It belongs to another curve, lies 1.5 to `reach_px` from the piece's middle, at most
 /// 1 px off the normal there, and differs by at most 32 degrees in direction. Each pair comes once.
+/// Pieces that are `left_out` (per piece; empty: none) are looked past.
 [[nodiscard]] std::vector<NextPiece> next_pieces(const Camera& camera, const GridGraph& graph,
-                                                 const PieceGraph& pieces, float reach_px);
+                                                 const PieceGraph& pieces, float reach_px,
+                                                 std::span<const char> left_out = {});
 /// How far off the next line may be: 48 px, or four line spacings where that is more. Light at 60
 /// degrees doubles the spacing, and one line may be missing.
 [[nodiscard]] float next_line_reach_px(const Rig& rig, const Camera& camera);
