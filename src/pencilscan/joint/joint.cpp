@@ -6,6 +6,7 @@
 
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/grid/local_ids.h"
+#include "pencilscan/joint/anchors.h"
 #include "pencilscan/joint/darkness.h"
 #include "pencilscan/joint/min_sum.h"
 #include "pencilscan/joint/next_lines.h"
@@ -174,50 +175,6 @@ PieceBeliefs beliefs_of(const LabelledPieces& pieces, const std::vector<float>& 
   return beliefs;
 }
 
-/// Pieces side by side vouch for each other, also for the lines of another projector. So where no
-/// chain of neighbours leads to a piece that others cross, what neighbours said does not count.
-void leave_unanchored(const LabelledPieces& pieces, std::span<const NextPiece> beside,
-                      std::vector<Decision>& decisions) {
-  constexpr float kPerNeighbor = 3;  // what one adds to the margin, about
-  const auto label_of = [&](int p) -> const PieceLabel* {
-    const auto k = static_cast<std::size_t>(p);
-    return decisions[k].label < 0 ? nullptr
-                                  : &pieces.labels[k][static_cast<std::size_t>(decisions[k].label)];
-  };
-  std::vector<std::vector<int>> linked(decisions.size());
-  std::vector<int> neighbors(decisions.size(), 0);
-  const auto link = [&](int a, int b, int lines_apart) {
-    const PieceLabel* la = label_of(a);
-    const PieceLabel* lb = label_of(b);
-    if (la == nullptr || lb == nullptr || !(la->pattern == lb->pattern) ||
-        std::abs(la->line - lb->line) != lines_apart)
-      return;
-    linked[static_cast<std::size_t>(a)].push_back(b);
-    linked[static_cast<std::size_t>(b)].push_back(a);
-    neighbors[static_cast<std::size_t>(a)] += lines_apart;
-    neighbors[static_cast<std::size_t>(b)] += lines_apart;
-  };
-  for (const NextPiece& next : beside) link(next.a, next.b, 1);
-  for (const auto& [a, b] : pieces.graph.continuations) link(a, b, 0);
-  std::vector<char> is_anchored = crossed_pieces(pieces.graph);
-  std::vector<int> open;
-  for (std::size_t p = 0; p < is_anchored.size(); ++p) {
-    if (is_anchored[p] != 0) open.push_back(static_cast<int>(p));
-  }
-  while (!open.empty()) {
-    const int p = open.back();
-    open.pop_back();
-    for (const int q : linked[static_cast<std::size_t>(p)]) {
-      if (is_anchored[static_cast<std::size_t>(q)] != 0) continue;
-      is_anchored[static_cast<std::size_t>(q)] = 1;
-      open.push_back(q);
-    }
-  }
-  for (std::size_t p = 0; p < decisions.size(); ++p) {
-    if (is_anchored[p] == 0) decisions[p].margin -= kPerNeighbor * static_cast<float>(neighbors[p]);
-  }
-}
-
 /// Where nothing crosses, lines are wrong together: a few curves beside a step in depth or beside a
 /// ghost, each of them held by the next. So a line is as sure as the least sure of three opinions:
 /// that of pieces, that of whole stretches, and that of stretches if faint ones are ghosts. Leaves
@@ -345,7 +302,7 @@ Labeling solve_joint(const Rig& rig, const std::vector<ColorFamily>& families,
       ask_stretches(rig, graphs[g], pieces[g], beside[g], options, energies[g], decisions[g]);
       leave_periodic(rig, pieces[g], decisions[g]);
     } else {
-      leave_unanchored(pieces[g], beside[g], decisions[g]);
+      leave_unanchored(pieces[g], beside[g], options, decisions[g]);
     }
   });
   Labeling labeling;

@@ -1,0 +1,96 @@
+#include "pencilscan/joint/anchors.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+namespace pencilscan {
+namespace {
+
+int curve_of(const PieceGraph& graph, int piece) {
+  return graph.pieces[static_cast<std::size_t>(piece)].curve;
+}
+
+}  // namespace
+
+std::vector<char> held_pieces(const PieceGraph& graph, const std::vector<std::vector<int>>& linked,
+                              std::vector<char> is_crossed) {
+  constexpr std::size_t kCurves = 2;
+  std::vector<char> is_held = std::move(is_crossed);
+  // Along curves.
+  std::vector<int> open;
+  for (std::size_t p = 0; p < is_held.size(); ++p) {
+    if (is_held[p] != 0) open.push_back(static_cast<int>(p));
+  }
+  while (!open.empty()) {
+    const int p = open.back();
+    open.pop_back();
+    for (const int q : linked[static_cast<std::size_t>(p)]) {
+      if (is_held[static_cast<std::size_t>(q)] != 0 || curve_of(graph, p) != curve_of(graph, q))
+        continue;
+      is_held[static_cast<std::size_t>(q)] = 1;
+      open.push_back(q);
+    }
+  }
+  // Groups of the others.
+  const std::vector<char> by_itself = is_held;
+  std::vector<char> is_seen = by_itself;
+  for (std::size_t first = 0; first < is_held.size(); ++first) {
+    if (is_seen[first] != 0) continue;
+    is_seen[first] = 1;
+    std::vector<int> group{static_cast<int>(first)};
+    std::set<int> holding;
+    for (std::size_t k = 0; k < group.size(); ++k) {
+      for (const int q : linked[static_cast<std::size_t>(group[k])]) {
+        const auto j = static_cast<std::size_t>(q);
+        if (by_itself[j] != 0) holding.insert(curve_of(graph, q));
+        if (is_seen[j] != 0) continue;
+        is_seen[j] = 1;
+        group.push_back(q);
+      }
+    }
+    if (holding.size() < kCurves) continue;
+    for (const int p : group) is_held[static_cast<std::size_t>(p)] = 1;
+  }
+  return is_held;
+}
+
+void leave_unanchored(const LabelledPieces& pieces, std::span<const NextPiece> beside,
+                      const JointOptions& options, std::vector<Decision>& decisions) {
+  constexpr float kPerNeighbor = 3;  // what one adds to the margin, about
+  const auto label_of = [&](int p) -> const PieceLabel* {
+    const auto k = static_cast<std::size_t>(p);
+    return decisions[k].label < 0 ? nullptr
+                                  : &pieces.labels[k][static_cast<std::size_t>(decisions[k].label)];
+  };
+  std::vector<std::vector<int>> linked(decisions.size());
+  std::vector<int> neighbors(decisions.size(), 0);
+  const auto link = [&](int a, int b, int lines_apart) {
+    const PieceLabel* la = label_of(a);
+    const PieceLabel* lb = label_of(b);
+    if (la == nullptr || lb == nullptr || !(la->pattern == lb->pattern) ||
+        std::abs(la->line - lb->line) != lines_apart)
+      return;
+    linked[static_cast<std::size_t>(a)].push_back(b);
+    linked[static_cast<std::size_t>(b)].push_back(a);
+    neighbors[static_cast<std::size_t>(a)] += lines_apart;
+    neighbors[static_cast<std::size_t>(b)] += lines_apart;
+  };
+  for (const NextPiece& next : beside) link(next.a, next.b, 1);
+  for (const auto& [a, b] : pieces.graph.continuations) link(a, b, 0);
+  std::vector<char> is_crossed(decisions.size(), 0);
+  const CrossingCost crossing_cost(pieces, options);
+  for (const PieceCrossing& x : pieces.graph.crossings) {
+    const PieceLabel* la = label_of(x.a);
+    const PieceLabel* lb = label_of(x.b);
+    // Below 0 the crossing is likelier where both lines are right than by chance.
+    if (la == nullptr || lb == nullptr || crossing_cost(*la, *lb, x) >= 0) continue;
+    is_crossed[static_cast<std::size_t>(x.a)] = is_crossed[static_cast<std::size_t>(x.b)] = 1;
+  }
+  const std::vector<char> is_held = held_pieces(pieces.graph, linked, std::move(is_crossed));
+  for (std::size_t p = 0; p < decisions.size(); ++p) {
+    if (is_held[p] == 0) decisions[p].margin -= kPerNeighbor * static_cast<float>(neighbors[p]);
+  }
+}
+
+}  // namespace pencilscan

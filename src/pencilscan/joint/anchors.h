@@ -1,0 +1,26 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "pencilscan/joint/next_lines.h"
+#include "pencilscan/joint/stretches.h"
+
+namespace pencilscan {
+
+/// Which pieces crossings hold. `linked`: per piece, the pieces that its line follows from, on its
+/// own curve and beside it. `is_crossed`: per piece, 1 where a crossing bears its line out. A piece
+/// is held where links along its curve lead to such a piece; and so is a group of others that hang
+/// together if two held curves and more are linked to it. By one alone a whole group would have
+/// the line of a curve that goes on wrongly.
+[[nodiscard]] std::vector<char> held_pieces(const PieceGraph& graph,
+                                            const std::vector<std::vector<int>>& linked,
+                                            std::vector<char> is_crossed);
+
+/// Pieces side by side vouch for each other, also for the lines of another projector. So what
+/// neighbours (`beside`: next_pieces) said does not count for pieces that no crossings hold: it is
+/// taken off their margins.
+void leave_unanchored(const LabelledPieces& pieces, std::span<const NextPiece> beside,
+                      const JointOptions& options, std::vector<Decision>& decisions);
+
+}  // namespace pencilscan

@@ -1,0 +1,81 @@
+#include "pencilscan/joint/anchors.h"
+
+#include <gtest/gtest.h>
+
+#include <utility>
+#include <vector>
+
+namespace pencilscan {
+namespace {
+
+/// Curves of three pieces each; pieces of a curve are linked to the next, and whole curves to those
+/// beside them as given.
+struct Curves {
+  Curves(int count, const std::vector<std::pair<int, int>>& beside) {
+    for (int c = 0; c < count; ++c) {
+      for (int k = 0; k < 3; ++k) {
+        CurvePiece piece;
+        piece.curve = c;
+        graph.pieces.push_back(piece);
+      }
+    }
+    linked.resize(graph.pieces.size());
+    is_crossed.resize(graph.pieces.size(), 0);
+    for (int c = 0; c < count; ++c) {
+      link(3 * c, 3 * c + 1);
+      link(3 * c + 1, 3 * c + 2);
+    }
+    for (const auto& [a, b] : beside) link(3 * a + 1, 3 * b + 1);
+  }
+  void link(int a, int b) {
+    linked[static_cast<std::size_t>(a)].push_back(b);
+    linked[static_cast<std::size_t>(b)].push_back(a);
+  }
+  void unlink(int a, int b) {
+    std::erase(linked[static_cast<std::size_t>(a)], b);
+    std::erase(linked[static_cast<std::size_t>(b)], a);
+  }
+  /// Per curve, how many of its pieces are held.
+  [[nodiscard]] std::vector<int> held() const {
+    const std::vector<char> is_held = held_pieces(graph, linked, is_crossed);
+    std::vector<int> count(graph.pieces.size() / 3, 0);
+    for (std::size_t p = 0; p < is_held.size(); ++p) count[p / 3] += is_held[p];
+    return count;
+  }
+
+  PieceGraph graph;
+  std::vector<std::vector<int>> linked;
+  std::vector<char> is_crossed;
+};
+
+TEST(HeldPieces, HangOnACrossingOfTheirOwnCurve) {
+  Curves curves(2, {});
+  EXPECT_EQ(curves.held(), std::vector<int>({0, 0}));
+  curves.is_crossed[2] = 1;
+  EXPECT_EQ(curves.held(), std::vector<int>({3, 0}));
+  // The curve jumps to another line between its first pieces.
+  curves.unlink(0, 1);
+  EXPECT_EQ(curves.held(), std::vector<int>({2, 0}));
+}
+
+TEST(HeldPieces, OrOnTwoCurvesThatAreHeld) {
+  // A row of five; then a sixth beside nothing.
+  Curves curves(6, {{0, 1}, {1, 2}, {2, 3}, {3, 4}});
+  curves.is_crossed[0] = 1;
+  EXPECT_EQ(curves.held(), std::vector<int>({3, 0, 0, 0, 0, 0}));
+  curves.is_crossed[12] = 1;
+  EXPECT_EQ(curves.held(), std::vector<int>({3, 3, 3, 3, 3, 0}));
+  // Each half hangs on one curve.
+  curves.unlink(7, 10);
+  EXPECT_EQ(curves.held(), std::vector<int>({3, 0, 0, 0, 3, 0}));
+}
+
+TEST(HeldPieces, TwoLinksToOneCurveAreOne) {
+  Curves curves(3, {{0, 1}, {1, 2}});
+  curves.link(0, 3);
+  curves.is_crossed[1] = 1;
+  EXPECT_EQ(curves.held(), std::vector<int>({3, 0, 0}));
+}
+
+}  // namespace
+}  // namespace pencilscan
