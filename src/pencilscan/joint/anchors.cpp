@@ -1,8 +1,9 @@
 #include "pencilscan/joint/anchors.h"
 
 #include <algorithm>
-#include <cmath>
+#include <cstdlib>
 #include <set>
+#include <utility>
 
 namespace pencilscan {
 namespace {
@@ -14,8 +15,8 @@ int curve_of(const PieceGraph& graph, int piece) {
 }  // namespace
 
 std::vector<char> held_pieces(const PieceGraph& graph, const std::vector<std::vector<int>>& linked,
-                              std::vector<char> is_crossed) {
-  constexpr std::size_t kCurves = 2;
+                              std::vector<char> is_crossed,
+                              const std::function<bool(std::span<const int> group)>& is_ambiguous) {
   std::vector<char> is_held = std::move(is_crossed);
   // Along curves.
   std::vector<int> open;
@@ -49,10 +50,41 @@ std::vector<char> held_pieces(const PieceGraph& graph, const std::vector<std::ve
         group.push_back(q);
       }
     }
-    if (holding.size() < kCurves) continue;
+    if (holding.empty() || (holding.size() == 1 && is_ambiguous(group))) continue;
     for (const int p : group) is_held[static_cast<std::size_t>(p)] = 1;
   }
   return is_held;
+}
+
+bool is_ambiguous_group(const LabelledPieces& pieces, const std::vector<Decision>& decisions,
+                        std::span<const int> group) {
+  constexpr std::size_t kWord = 3;  // lines of a code word of the paper; fewer have no code
+  constexpr float kMargin = 2;      // half of what one wrong colour costs
+  constexpr float kMissing = 4;     // of a label that a piece does not have: as a wrong colour
+  const auto labels_of = [&](int p) -> const std::vector<PieceLabel>& {
+    return pieces.labels[static_cast<std::size_t>(p)];
+  };
+  const auto own = [&](int p) -> const PieceLabel& {
+    return labels_of(p)[static_cast<std::size_t>(decisions[static_cast<std::size_t>(p)].label)];
+  };
+  std::set<int> curves;
+  for (const int p : group) curves.insert(curve_of(pieces.graph, p));
+  if (curves.size() <= kWord) return false;
+  const int first = group.front();
+  for (const PieceLabel& other : labels_of(first)) {
+    const int apart = other.line - own(first).line;
+    if (other.pattern == own(first).pattern && apart == 0) continue;
+    float more = 0;
+    for (const int p : group) {
+      const auto found =
+          std::find_if(labels_of(p).begin(), labels_of(p).end(), [&](const PieceLabel& label) {
+            return label.pattern == other.pattern && label.line == own(p).line + apart;
+          });
+      more += found == labels_of(p).end() ? kMissing : found->cost - own(p).cost;
+    }
+    if (more < kMargin) return true;
+  }
+  return false;
 }
 
 void leave_unanchored(const LabelledPieces& pieces, std::span<const NextPiece> beside,
@@ -87,7 +119,9 @@ void leave_unanchored(const LabelledPieces& pieces, std::span<const NextPiece> b
     if (la == nullptr || lb == nullptr || crossing_cost(*la, *lb, x) >= 0) continue;
     is_crossed[static_cast<std::size_t>(x.a)] = is_crossed[static_cast<std::size_t>(x.b)] = 1;
   }
-  const std::vector<char> is_held = held_pieces(pieces.graph, linked, std::move(is_crossed));
+  const std::vector<char> is_held = held_pieces(
+      pieces.graph, linked, std::move(is_crossed),
+      [&](std::span<const int> group) { return is_ambiguous_group(pieces, decisions, group); });
   for (std::size_t p = 0; p < decisions.size(); ++p) {
     if (is_held[p] == 0) decisions[p].margin -= kPerNeighbor * static_cast<float>(neighbors[p]);
   }

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -37,7 +38,8 @@ struct Curves {
   }
   /// Per curve, how many of its pieces are held.
   [[nodiscard]] std::vector<int> held() const {
-    const std::vector<char> is_held = held_pieces(graph, linked, is_crossed);
+    const std::vector<char> is_held =
+        held_pieces(graph, linked, is_crossed, [&](std::span<const int>) { return is_ambiguous; });
     std::vector<int> count(graph.pieces.size() / 3, 0);
     for (std::size_t p = 0; p < is_held.size(); ++p) count[p / 3] += is_held[p];
     return count;
@@ -46,6 +48,7 @@ struct Curves {
   PieceGraph graph;
   std::vector<std::vector<int>> linked;
   std::vector<char> is_crossed;
+  bool is_ambiguous = true;
 };
 
 TEST(HeldPieces, HangOnACrossingOfTheirOwnCurve) {
@@ -68,6 +71,11 @@ TEST(HeldPieces, OrOnTwoCurvesThatAreHeld) {
   // Each half hangs on one curve.
   curves.unlink(7, 10);
   EXPECT_EQ(curves.held(), std::vector<int>({3, 0, 0, 0, 3, 0}));
+  // That is enough where nothing else is possible.
+  curves.is_ambiguous = false;
+  EXPECT_EQ(curves.held(), std::vector<int>({3, 3, 3, 3, 3, 0}));
+  curves.is_crossed[12] = 0;
+  EXPECT_EQ(curves.held(), std::vector<int>({3, 3, 3, 0, 0, 0}));
 }
 
 TEST(HeldPieces, TwoLinksToOneCurveAreOne) {
@@ -75,6 +83,45 @@ TEST(HeldPieces, TwoLinksToOneCurveAreOne) {
   curves.link(0, 3);
   curves.is_crossed[1] = 1;
   EXPECT_EQ(curves.held(), std::vector<int>({3, 0, 0}));
+}
+
+/// Curves of one piece with lines 10, 11, ... of projector 0, and as cheap those of projector 1
+/// eight below.
+LabelledPieces two_readings(int count) {
+  LabelledPieces pieces;
+  for (int c = 0; c < count; ++c) {
+    CurvePiece piece;
+    piece.curve = c;
+    pieces.graph.pieces.push_back(piece);
+    std::vector<PieceLabel> labels(2);
+    labels[0].pattern = {0, 0};
+    labels[0].line = 10 + c;
+    labels[1].pattern = {1, 0};
+    labels[1].line = 2 + c;
+    pieces.labels.push_back(labels);
+  }
+  return pieces;
+}
+
+TEST(AmbiguousGroup, CouldShowOtherLinesAllAsFarAway) {
+  LabelledPieces pieces = two_readings(4);
+  const std::vector<Decision> decisions(4, Decision{0, 8.F});
+  const std::vector<int> group = {0, 1, 2, 3};
+  EXPECT_TRUE(is_ambiguous_group(pieces, decisions, group));
+  pieces.labels[2][1].cost = 3;  // about a wrong colour
+  EXPECT_FALSE(is_ambiguous_group(pieces, decisions, group));
+  pieces.labels[2][1].cost = 1;
+  EXPECT_TRUE(is_ambiguous_group(pieces, decisions, group));
+  pieces.labels[3][1].line = 6;  // not as far away as the others
+  EXPECT_FALSE(is_ambiguous_group(pieces, decisions, group));
+  pieces.labels[3].pop_back();
+  EXPECT_FALSE(is_ambiguous_group(pieces, decisions, group));
+}
+
+TEST(AmbiguousGroup, HasMoreLinesThanACodeWord) {
+  const LabelledPieces pieces = two_readings(3);
+  const std::vector<Decision> decisions(3, Decision{0, 8.F});
+  EXPECT_FALSE(is_ambiguous_group(pieces, decisions, std::vector<int>{0, 1, 2}));
 }
 
 }  // namespace
