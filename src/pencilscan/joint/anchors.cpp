@@ -57,10 +57,9 @@ std::vector<char> held_pieces(const PieceGraph& graph, const std::vector<std::ve
 }
 
 bool is_ambiguous_group(const LabelledPieces& pieces, const std::vector<Decision>& decisions,
-                        std::span<const int> group) {
+                        const JointOptions& options, std::span<const int> group) {
   constexpr std::size_t kWord = 3;  // lines of a code word of the paper; fewer have no code
-  constexpr float kMargin = 2;      // half of what one wrong colour costs
-  constexpr float kMissing = 4;     // of a label that a piece does not have: as a wrong colour
+  const auto wrong_color = static_cast<float>(options.max_color_cost);
   const auto labels_of = [&](int p) -> const std::vector<PieceLabel>& {
     return pieces.labels[static_cast<std::size_t>(p)];
   };
@@ -80,9 +79,9 @@ bool is_ambiguous_group(const LabelledPieces& pieces, const std::vector<Decision
           std::find_if(labels_of(p).begin(), labels_of(p).end(), [&](const PieceLabel& label) {
             return label.pattern == other.pattern && label.line == own(p).line + apart;
           });
-      more += found == labels_of(p).end() ? kMissing : found->cost - own(p).cost;
+      more += found == labels_of(p).end() ? wrong_color : found->cost - own(p).cost;
     }
-    if (more < kMargin) return true;
+    if (more < 0.5F * wrong_color) return true;
   }
   return false;
 }
@@ -119,9 +118,10 @@ void leave_unanchored(const LabelledPieces& pieces, std::span<const NextPiece> b
     if (la == nullptr || lb == nullptr || crossing_cost(*la, *lb, x) >= 0) continue;
     is_crossed[static_cast<std::size_t>(x.a)] = is_crossed[static_cast<std::size_t>(x.b)] = 1;
   }
-  const std::vector<char> is_held = held_pieces(
-      pieces.graph, linked, std::move(is_crossed),
-      [&](std::span<const int> group) { return is_ambiguous_group(pieces, decisions, group); });
+  const std::vector<char> is_held =
+      held_pieces(pieces.graph, linked, std::move(is_crossed), [&](std::span<const int> group) {
+        return is_ambiguous_group(pieces, decisions, options, group);
+      });
   for (std::size_t p = 0; p < decisions.size(); ++p) {
     if (is_held[p] == 0) decisions[p].margin -= kPerNeighbor * static_cast<float>(neighbors[p]);
   }

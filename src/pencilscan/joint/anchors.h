@@ -25,7 +25,7 @@ namespace pencilscan {
 /// of fewer say nothing.
 [[nodiscard]] bool is_ambiguous_group(const LabelledPieces& pieces,
                                       const std::vector<Decision>& decisions,
-                                      std::span<const int> group);
+                                      const JointOptions& options, std::span<const int> group);
 
 /// Pieces side by side vouch for each other, also for the lines of another projector. So what
 /// neighbours (`beside`: next_pieces) said does not count for pieces that no crossings hold: it is

@@ -107,21 +107,21 @@ TEST(AmbiguousGroup, CouldShowOtherLinesAllAsFarAway) {
   LabelledPieces pieces = two_readings(4);
   const std::vector<Decision> decisions(4, Decision{0, 8.F});
   const std::vector<int> group = {0, 1, 2, 3};
-  EXPECT_TRUE(is_ambiguous_group(pieces, decisions, group));
+  EXPECT_TRUE(is_ambiguous_group(pieces, decisions, {}, group));
   pieces.labels[2][1].cost = 3;  // about a wrong colour
-  EXPECT_FALSE(is_ambiguous_group(pieces, decisions, group));
+  EXPECT_FALSE(is_ambiguous_group(pieces, decisions, {}, group));
   pieces.labels[2][1].cost = 1;
-  EXPECT_TRUE(is_ambiguous_group(pieces, decisions, group));
+  EXPECT_TRUE(is_ambiguous_group(pieces, decisions, {}, group));
   pieces.labels[3][1].line = 6;  // not as far away as the others
-  EXPECT_FALSE(is_ambiguous_group(pieces, decisions, group));
+  EXPECT_FALSE(is_ambiguous_group(pieces, decisions, {}, group));
   pieces.labels[3].pop_back();
-  EXPECT_FALSE(is_ambiguous_group(pieces, decisions, group));
+  EXPECT_FALSE(is_ambiguous_group(pieces, decisions, {}, group));
 }
 
 TEST(AmbiguousGroup, HasMoreLinesThanACodeWord) {
   const LabelledPieces pieces = two_readings(3);
   const std::vector<Decision> decisions(3, Decision{0, 8.F});
-  EXPECT_FALSE(is_ambiguous_group(pieces, decisions, std::vector<int>{0, 1, 2}));
+  EXPECT_FALSE(is_ambiguous_group(pieces, decisions, {}, std::vector<int>{0, 1, 2}));
 }
 
 }  // namespace

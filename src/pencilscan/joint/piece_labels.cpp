@@ -4,7 +4,6 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
-#include <tuple>
 
 #include "pencilscan/detection/code_evidence.h"
 #include "pencilscan/joint/floor_cost.h"
@@ -26,11 +25,6 @@ std::vector<float> color_costs(const Curve& curve, const CurvePiece& piece, std:
 float slant_cost(const CurvePiece& piece, const PieceLabel& label, float w) {
   const float slope = label.q.head<2>().dot(piece.tangent) / w;
   return std::log1p(slope * slope);
-}
-
-bool before(const PieceLabel& a, const PieceLabel& b) {
-  return std::tie(a.pattern.projector, a.pattern.pattern, a.line) <
-         std::tie(b.pattern.projector, b.pattern.pattern, b.line);
 }
 
 /// Labels of one piece at a crossing, ordered by inverse depth.
@@ -122,8 +116,8 @@ std::vector<float> passed_on(const std::vector<PieceLabel>& from, const std::vec
   const float best = *std::min_element(score.begin(), score.end());
   std::size_t i = 0;
   for (std::size_t j = 0; j < to.size(); ++j) {
-    while (i < from.size() && before(from[i], to[j])) ++i;
-    if (i < from.size() && !before(to[j], from[i])) out[j] = std::min(change, score[i] - best);
+    while (i < from.size() && from[i].of() < to[j].of()) ++i;
+    if (i < from.size() && from[i].of() == to[j].of()) out[j] = std::min(change, score[i] - best);
   }
   return out;
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <span>
+#include <tuple>
 #include <vector>
 
 #include "pencilscan/joint/curve_pieces.h"
@@ -12,6 +13,18 @@
 
 namespace pencilscan {
 
+/// A line of a pattern; ordered by pattern.
+struct PatternLine {
+  PatternRef pattern;
+  int line = 0;
+
+  friend bool operator==(const PatternLine&, const PatternLine&) = default;
+  friend bool operator<(const PatternLine& a, const PatternLine& b) {
+    return std::tie(a.pattern.projector, a.pattern.pattern, a.line) <
+           std::tie(b.pattern.projector, b.pattern.pattern, b.line);
+  }
+};
+
 /// A line that a piece may show.
 struct PieceLabel {
   PatternRef pattern;
@@ -20,6 +33,7 @@ struct PieceLabel {
   float inverse_depth_per_px = 0;               ///< per projector px across the line
   float cost = 0;                               ///< negative log-likelihood without other pieces
 
+  [[nodiscard]] PatternLine of() const { return {pattern, line}; }
   /// Where it puts what the camera sees at normalised (x, y), in the camera's frame.
   [[nodiscard]] Vec3 place(const Eigen::Vector2f& at) const {
     const Eigen::Vector3f ray = at.homogeneous();

@@ -4,7 +4,9 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <tuple>
+#include <utility>
+
+#include "pencilscan/core/median.h"
 
 namespace pencilscan {
 namespace {
@@ -14,31 +16,24 @@ const PieceLabel& label_of(const LabelledPieces& pieces, const std::vector<Decis
   return pieces.labels[piece][static_cast<std::size_t>(decisions[piece].label)];
 }
 
-TiedEnergy::Line line_of(const PieceLabel& label) { return {label.pattern, label.line}; }
-
-bool is_earlier(const TiedEnergy::Line& a, const TiedEnergy::Line& b) {
-  return std::tie(a.pattern.projector, a.pattern.pattern, a.line) <
-         std::tie(b.pattern.projector, b.pattern.pattern, b.line);
-}
-
 /// All lines that some piece of a stretch may show.
-std::vector<TiedEnergy::Line> lines_of(const LabelledPieces& pieces, const Stretch& stretch) {
-  std::vector<TiedEnergy::Line> lines;
+std::vector<PatternLine> lines_of(const LabelledPieces& pieces, const Stretch& stretch) {
+  std::vector<PatternLine> lines;
   for (std::size_t p = stretch.first; p <= stretch.last; ++p)
-    for (const PieceLabel& label : pieces.labels[p]) lines.push_back(line_of(label));
-  std::sort(lines.begin(), lines.end(), is_earlier);
+    for (const PieceLabel& label : pieces.labels[p]) lines.push_back(label.of());
+  std::sort(lines.begin(), lines.end());
   lines.erase(std::unique(lines.begin(), lines.end()), lines.end());
   return lines;
 }
 
 /// For each line, the index of that label of the piece; "outlier" where it has none.
 std::vector<std::size_t> labels_of_lines(const std::vector<PieceLabel>& labels,
-                                         const std::vector<TiedEnergy::Line>& lines) {
+                                         const std::vector<PatternLine>& lines) {
   std::vector<std::size_t> result;
   std::size_t k = 0;  // both are ordered
-  for (const TiedEnergy::Line& line : lines) {
-    while (k < labels.size() && is_earlier(line_of(labels[k]), line)) ++k;
-    const bool has = k < labels.size() && line_of(labels[k]) == line;
+  for (const PatternLine& line : lines) {
+    while (k < labels.size() && labels[k].of() < line) ++k;
+    const bool has = k < labels.size() && labels[k].of() == line;
     result.push_back(has ? k : labels.size());
   }
   return result;
@@ -49,9 +44,7 @@ float median_height(const GridGraph& graph, const CurvePiece& piece) {
   std::vector<float> heights;
   for (int i = piece.begin; i < piece.end; ++i)
     heights.push_back(points[static_cast<std::size_t>(i)].amplitude);
-  const auto middle = heights.begin() + static_cast<std::ptrdiff_t>(heights.size() / 2);
-  std::nth_element(heights.begin(), middle, heights.end());
-  return *middle;
+  return upper_median(std::move(heights));
 }
 
 }  // namespace
@@ -84,7 +77,7 @@ std::vector<Stretch> same_line_stretches(const LabelledPieces& pieces,
     const bool goes_on =
         !stretches.empty() && stretches.back().last + 1 == p &&
         list[p - 1].curve == list[p].curve &&
-        line_of(label_of(pieces, decisions, p - 1)) == line_of(label_of(pieces, decisions, p));
+        label_of(pieces, decisions, p - 1).of() == label_of(pieces, decisions, p).of();
     if (goes_on) {
       stretches.back().last = p;
     } else {
@@ -154,7 +147,7 @@ std::vector<float> margins_of_stretches(const LabelledPieces& pieces, const Pair
   const std::vector<float> costs = min_sum(tied.energy, rounds, damping);
   std::vector<float> margins(decisions.size(), 0.F);
   for (std::size_t s = 0; s < stretches.size(); ++s) {
-    const auto line = line_of(label_of(pieces, decisions, stretches[s].first));
+    const PatternLine line = label_of(pieces, decisions, stretches[s].first).of();
     const float* cost = costs.data() + tied.energy.first[s];
     float own = 0;
     float other = std::numeric_limits<float>::max();

@@ -32,14 +32,7 @@ struct Stretch {
 /// The energy of the pieces with each stretch as one variable, which takes a line for all its
 /// pieces. A piece that cannot show the line is an outlier then. Pieces of no stretch are left out.
 struct TiedEnergy {
-  struct Line {
-    PatternRef pattern;
-    int line = 0;
-    [[nodiscard]] bool operator==(const Line& other) const {
-      return pattern == other.pattern && line == other.line;
-    }
-  };
-  std::vector<std::vector<Line>> lines;  ///< per stretch: what its variable may be
+  std::vector<std::vector<PatternLine>> lines;  ///< per stretch: what its variable may be
   PairwiseEnergy energy;
 };
 
