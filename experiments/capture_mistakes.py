@@ -31,11 +31,12 @@ def heap(seed):
     return shapes.joined(parts)
 
 
-def rendered(program, folder):
-    """The right captures, and the devices as their user describes them."""
+def rendered(program, folder, scale):
+    """The right captures, and the devices as their user describes them; `scale`: of the pixels' number along an axis."""
+    sizes = {"camera-width": 640, "camera-height": 480, "camera-focal-px": 1150,
+             "projector-width": 640, "projector-height": 512, "projector-focal-px": 1215}
     program("rig", "ring", "--overwrite", "--out", folder / "ring.json", "--cameras", 3, "--projectors", 3, "--arc-deg", 100,
-            "--camera-width", 640, "--camera-height", 480, "--camera-focal-px", 1150,
-            "--projector-width", 640, "--projector-height", 512, "--projector-focal-px", 1215)
+            *[word for name, size in sizes.items() for word in ("--" + name, int(scale * size))])
     for capture in range(3):
         common.write_ply(folder / "heap.ply", *heap(SEED + capture))
         program("simulate", "--overwrite", "--rig", folder / "ring.json", "--mesh", folder / "heap.ply", "--out",
@@ -150,7 +151,7 @@ def main():
     args = common.arguments("capture_mistakes", __doc__)
     program = common.Program(args)
     rows = common.Rows(args.out / "results.csv", ["mistake"], ["verdict", "reason"], args.resume)
-    devices = rendered(program, args.out)
+    devices = rendered(program, args.out, 0.5 if args.small else 1)
     for name, spoil in MISTAKES.items():
         if rows.has(mistake=name) or (args.small and name not in SMALL):
             continue

@@ -58,7 +58,7 @@ std::vector<Track> mirrored_by(const Rig& rig, std::vector<Track> tracks, std::s
 
 TEST(FindMirrored, ADeviceThatMirrorsItsPictureIsNamedAndARightOneIsNot) {
   const Rig truth = ring(3, 3);
-  const auto tracks = tracks_of(truth, {.count = 500});
+  const auto tracks = tracks_of(truth, {.count = 250});
   const auto right = input_of(truth, tracks, true);
   EXPECT_FALSE(find_mirrored(right, calibrate(right, kQuick), kQuick));
   for (const std::size_t device : {1U, 4U}) {
@@ -86,7 +86,7 @@ TEST(Calibrate, KnownCamerasAreKeptAndGiveAPreciseRig) {
 
 TEST(Calibrate, FocalLengthsThatAreFivePercentOffAreOnlyAStart) {
   const Rig truth = ring(3, 3);
-  CalibrationInput input = input_of(truth, tracks_of(truth, {.count = 2000}), true);
+  CalibrationInput input = input_of(truth, tracks_of(truth, {.count = 1000}), true);
   for (Camera& camera : input.rig.cameras) {
     camera.K(0, 0) *= 1.05;
     camera.K(1, 1) *= 1.05;
@@ -150,15 +150,15 @@ std::string findings_of(const Rig& truth, const std::vector<Track>& tracks) {
 
 TEST(Verdict, SwappedFoldersAreNamed) {
   const Rig truth = ring(4, 4);
-  const auto tracks = with_exchanged(tracks_of(truth, {.count = 2500}), {1, 5}, {2, 5});
+  const auto tracks = with_exchanged(tracks_of(truth, {.count = 1500}), {1, 5}, {2, 5});
   EXPECT_THAT(findings_of(truth, tracks),
               HasSubstr("the folders proj1/cam1 and proj1/cam2 are swapped"));
 }
 
 TEST(Verdict, FoldersSwappedInOneCaptureAreNamedWithIt) {
   const Rig truth = ring(4, 4);
-  auto tracks = tracks_of(truth, {.count = 2500});
-  auto second = tracks_of(truth, {.count = 2500, .seed = 5});
+  auto tracks = tracks_of(truth, {.count = 1500});
+  auto second = tracks_of(truth, {.count = 1500, .seed = 5});
   for (Track& track : second) track.capture = 1;
   second = with_exchanged(second, {1, 5}, {2, 5});
   tracks.insert(tracks.end(), second.begin(), second.end());

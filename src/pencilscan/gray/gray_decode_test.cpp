@@ -295,9 +295,10 @@ TEST(LocalMap, InverseLeadsBackToThePixel) {
 }
 
 TEST(ImageOrder, WrongOrdersAreNamed) {
-  const Scene scene;
-  const GrayImageSource right = images_of(scene);
   const std::size_t count = gray_code_sequence(kPanelWidth, kPanelHeight).size();
+  std::vector<cv::Mat> drawn;
+  for (std::size_t i = 0; i < count; ++i) drawn.push_back(images_of({})(i));
+  const GrayImageSource right = [&](std::size_t i) { return drawn[i]; };
   const auto explanation = [&](const GrayImageSource& source) {
     const DecodedView view =
         decode_gray_stack(make_gray_stack(kPanelWidth, kPanelHeight, true, source));
