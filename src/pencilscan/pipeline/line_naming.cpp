@@ -58,11 +58,13 @@ LineNaming name_lines(const Rig& rig, const std::vector<ColorFamily>& families,
   if (!are_enough(result.crossings)) return result;
   if (!is_off && points > kNearlyAll * static_cast<double>(telling_points(result.labeling).all()))
     return result;
-  const bool meets =
-      !is_off && result.crossings.median_px <= kAsClosely * result.crossings.expected_px;
-  if (meets &&
-      (least_named_share(result.labeling) > kMostNamed || (is_confirmed && is_confirmed())))
-    return result;
+  if (!is_off) {
+    // Two of three signs of a right rig.
+    const bool meets = result.crossings.median_px <= kAsClosely * result.crossings.expected_px;
+    const bool are_named = least_named_share(result.labeling) > kMostNamed;
+    if (meets && are_named) return result;
+    if ((meets || are_named) && is_confirmed && is_confirmed()) return result;
+  }
 
   const FrameCurves curves{families, graphs};
   RigRefinementOptions refinement;
