@@ -300,7 +300,7 @@ Labeling solve_joint(const Rig& rig, const std::vector<ColorFamily>& families,
   parallel_for(graphs.size(), [&](std::size_t g) {
     if (lacks_crossings(pieces[g].graph)) {
       ask_stretches(rig, graphs[g], pieces[g], beside[g], options, energies[g], decisions[g]);
-      leave_periodic(rig, pieces[g], decisions[g]);
+      leave_periodic(rig, pieces[g], energies[g], decisions[g]);
     } else {
       leave_unanchored(pieces[g], beside[g], options, decisions[g]);
     }

@@ -2,11 +2,38 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <tuple>
 #include <utility>
 
 #include "pencilscan/core/parallel.h"
 
 namespace pencilscan {
+namespace {
+
+/// Lines that a camera's ray passes per length where it meets the middle of the volume; 0 where the
+/// projector does not light that.
+double lines_along_ray(const Rig& rig, const Camera& camera, PatternRef ref) {
+  const Vec3 middle = working_volume(rig).center;
+  const double step = footprint(rig);
+  const Projector& projector = rig.projector(ref.projector);
+  const LinePattern& pattern = rig.pattern(ref);
+  const auto here = projector.project(middle);
+  const auto there = projector.project(middle + step * (middle - camera.center()).normalized());
+  if (!here || !there) return 0;
+  const auto axis = static_cast<Eigen::Index>(pattern.axis);
+  return std::abs(pattern.coordinate((*there)[axis]) - pattern.coordinate((*here)[axis])) / step;
+}
+
+/// A camera that sees the lines of a pattern from within their own planes sees each of them in one
+/// place, however far away the surface is: any line that a piece might be is there. It tells
+/// something if it sees the piece pass at least one line while the piece passes a whole period.
+bool tells_lines_apart(const Rig& rig, const Camera& own, const Camera& other, PatternRef ref) {
+  return rig.pattern(ref).period() * lines_along_ray(rig, other, ref) >=
+         lines_along_ray(rig, own, ref);
+}
+
+}  // namespace
 
 OtherViews::OtherViews(const Rig& rig, std::span<const GridGraph> graphs,
                        std::span<const LabelledPieces> pieces)
@@ -77,6 +104,13 @@ std::vector<OtherViews::Sighting> OtherViews::look_from_others(std::size_t g,
       if (graphs_[k].camera == c) others.push_back(k);
     }
   }
+  std::map<std::tuple<std::size_t, int, int>, bool> telling;
+  const auto tells = [&](std::size_t o, PatternRef ref) {
+    const auto [known, is_new] = telling.try_emplace({o, ref.projector, ref.pattern}, false);
+    if (is_new)
+      known->second = tells_lines_apart(rig_, camera, rig_.camera(graphs_[o].camera), ref);
+    return known->second;
+  };
   constexpr float kPixels = 3;
   const float ahead = kPixels / static_cast<float>(camera.focal_px());
   std::vector<Sighting> sightings;
@@ -88,6 +122,7 @@ std::vector<OtherViews::Sighting> OtherViews::look_from_others(std::size_t g,
       const Vec3 here = world_from_camera * label.place(piece.middle);
       const Vec3 next = world_from_camera * label.place(piece.middle + ahead * piece.tangent);
       for (const std::size_t o : others) {
+        if (!tells(o, label.pattern)) continue;
         const Camera& other = rig_.camera(graphs_[o].camera);
         const auto a = other.project(here);
         if (!a || !other.contains(*a)) continue;

@@ -193,29 +193,32 @@ std::vector<char> faint_pieces(const GridGraph& graph, const LabelledPieces& pie
   return faint;
 }
 
-void leave_periodic(const Rig& rig, const LabelledPieces& pieces,
+void leave_periodic(const Rig& rig, const LabelledPieces& pieces, const PairwiseEnergy& energy,
                     std::vector<Decision>& decisions) {
-  for (const auto& [first, last] : same_line_stretches(pieces, decisions)) {
-    const PieceLabel& best = label_of(pieces, decisions, first);
+  for (const Stretch& stretch : same_line_stretches(pieces, decisions)) {
+    const PatternLine best = label_of(pieces, decisions, stretch.first).of();
     const int period = rig.pattern(best.pattern).period();
-    const auto is_possible = [&, first = first, last = last](int line) {
-      for (std::size_t p = first; p <= last; ++p) {
-        const auto& labels = pieces.labels[p];
-        if (std::none_of(labels.begin(), labels.end(), [&](const PieceLabel& label) {
-              return label.pattern == best.pattern && label.line == line;
-            }))
-          return false;
+    const std::vector<PatternLine> lines = lines_of(pieces, stretch);
+    std::vector<float> costs(lines.size(), 0.F);
+    std::vector<char> is_possible(lines.size(), 1);
+    for (std::size_t p = stretch.first; p <= stretch.last; ++p) {
+      const std::vector<std::size_t> labels = labels_of_lines(pieces.labels[p], lines);
+      const float* unary = energy.unary.data() + energy.first[p];
+      for (std::size_t l = 0; l < lines.size(); ++l) {
+        costs[l] += unary[labels[l]];
+        if (labels[l] == pieces.labels[p].size()) is_possible[l] = 0;
       }
-      return true;
-    };
-    const bool is_ambiguous = std::any_of(pieces.labels[first].begin(), pieces.labels[first].end(),
-                                          [&](const PieceLabel& other) {
-                                            const int apart = std::abs(other.line - best.line);
-                                            return other.pattern == best.pattern && apart > 0 &&
-                                                   apart % period == 0 && is_possible(other.line);
-                                          });
-    if (!is_ambiguous) continue;
-    for (std::size_t p = first; p <= last; ++p) decisions[p].margin = 0;
+    }
+    const auto own = static_cast<std::size_t>(
+        std::lower_bound(lines.begin(), lines.end(), best) - lines.begin());
+    float margin = std::numeric_limits<float>::max();
+    for (std::size_t l = 0; l < lines.size(); ++l) {
+      const int apart = std::abs(lines[l].line - best.line);
+      if (l == own || !(lines[l].pattern == best.pattern) || apart % period != 0) continue;
+      if (is_possible[l] != 0) margin = std::min(margin, costs[l] - costs[own]);
+    }
+    for (std::size_t p = stretch.first; p <= stretch.last; ++p)
+      decisions[p].margin = std::min(decisions[p].margin, std::max(0.F, margin));
   }
 }
 

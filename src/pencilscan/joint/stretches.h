@@ -53,8 +53,10 @@ struct TiedEnergy {
                                              std::span<const NextPiece> beside,
                                              const std::vector<Decision>& decisions);
 
-/// Without crossings only the code tells lines apart: a stretch of a curve is ambiguous (margin 0)
-/// where a line a whole period away is possible too, all along it.
-void leave_periodic(const Rig& rig, const LabelledPieces& pieces, std::vector<Decision>& decisions);
+/// Without crossings only the code and other views tell lines apart: where a line a whole period
+/// away is possible too, all along a stretch, the margin is what other views and darkness say
+/// against it. One camera alone leaves such a stretch ambiguous (margin 0).
+void leave_periodic(const Rig& rig, const LabelledPieces& pieces, const PairwiseEnergy& energy,
+                    std::vector<Decision>& decisions);
 
 }  // namespace pencilscan
