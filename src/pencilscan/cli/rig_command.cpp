@@ -165,6 +165,7 @@ Json to_json(const CoverageCheck& coverage) {
           {"usable", coverage.usable},
           {"grid", coverage.grid},
           {"skew_grid", coverage.skew_grid},
+          {"two_views", coverage.two_views},
           {"ambiguous", coverage.ambiguous}};
 }
 
@@ -259,6 +260,7 @@ void print_coverage(const CoverageCheck& coverage) {
   row("usable", coverage.usable, "by some pair, with depth and lines far enough apart");
   row("grid", coverage.grid, "where a camera sees usable lines of two projectors cross");
   row("skew_grid", coverage.skew_grid, "the same, of projectors whose lines have skew axes");
+  row("two_views", coverage.two_views, "where two cameras see the same usable lines");
   row("ambiguous", coverage.ambiguous, "lit by lines of one colour that can be taken for others");
   std::printf("\n");
   std::fflush(stdout);

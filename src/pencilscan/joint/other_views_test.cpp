@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <set>
@@ -24,8 +25,10 @@ using sample::random_beliefs;
 /// Stretches of lines on a plane before four cameras, one of them on the plane's other side, each
 /// seen by some of them, with labels at the plane's depth and off it.
 struct SeenPlane {
-  explicit SeenPlane(std::uint64_t seed) {
+  explicit SeenPlane(std::uint64_t seed, const Camera* second = nullptr) {
     rig = sample::small_rig(240, 200, 70);
+    if (second != nullptr) rig.cameras[1] = *second;
+    for (Projector& projector : rig.projectors) projector.patterns.push_back(projector.patterns[0]);
     rig.cameras.push_back(sample::device_at<Camera>({540, 30, 160}, "cam2", 240, 200, 850));
     rig.cameras.push_back(sample::device_at<Camera>({-560, 0, 80}, "cam3", 240, 200, 900));
     Random random(seed);
@@ -184,6 +187,30 @@ TEST(OtherViews, CostIsThatOfAPlainLoopOverAllPoints) {
     EXPECT_GT(scene.hits, 300);
     EXPECT_GT(scene.misses, 300);
   }
+}
+
+TEST(OtherViews, ACameraWithinTheLinesOwnPlanesSaysNothingOfThem) {
+  const Rig rig = sample::small_rig(240, 200, 70);
+  const Projector& projector = rig.projectors[0];
+  ASSERT_EQ(projector.patterns[0].axis, Axis::kColumn);
+  // The planes of its vertical lines meet in this axis.
+  const Vec3 axis = projector.device_from_world.rotation.row(1).transpose();
+  const Camera below =
+      sample::device_at<Camera>(projector.center() + 150 * axis, "cam1", 240, 200, 900);
+  SeenPlane scene(5, &below);
+  scene.graphs.resize(2);
+  scene.pieces.resize(2);
+  const OtherViews views(scene.rig, scene.graphs, scene.pieces);
+  const auto costs = views.costs(0, std::vector<PieceBeliefs>(2));
+  std::array<int, 2> told{};
+  for (std::size_t p = 0; p < costs.size(); ++p) {
+    for (std::size_t k = 0; k < costs[p].size(); ++k) {
+      const PieceLabel& label = scene.pieces[0].labels[p][k];
+      told[static_cast<std::size_t>(label.pattern.projector)] += costs[p][k] != 0 ? 1 : 0;
+    }
+  }
+  EXPECT_EQ(told[0], 0);
+  EXPECT_GT(told[1], 20);
 }
 
 TEST(OtherViews, LabelsThatStayCostTheSameOnceOthersAreForgotten) {

@@ -209,8 +209,8 @@ void leave_periodic(const Rig& rig, const LabelledPieces& pieces, const Pairwise
         if (labels[l] == pieces.labels[p].size()) is_possible[l] = 0;
       }
     }
-    const auto own = static_cast<std::size_t>(
-        std::lower_bound(lines.begin(), lines.end(), best) - lines.begin());
+    const auto own = static_cast<std::size_t>(std::lower_bound(lines.begin(), lines.end(), best) -
+                                              lines.begin());
     float margin = std::numeric_limits<float>::max();
     for (std::size_t l = 0; l < lines.size(); ++l) {
       const int apart = std::abs(lines[l].line - best.line);

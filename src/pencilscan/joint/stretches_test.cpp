@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include "pencilscan/core/random.h"
@@ -218,6 +219,60 @@ TEST(Stretches, AreFaintBesideALineThatIsThreeTimesAsBright) {
   EXPECT_EQ(faint[2], 0);
   beside[0] = {2, 9};
   EXPECT_EQ(faint_pieces(graph, scene.pieces, beside, scene.decisions)[2], 1);
+}
+
+/// One curve of two pieces that may be lines 1, 2 and 9 of a code of eight; it was named 1.
+struct Periodic {
+  Periodic() {
+    rig.projectors.emplace_back();
+    rig.projectors[0].patterns.emplace_back();
+    for (int k = 0; k < 2; ++k) {
+      CurvePiece piece;
+      piece.begin = 10 * k;
+      piece.end = 10 * (k + 1);
+      pieces.graph.pieces.push_back(piece);
+      auto& labels = pieces.labels.emplace_back();
+      for (const int line : {1, 2, 9}) {
+        labels.emplace_back();
+        labels.back().pattern = {0, 0};
+        labels.back().line = line;
+      }
+      decisions.push_back({0, 5.F});
+    }
+    energy.first = {0, 4, 8};
+    energy.unary.assign(8, 0.F);
+  }
+
+  Rig rig;
+  LabelledPieces pieces;
+  PairwiseEnergy energy;
+  std::vector<Decision> decisions;
+};
+
+TEST(LeavePeriodic, OnlyOtherViewsTellALineFromOneAPeriodAway) {
+  Periodic scene;
+  auto decisions = scene.decisions;
+  leave_periodic(scene.rig, scene.pieces, scene.energy, decisions);
+  for (const Decision& d : decisions) EXPECT_EQ(d.margin, 0);
+
+  scene.energy.unary = {-1, 0, 2, 0, -1, 0, 0.5F, 0};  // lines 1, 2, 9 and none, twice
+  decisions = scene.decisions;
+  leave_periodic(scene.rig, scene.pieces, scene.energy, decisions);
+  for (const Decision& d : decisions) EXPECT_FLOAT_EQ(d.margin, 4.5F);
+
+  std::swap(scene.energy.unary[0], scene.energy.unary[2]);  // the first piece is rather line 9
+  decisions = scene.decisions;
+  leave_periodic(scene.rig, scene.pieces, scene.energy, decisions);
+  for (const Decision& d : decisions) EXPECT_EQ(d.margin, 0);
+}
+
+TEST(LeavePeriodic, ALineThatOnePieceCannotBeIsNoQuestion) {
+  Periodic scene;
+  scene.pieces.labels[1].pop_back();
+  scene.energy.first = {0, 4, 7};
+  auto decisions = scene.decisions;
+  leave_periodic(scene.rig, scene.pieces, scene.energy, decisions);
+  for (const Decision& d : decisions) EXPECT_EQ(d.margin, 5);
 }
 
 }  // namespace

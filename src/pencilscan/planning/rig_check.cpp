@@ -280,11 +280,19 @@ ViewFlags cross_families(const std::vector<Observation>& observed,
   return flags;
 }
 
+/// Do two cameras see the lines of one family there, and can use them?
+bool is_in_two_views(const SampleView& view, std::size_t family_count) {
+  std::vector<int> cameras(family_count, 0);
+  for (const auto& observed : view.observed)
+    for (const Observation& o : observed) cameras[o.family] += o.usable ? 1 : 0;
+  return std::any_of(cameras.begin(), cameras.end(), [](int count) { return count >= 2; });
+}
+
 CoverageCheck check_coverage(const std::vector<SampleView>& views,
                              const std::vector<AxesCheck>& axes, std::size_t family_count,
                              const RigCheckOptions& options) {
   std::size_t seen = 0, lit = 0, both = 0, usable = 0, grid = 0, skew_grid = 0;
-  std::size_t lit_views = 0, ambiguous_views = 0;
+  std::size_t two_views = 0, lit_views = 0, ambiguous_views = 0;
   for (const SampleView& view : views) {
     bool any_both = false, any_usable = false, any_grid = false, any_skew = false;
     for (const auto& observed : view.observed) {
@@ -304,15 +312,12 @@ CoverageCheck check_coverage(const std::vector<SampleView>& views,
     usable += any_usable ? 1 : 0;
     grid += any_grid ? 1 : 0;
     skew_grid += any_skew ? 1 : 0;
+    two_views += is_in_two_views(view, family_count) ? 1 : 0;
   }
   const std::size_t n = views.size();
-  return {share(seen, n),
-          share(lit, n),
-          share(both, n),
-          share(usable, n),
-          share(grid, n),
-          share(skew_grid, n),
-          share(ambiguous_views, lit_views)};
+  return {
+      share(seen, n), share(lit, n),       share(both, n),      share(usable, n),
+      share(grid, n), share(skew_grid, n), share(two_views, n), share(ambiguous_views, lit_views)};
 }
 
 std::vector<double> view_shares(const std::vector<SampleView>& views,

@@ -74,6 +74,7 @@ struct CoverageCheck {
   double usable = 0;        ///< by some pair with enough sensitivity and spacing
   double grid = 0;          ///< some camera sees two usable families of two projectors cross
   double skew_grid = 0;     ///< the same with axes that are not coplanar (equation (6))
+  double two_views = 0;     ///< two cameras see the same usable family
   double ambiguous = 0;     ///< of (camera, sample) with light: some same-colour ambiguity
 };
 

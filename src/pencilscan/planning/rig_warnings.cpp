@@ -149,11 +149,16 @@ class Collector {
   void check_grid() {
     const double grid = of_lit(check_.coverage.grid);
     if (grid >= kEnoughGrid) return;
-    warn(grid < kTooFewGrid, "no_grid",
+    const double two_views = of_lit(check_.coverage.two_views);
+    const bool has_views = two_views >= kEnoughGrid;
+    warn(grid < kTooFewGrid && !has_views, "no_grid",
          "only " + percent(grid) +
              " of the surface that is seen and lit shows some camera two usable line sets of "
-             "different projectors that cross: crossings decide which line is which; mix "
-             "directions of lines, and let neighbouring projectors overlap");
+             "different projectors that cross: crossings decide which line is which" +
+             (has_views ? ", and where there are none, two cameras that see the same lines (" +
+                              percent(two_views) + " of it) and the code"
+                        : std::string()) +
+             "; mix directions of lines, and let neighbouring projectors overlap");
   }
 
   /// Coplanar axes among the pairs that make up the grid, and what is left without them.
