@@ -10,7 +10,9 @@ namespace pencilscan {
 
 /// The multi-view term: a label places its piece in space, and another camera should see a curve of
 /// the same family, direction and line there, unless something hides it. The other camera sees it
-/// if one of its curve points lies within 1.8 px across, 1 px along and 26 degrees.
+/// if one of its curve points lies within 1.8 px across, 1 px along and 26 degrees. Cameras count
+/// whose axes are within 105 degrees, those beyond 75 less; but not for lines that one sees from
+/// within their own planes.
 class OtherViews {
  public:
   OtherViews(const Rig& rig, std::span<const GridGraph> graphs,

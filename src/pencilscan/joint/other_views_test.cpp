@@ -29,7 +29,7 @@ struct SeenPlane {
     rig = sample::small_rig(240, 200, 70);
     if (second != nullptr) rig.cameras[1] = *second;
     for (Projector& projector : rig.projectors) projector.patterns.push_back(projector.patterns[0]);
-    rig.cameras.push_back(sample::device_at<Camera>({540, 30, 160}, "cam2", 240, 200, 850));
+    rig.cameras.push_back(sample::device_at<Camera>({180, 560, 100}, "cam2", 240, 200, 850));
     rig.cameras.push_back(sample::device_at<Camera>({-560, 0, 80}, "cam3", 240, 200, 900));
     Random random(seed);
     for (int c = 0; c < 4; ++c) {
@@ -114,9 +114,10 @@ struct SeenPlane {
     return found;
   }
 
-  /// The cost of a label by the cameras that look the same way: a true label is seen with
-  /// probability 0.7, a wrong one by chance with 0.2; what is seen has the same line with
-  /// probability 0.85, or by chance with 0.03.
+  /// The cost of a label by the cameras that see its side: a true label is seen with probability
+  /// 0.7, or 0.35 by the third camera from the first and back, which stand wide apart, a wrong one
+  /// by chance with 0.2; what is seen has the same line with probability 0.85, or by chance with
+  /// 0.03.
   [[nodiscard]] double cost(std::size_t g, std::size_t p, const PieceLabel& label,
                             const std::vector<PieceBeliefs>& beliefs) {
     const Camera& camera = rig.cameras[g];
@@ -128,6 +129,7 @@ struct SeenPlane {
     double sum = 0;
     for (std::size_t o = 0; o < 3; ++o) {  // the fourth sees the other side, and is seen by none
       if (o == g || g == 3) continue;
+      const double if_true = g != 1 && o != 1 ? 0.35 : 0.7;
       const auto at = rig.cameras[o].project(world(piece.middle));
       const auto ahead = rig.cameras[o].project(
           world(piece.middle + 3 / static_cast<float>(camera.K(0, 0)) * piece.tangent));
@@ -135,13 +137,13 @@ struct SeenPlane {
       const int hit =
           piece_at(o, curve_of(graphs[g], piece).family, *at, (*ahead - *at).normalized());
       if (hit < 0) {
-        sum -= std::log(0.3 / 0.8);
+        sum -= std::log((1 - if_true) / 0.8);
         ++misses;
         continue;
       }
       ++hits;
       if (beliefs[o].empty()) {
-        sum -= std::log(0.7 / 0.2);
+        sum -= std::log(if_true / 0.2);
         continue;
       }
       double same = 0;
