@@ -27,7 +27,7 @@ double lines_along_ray(const Rig& rig, const Camera& camera, PatternRef ref) {
 
 /// A camera that sees the lines of a pattern from within their own planes sees each of them in one
 /// place, however far away the surface is: any line that a piece might be is there. It tells
-/// something if it sees the piece pass at least one line while the piece passes a whole period.
+/// them apart if it sees the piece pass at least one line while the piece passes a whole period.
 bool tells_lines_apart(const Rig& rig, const Camera& own, const Camera& other, PatternRef ref) {
   return rig.pattern(ref).period() * lines_along_ray(rig, other, ref) >=
          lines_along_ray(rig, own, ref);
@@ -39,11 +39,13 @@ bool tells_lines_apart(const Rig& rig, const Camera& own, const Camera& other, P
 /// surest labels .67 are seen from 60 degrees apart and .43 from 90 (bunny and hand before six and
 /// six, bunny before four and four); of .25, .3, .35 and .43 from there, .35 left the fewest wrong
 /// names of six objects before four and four.
+constexpr float kSeenNear = 0.7F;
+constexpr float kSeenFar = 0.35F;
 float seen_if_true(const Camera& a, const Camera& b) {
   constexpr double kNear = 0.25;  // cosine of the angle between the axes: 75 degrees
   constexpr double kFar = -0.25;  // 105 degrees
   const double cosine = a.forward().dot(b.forward());
-  return cosine > kNear ? 0.7F : cosine > kFar ? 0.35F : 0.F;
+  return cosine > kNear ? kSeenNear : cosine > kFar ? kSeenFar : 0.F;
 }
 
 }  // namespace
@@ -106,15 +108,25 @@ int OtherViews::find(const FamilyView& view, const Eigen::Vector2f& position,
   return piece;
 }
 
+std::vector<std::size_t> OtherViews::views_of(std::size_t g) const {
+  std::vector<std::size_t> near;
+  std::vector<std::size_t> far;
+  const Camera& camera = rig_.camera(graphs_[g].camera);
+  for (std::size_t k = 0; k < graphs_.size(); ++k) {
+    const Camera& other = rig_.camera(graphs_[k].camera);
+    if (k == g || other.sees_texture_only) continue;
+    const float seen = seen_if_true(camera, other);
+    if (seen == kSeenNear) near.push_back(k);
+    if (seen == kSeenFar) far.push_back(k);
+  }
+  return near.empty() ? far : near;
+}
+
 std::vector<OtherViews::Sighting> OtherViews::look_from_others(std::size_t g,
                                                                std::span<const View> views) const {
   const Camera& camera = rig_.camera(graphs_[g].camera);
   const RigidTransform world_from_camera = camera.device_from_world.inverse();
-  std::vector<std::size_t> others;
-  for (std::size_t k = 0; k < graphs_.size(); ++k) {
-    const Camera& other = rig_.camera(graphs_[k].camera);
-    if (k != g && !other.sees_texture_only && seen_if_true(camera, other) > 0) others.push_back(k);
-  }
+  const std::vector<std::size_t> others = views_of(g);
   std::map<std::tuple<std::size_t, int, int>, bool> telling;
   const auto tells = [&](std::size_t o, PatternRef ref) {
     const auto [known, is_new] = telling.try_emplace({o, ref.projector, ref.pattern}, false);
@@ -133,7 +145,6 @@ std::vector<OtherViews::Sighting> OtherViews::look_from_others(std::size_t g,
       const Vec3 here = world_from_camera * label.place(piece.middle);
       const Vec3 next = world_from_camera * label.place(piece.middle + ahead * piece.tangent);
       for (const std::size_t o : others) {
-        if (!tells(o, label.pattern)) continue;
         const Camera& other = rig_.camera(graphs_[o].camera);
         const auto a = other.project(here);
         if (!a || !other.contains(*a)) continue;
@@ -152,6 +163,7 @@ std::vector<OtherViews::Sighting> OtherViews::look_from_others(std::size_t g,
               sighting.same = static_cast<int>(j);
           }
         }
+        sighting.tells = tells(o, label.pattern);
         sightings.push_back(sighting);
       }
     }
@@ -173,8 +185,10 @@ void OtherViews::forget(std::span<const std::vector<std::vector<int>>> new_index
 
 std::vector<std::vector<float>> OtherViews::costs(std::size_t g,
                                                   std::span<const PieceBeliefs> beliefs) const {
-  // A wrong label is hit by chance.
+  // A wrong label is hit by chance. Where any line is there, it is hit unless the place is off the
+  // object or hidden.
   constexpr float kHitByChance = 0.2F;
+  constexpr float kHitAnyway = 0.7F;  // as often as a true one, times this
   constexpr float kSameIfTrue = 0.85F;
   constexpr float kSameByChance = 0.03F;
   std::vector<float> hit_if_true;  // by graph
@@ -186,10 +200,11 @@ std::vector<std::vector<float>> OtherViews::costs(std::size_t g,
     float& cost = result[static_cast<std::size_t>(s.piece)][static_cast<std::size_t>(s.label)];
     const PieceBeliefs& their = beliefs[static_cast<std::size_t>(s.graph)];
     const float if_true = hit_if_true[static_cast<std::size_t>(s.graph)];
+    const float by_chance = s.tells ? kHitByChance : kHitAnyway * if_true;
     if (s.hit < 0) {
-      cost -= std::log((1 - if_true) / (1 - kHitByChance));
-    } else if (their.empty()) {
-      cost -= std::log(if_true / kHitByChance);
+      cost -= std::log((1 - if_true) / (1 - by_chance));
+    } else if (their.empty() || !s.tells) {
+      cost -= std::log(if_true / by_chance);
     } else {
       const float same =
           s.same < 0 ? 0.F

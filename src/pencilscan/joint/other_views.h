@@ -11,8 +11,8 @@ namespace pencilscan {
 /// The multi-view term: a label places its piece in space, and another camera should see a curve of
 /// the same family, direction and line there, unless something hides it. The other camera sees it
 /// if one of its curve points lies within 1.8 px across, 1 px along and 26 degrees. Cameras count
-/// whose axes are within 105 degrees, those beyond 75 less; but not for lines that one sees from
-/// within their own planes.
+/// whose axes are within 75 degrees, or, where there is none, within 105, and those less. Of lines
+/// that a camera sees from within their own planes it tells only whether one is there.
 class OtherViews {
  public:
   OtherViews(const Rig& rig, std::span<const GridGraph> graphs,
@@ -32,9 +32,10 @@ class OtherViews {
   struct Sighting {
     int piece = 0;
     int label = 0;
-    int graph = 0;  ///< of the other camera
-    int hit = -1;   ///< piece there; -1: nothing where it should be
-    int same = -1;  ///< its label with the same line; -1: it has none
+    int graph = 0;      ///< of the other camera
+    int hit = -1;       ///< piece there; -1: nothing where it should be
+    int same = -1;      ///< its label with the same line; -1: it has none
+    bool tells = true;  ///< lines apart: else any line would be there
   };
 
   struct Entry {
@@ -55,6 +56,8 @@ class OtherViews {
                                 const Eigen::Vector2f& tangent);
 
   [[nodiscard]] View make_view(std::size_t g) const;
+  /// The graphs of the cameras that have a say in what graphs[g] shows.
+  [[nodiscard]] std::vector<std::size_t> views_of(std::size_t g) const;
   [[nodiscard]] std::vector<Sighting> look_from_others(std::size_t g,
                                                        std::span<const View> views) const;
 

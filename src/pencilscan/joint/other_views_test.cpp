@@ -115,8 +115,8 @@ struct SeenPlane {
   }
 
   /// The cost of a label by the cameras that see its side: a true label is seen with probability
-  /// 0.7, or 0.35 by the third camera from the first and back, which stand wide apart, a wrong one
-  /// by chance with 0.2; what is seen has the same line with probability 0.85, or by chance with
+  /// 0.7, a wrong one by chance with 0.2 (the first and the third stand wide apart, and each has
+  /// the second beside it); what is seen has the same line with probability 0.85, or by chance with
   /// 0.03.
   [[nodiscard]] double cost(std::size_t g, std::size_t p, const PieceLabel& label,
                             const std::vector<PieceBeliefs>& beliefs) {
@@ -129,7 +129,8 @@ struct SeenPlane {
     double sum = 0;
     for (std::size_t o = 0; o < 3; ++o) {  // the fourth sees the other side, and is seen by none
       if (o == g || g == 3) continue;
-      const double if_true = g != 1 && o != 1 ? 0.35 : 0.7;
+      if (g != 1 && o != 1) continue;
+      const double if_true = 0.7;
       const auto at = rig.cameras[o].project(world(piece.middle));
       const auto ahead = rig.cameras[o].project(
           world(piece.middle + 3 / static_cast<float>(camera.K(0, 0)) * piece.tangent));
@@ -191,7 +192,7 @@ TEST(OtherViews, CostIsThatOfAPlainLoopOverAllPoints) {
   }
 }
 
-TEST(OtherViews, ACameraWithinTheLinesOwnPlanesSaysNothingOfThem) {
+TEST(OtherViews, ACameraWithinTheLinesOwnPlanesTellsOnlyWhetherOneIsThere) {
   const Rig rig = sample::small_rig(240, 200, 70);
   const Projector& projector = rig.projectors[0];
   ASSERT_EQ(projector.patterns[0].axis, Axis::kColumn);
@@ -203,16 +204,41 @@ TEST(OtherViews, ACameraWithinTheLinesOwnPlanesSaysNothingOfThem) {
   scene.graphs.resize(2);
   scene.pieces.resize(2);
   const OtherViews views(scene.rig, scene.graphs, scene.pieces);
+  Random random(5);
   const auto costs = views.costs(0, std::vector<PieceBeliefs>(2));
-  std::array<int, 2> told{};
+  const auto later = views.costs(0, {{{}, random_beliefs(scene.pieces[1], random)}});
+  const auto hit = static_cast<float>(-std::log(1 / 0.7));
+  const auto miss = static_cast<float>(-std::log(0.3 / (1 - 0.7 * 0.7)));
+  std::array<int, 2> changed{};
   for (std::size_t p = 0; p < costs.size(); ++p) {
     for (std::size_t k = 0; k < costs[p].size(); ++k) {
-      const PieceLabel& label = scene.pieces[0].labels[p][k];
-      told[static_cast<std::size_t>(label.pattern.projector)] += costs[p][k] != 0 ? 1 : 0;
+      const int projector = scene.pieces[0].labels[p][k].pattern.projector;
+      changed[static_cast<std::size_t>(projector)] += costs[p][k] != later[p][k] ? 1 : 0;
+      if (projector != 0) continue;
+      EXPECT_TRUE(std::abs(costs[p][k] - hit) < 1e-5F || std::abs(costs[p][k] - miss) < 1e-5F ||
+                  costs[p][k] == 0)
+          << costs[p][k];
     }
   }
-  EXPECT_EQ(told[0], 0);
-  EXPECT_GT(told[1], 20);
+  EXPECT_EQ(changed[0], 0) << "its names say nothing";
+  EXPECT_GT(changed[1], 10);
+}
+
+TEST(OtherViews, WhereNoneStandsNearACameraWideApartCountsLess) {
+  SeenPlane scene(6);
+  scene.graphs = {scene.graphs[0], scene.graphs[2]};
+  scene.pieces = {scene.pieces[0], scene.pieces[2]};
+  const OtherViews views(scene.rig, scene.graphs, scene.pieces);
+  int hits = 0;
+  int misses = 0;
+  for (const auto& of_piece : views.costs(0, std::vector<PieceBeliefs>(2))) {
+    for (const float cost : of_piece) {
+      hits += std::abs(cost + std::log(0.35F / 0.2F)) < 1e-5F ? 1 : 0;
+      misses += std::abs(cost + std::log(0.65F / 0.8F)) < 1e-5F ? 1 : 0;
+    }
+  }
+  EXPECT_GT(hits, 10);
+  EXPECT_GT(misses, 10);
 }
 
 TEST(OtherViews, LabelsThatStayCostTheSameOnceOthersAreForgotten) {
