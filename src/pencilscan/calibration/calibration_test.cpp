@@ -58,7 +58,7 @@ std::vector<Track> mirrored_by(const Rig& rig, std::vector<Track> tracks, std::s
 
 TEST(FindMirrored, ADeviceThatMirrorsItsPictureIsNamedAndARightOneIsNot) {
   const Rig truth = ring(3, 3);
-  const auto tracks = tracks_of(truth, {.count = 250});
+  const auto tracks = tracks_of(truth, {.count = 500});
   const auto right = input_of(truth, tracks, true);
   EXPECT_FALSE(find_mirrored(right, calibrate(right, kQuick), kQuick));
   for (const std::size_t device : {1U, 4U}) {

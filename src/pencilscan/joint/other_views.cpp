@@ -2,36 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
-#include <tuple>
 #include <utility>
 
 #include "pencilscan/core/parallel.h"
 
 namespace pencilscan {
 namespace {
-
-/// Lines that a camera's ray passes per length where it meets the middle of the volume; 0 where the
-/// projector does not light that.
-double lines_along_ray(const Rig& rig, const Camera& camera, PatternRef ref) {
-  const Vec3 middle = working_volume(rig).center;
-  const double step = footprint(rig);
-  const Projector& projector = rig.projector(ref.projector);
-  const LinePattern& pattern = rig.pattern(ref);
-  const auto here = projector.project(middle);
-  const auto there = projector.project(middle + step * (middle - camera.center()).normalized());
-  if (!here || !there) return 0;
-  const auto axis = static_cast<Eigen::Index>(pattern.axis);
-  return std::abs(pattern.coordinate((*there)[axis]) - pattern.coordinate((*here)[axis])) / step;
-}
-
-/// A camera that sees the lines of a pattern from within their own planes sees each of them in one
-/// place, however far away the surface is: any line that a piece might be is there. It tells
-/// them apart if it sees the piece pass at least one line while the piece passes a whole period.
-bool tells_lines_apart(const Rig& rig, const Camera& own, const Camera& other, PatternRef ref) {
-  return rig.pattern(ref).period() * lines_along_ray(rig, other, ref) >=
-         lines_along_ray(rig, own, ref);
-}
 
 /// Probability that another camera sees a curve where a true label of this camera lies, if it sees
 /// about that side of the surface at all; 0: not from there. Wide apart, much of the surface that
@@ -119,6 +95,8 @@ std::vector<std::size_t> OtherViews::views_of(std::size_t g) const {
     if (seen == kSeenNear) near.push_back(k);
     if (seen == kSeenFar) far.push_back(k);
   }
+  // Two that contradict each other would both lose their names, and nobody knows which one moved.
+  if (near.empty() && far.size() < 2) return {};
   return near.empty() ? far : near;
 }
 
@@ -127,13 +105,6 @@ std::vector<OtherViews::Sighting> OtherViews::look_from_others(std::size_t g,
   const Camera& camera = rig_.camera(graphs_[g].camera);
   const RigidTransform world_from_camera = camera.device_from_world.inverse();
   const std::vector<std::size_t> others = views_of(g);
-  std::map<std::tuple<std::size_t, int, int>, bool> telling;
-  const auto tells = [&](std::size_t o, PatternRef ref) {
-    const auto [known, is_new] = telling.try_emplace({o, ref.projector, ref.pattern}, false);
-    if (is_new)
-      known->second = tells_lines_apart(rig_, camera, rig_.camera(graphs_[o].camera), ref);
-    return known->second;
-  };
   constexpr float kPixels = 3;
   const float ahead = kPixels / static_cast<float>(camera.focal_px());
   std::vector<Sighting> sightings;
@@ -163,7 +134,6 @@ std::vector<OtherViews::Sighting> OtherViews::look_from_others(std::size_t g,
               sighting.same = static_cast<int>(j);
           }
         }
-        sighting.tells = tells(o, label.pattern);
         sightings.push_back(sighting);
       }
     }
@@ -185,10 +155,8 @@ void OtherViews::forget(std::span<const std::vector<std::vector<int>>> new_index
 
 std::vector<std::vector<float>> OtherViews::costs(std::size_t g,
                                                   std::span<const PieceBeliefs> beliefs) const {
-  // A wrong label is hit by chance. Where any line is there, it is hit unless the place is off the
-  // object or hidden.
+  // A wrong label is hit by chance.
   constexpr float kHitByChance = 0.2F;
-  constexpr float kHitAnyway = 0.7F;  // as often as a true one, times this
   constexpr float kSameIfTrue = 0.85F;
   constexpr float kSameByChance = 0.03F;
   std::vector<float> hit_if_true;  // by graph
@@ -200,11 +168,10 @@ std::vector<std::vector<float>> OtherViews::costs(std::size_t g,
     float& cost = result[static_cast<std::size_t>(s.piece)][static_cast<std::size_t>(s.label)];
     const PieceBeliefs& their = beliefs[static_cast<std::size_t>(s.graph)];
     const float if_true = hit_if_true[static_cast<std::size_t>(s.graph)];
-    const float by_chance = s.tells ? kHitByChance : kHitAnyway * if_true;
     if (s.hit < 0) {
-      cost -= std::log((1 - if_true) / (1 - by_chance));
-    } else if (their.empty() || !s.tells) {
-      cost -= std::log(if_true / by_chance);
+      cost -= std::log((1 - if_true) / (1 - kHitByChance));
+    } else if (their.empty()) {
+      cost -= std::log(if_true / kHitByChance);
     } else {
       const float same =
           s.same < 0 ? 0.F

@@ -11,8 +11,8 @@ namespace pencilscan {
 /// The multi-view term: a label places its piece in space, and another camera should see a curve of
 /// the same family, direction and line there, unless something hides it. The other camera sees it
 /// if one of its curve points lies within 1.8 px across, 1 px along and 26 degrees. Cameras count
-/// whose axes are within 75 degrees, or, where there is none, within 105, and those less. Of lines
-/// that a camera sees from within their own planes it tells only whether one is there.
+/// whose axes are within 75 degrees, or, where there is none, two and more within 105, and those
+/// less.
 class OtherViews {
  public:
   OtherViews(const Rig& rig, std::span<const GridGraph> graphs,
@@ -32,10 +32,9 @@ class OtherViews {
   struct Sighting {
     int piece = 0;
     int label = 0;
-    int graph = 0;      ///< of the other camera
-    int hit = -1;       ///< piece there; -1: nothing where it should be
-    int same = -1;      ///< its label with the same line; -1: it has none
-    bool tells = true;  ///< lines apart: else any line would be there
+    int graph = 0;  ///< of the other camera
+    int hit = -1;   ///< piece there; -1: nothing where it should be
+    int same = -1;  ///< its label with the same line; -1: it has none
   };
 
   struct Entry {
