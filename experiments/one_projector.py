@@ -39,11 +39,7 @@ def turned(name, seed):
 
 def simulate(program, folder, setting, azimuths=(0,)):
     pitch, line, blur, camera_blur, order = setting
-    rig = wide_lines.rig_of(pitch, line)
-    of_first = rig["cameras"][0]
-    focal, distance = of_first["K"][0][0], np.linalg.norm(common.center_of(of_first))
-    rig["cameras"] = [common.device(f"cam{k}", (of_first["width"], of_first["height"]), focal,
-                                    common.on_sphere(azimuth, 0, distance)) for k, azimuth in enumerate(azimuths)]
+    rig = wide_lines.rig_of(pitch, line, azimuths)
     rig["projectors"][0]["pattern"]["order"] = order
     common.write_rig(folder / "rig.json", rig)
     program("simulate", "--rig", folder / "rig.json", "--mesh", folder / "mesh.ply", "--out", folder / "scene",

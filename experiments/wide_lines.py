@@ -37,11 +37,12 @@ def ball():
                                      np.stack([corner[0], corner[3], corner[1]], 1)])
 
 
-def rig_of(pitch, line):
-    camera = common.device("cam0", (1280, 960), 2300, (1000, 0, 0))
+def rig_of(pitch, line, azimuths=(0,)):
+    cameras = [common.device(f"cam{k}", (1280, 960), 2300, common.on_sphere(azimuth, 0, 1000))
+               for k, azimuth in enumerate(azimuths)]
     projector = common.device("proj0", (1024, 768), 2000, common.on_sphere(20, 6, 1000))
     projector["pattern"] = {**common.pattern("vertical", pitch, line), "order": 4}
-    return common.rig_of([camera], [projector], 1.15 * RADIUS)
+    return common.rig_of(cameras, [projector], 1.15 * RADIUS)
 
 
 def line_map(camera, projector):

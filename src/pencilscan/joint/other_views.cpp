@@ -7,28 +7,10 @@
 #include "pencilscan/core/parallel.h"
 
 namespace pencilscan {
-namespace {
-
-/// Probability that another camera sees a curve where a true label of this camera lies, if it sees
-/// about that side of the surface at all; 0: not from there. Wide apart, much of the surface that
-/// one sees turns away from the other or is hidden from it, and whole patches at once. Of the
-/// surest labels .67 are seen from 60 degrees apart and .43 from 90 (bunny and hand before six and
-/// six, bunny before four and four); of .25, .3, .35 and .43 from there, .35 left the fewest wrong
-/// names of six objects before four and four.
-constexpr float kSeenNear = 0.7F;
-constexpr float kSeenFar = 0.35F;
-float seen_if_true(const Camera& a, const Camera& b) {
-  constexpr double kNear = 0.25;  // cosine of the angle between the axes: 75 degrees
-  constexpr double kFar = -0.25;  // 105 degrees
-  const double cosine = a.forward().dot(b.forward());
-  return cosine > kNear ? kSeenNear : cosine > kFar ? kSeenFar : 0.F;
-}
-
-}  // namespace
-
 OtherViews::OtherViews(const Rig& rig, std::span<const GridGraph> graphs,
                        std::span<const LabelledPieces> pieces)
     : rig_(rig), graphs_(graphs), pieces_(pieces), sightings_(graphs.size()) {
+  for (std::size_t g = 0; g < graphs.size(); ++g) voices_.push_back(voices_of(g));
   std::vector<View> views(graphs.size());
   parallel_for(graphs.size(), [&](std::size_t g) { views[g] = make_view(g); });
   parallel_for(graphs.size(), [&](std::size_t g) { sightings_[g] = look_from_others(g, views); });
@@ -84,27 +66,33 @@ int OtherViews::find(const FamilyView& view, const Eigen::Vector2f& position,
   return piece;
 }
 
-std::vector<std::size_t> OtherViews::views_of(std::size_t g) const {
-  std::vector<std::size_t> near;
-  std::vector<std::size_t> far;
-  const Camera& camera = rig_.camera(graphs_[g].camera);
-  for (std::size_t k = 0; k < graphs_.size(); ++k) {
-    const Camera& other = rig_.camera(graphs_[k].camera);
-    if (k == g || other.sees_texture_only) continue;
-    const float seen = seen_if_true(camera, other);
-    if (seen == kSeenNear) near.push_back(k);
-    if (seen == kSeenFar) far.push_back(k);
-  }
+OtherViews::Voices OtherViews::voices_of(std::size_t g) const {
+  constexpr double kFar = -0.25;  // cosine of the angle between the axes: 105 degrees
+  const auto graphs_of = [&](const std::vector<int>& cameras) {
+    std::vector<std::size_t> result;
+    for (const int c : cameras) {
+      for (std::size_t k = 0; k < graphs_.size(); ++k) {
+        if (graphs_[k].camera == c) result.push_back(k);
+      }
+    }
+    return result;
+  };
+  std::vector<std::size_t> near = graphs_of(adjacent_cameras(rig_, graphs_[g].camera));
+  if (!near.empty()) return {std::move(near), 0.7F};
+  // Wide apart, much of the surface that one sees turns away from the other or is hidden from it,
+  // and whole patches at once. Of the surest labels .67 are seen from 60 degrees apart and .43 from
+  // 90 (bunny and hand before six and six, bunny before four and four); of .25, .3, .35 and .43
+  // here, .35 left the fewest wrong names of six objects before four and four.
+  std::vector<std::size_t> far = graphs_of(adjacent_cameras(rig_, graphs_[g].camera, kFar));
   // Two that contradict each other would both lose their names, and nobody knows which one moved.
-  if (near.empty() && far.size() < 2) return {};
-  return near.empty() ? far : near;
+  if (far.size() < 2) return {};
+  return {std::move(far), 0.35F};
 }
 
 std::vector<OtherViews::Sighting> OtherViews::look_from_others(std::size_t g,
                                                                std::span<const View> views) const {
   const Camera& camera = rig_.camera(graphs_[g].camera);
   const RigidTransform world_from_camera = camera.device_from_world.inverse();
-  const std::vector<std::size_t> others = views_of(g);
   constexpr float kPixels = 3;
   const float ahead = kPixels / static_cast<float>(camera.focal_px());
   std::vector<Sighting> sightings;
@@ -115,7 +103,7 @@ std::vector<OtherViews::Sighting> OtherViews::look_from_others(std::size_t g,
       const PieceLabel& label = pieces_[g].labels[p][k];
       const Vec3 here = world_from_camera * label.place(piece.middle);
       const Vec3 next = world_from_camera * label.place(piece.middle + ahead * piece.tangent);
-      for (const std::size_t o : others) {
+      for (const std::size_t o : voices_[g].graphs) {
         const Camera& other = rig_.camera(graphs_[o].camera);
         const auto a = other.project(here);
         if (!a || !other.contains(*a)) continue;
@@ -159,19 +147,18 @@ std::vector<std::vector<float>> OtherViews::costs(std::size_t g,
   constexpr float kHitByChance = 0.2F;
   constexpr float kSameIfTrue = 0.85F;
   constexpr float kSameByChance = 0.03F;
-  std::vector<float> hit_if_true;  // by graph
-  for (const GridGraph& other : graphs_)
-    hit_if_true.push_back(seen_if_true(rig_.camera(graphs_[g].camera), rig_.camera(other.camera)));
+  const float hit_if_true = voices_[g].hit_if_true;
+  const float miss = -std::log((1 - hit_if_true) / (1 - kHitByChance));
+  const float unknown_hit = -std::log(hit_if_true / kHitByChance);
   std::vector<std::vector<float>> result;
   for (const auto& labels : pieces_[g].labels) result.emplace_back(labels.size(), 0.F);
   for (const Sighting& s : sightings_[g]) {
     float& cost = result[static_cast<std::size_t>(s.piece)][static_cast<std::size_t>(s.label)];
     const PieceBeliefs& their = beliefs[static_cast<std::size_t>(s.graph)];
-    const float if_true = hit_if_true[static_cast<std::size_t>(s.graph)];
     if (s.hit < 0) {
-      cost -= std::log((1 - if_true) / (1 - kHitByChance));
+      cost += miss;
     } else if (their.empty()) {
-      cost -= std::log(if_true / kHitByChance);
+      cost += unknown_hit;
     } else {
       const float same =
           s.same < 0 ? 0.F

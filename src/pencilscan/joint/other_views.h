@@ -37,6 +37,12 @@ class OtherViews {
     int same = -1;  ///< its label with the same line; -1: it has none
   };
 
+  /// The graphs of the cameras that have a say in what one shows.
+  struct Voices {
+    std::vector<std::size_t> graphs;
+    float hit_if_true = 0;  ///< probability that one of them sees a curve where a true label lies
+  };
+
   struct Entry {
     Eigen::Vector2f position;
     Eigen::Vector2f tangent;
@@ -55,14 +61,14 @@ class OtherViews {
                                 const Eigen::Vector2f& tangent);
 
   [[nodiscard]] View make_view(std::size_t g) const;
-  /// The graphs of the cameras that have a say in what graphs[g] shows.
-  [[nodiscard]] std::vector<std::size_t> views_of(std::size_t g) const;
+  [[nodiscard]] Voices voices_of(std::size_t g) const;
   [[nodiscard]] std::vector<Sighting> look_from_others(std::size_t g,
                                                        std::span<const View> views) const;
 
   const Rig& rig_;
   std::span<const GridGraph> graphs_;
   std::span<const LabelledPieces> pieces_;
+  std::vector<Voices> voices_;                    ///< per graph
   std::vector<std::vector<Sighting>> sightings_;  ///< per graph
 };
 

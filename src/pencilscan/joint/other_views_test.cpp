@@ -26,7 +26,6 @@ using sample::random_beliefs;
 struct SeenPlane {
   explicit SeenPlane(std::uint64_t seed) {
     rig = sample::small_rig(240, 200, 70);
-    for (Projector& projector : rig.projectors) projector.patterns.push_back(projector.patterns[0]);
     rig.cameras.push_back(sample::device_at<Camera>({180, 560, 100}, "cam2", 240, 200, 850));
     rig.cameras.push_back(sample::device_at<Camera>({-560, 0, 80}, "cam3", 240, 200, 900));
     Random random(seed);
@@ -126,9 +125,7 @@ struct SeenPlane {
     };
     double sum = 0;
     for (std::size_t o = 0; o < 3; ++o) {  // the fourth sees the other side, and is seen by none
-      if (o == g || g == 3) continue;
-      if (g != 1 && o != 1) continue;
-      const double if_true = 0.7;
+      if (o == g || g == 3 || (g != 1 && o != 1)) continue;
       const auto at = rig.cameras[o].project(world(piece.middle));
       const auto ahead = rig.cameras[o].project(
           world(piece.middle + 3 / static_cast<float>(camera.K(0, 0)) * piece.tangent));
@@ -136,13 +133,13 @@ struct SeenPlane {
       const int hit =
           piece_at(o, curve_of(graphs[g], piece).family, *at, (*ahead - *at).normalized());
       if (hit < 0) {
-        sum -= std::log((1 - if_true) / 0.8);
+        sum -= std::log(0.3 / 0.8);
         ++misses;
         continue;
       }
       ++hits;
       if (beliefs[o].empty()) {
-        sum -= std::log(if_true / 0.2);
+        sum -= std::log(0.7 / 0.2);
         continue;
       }
       double same = 0;

@@ -106,13 +106,12 @@ Sphere working_volume(const Rig& rig) {
   return volume;
 }
 
-std::vector<int> adjacent_cameras(const Rig& rig, int camera) {
-  constexpr double kMinCosine = 0.25;
+std::vector<int> adjacent_cameras(const Rig& rig, int camera, double min_cosine) {
   std::vector<int> result;
   const Vec3 forward = rig.cameras[static_cast<std::size_t>(camera)].forward();
   for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
     if (static_cast<int>(c) == camera || rig.cameras[c].sees_texture_only) continue;
-    if (rig.cameras[c].forward().dot(forward) > kMinCosine) result.push_back(static_cast<int>(c));
+    if (rig.cameras[c].forward().dot(forward) > min_cosine) result.push_back(static_cast<int>(c));
   }
   return result;
 }

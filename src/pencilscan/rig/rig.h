@@ -115,7 +115,9 @@ void write_rig(const Rig& rig, const std::filesystem::path& path);
 /// The same rig with all lengths times `factor`, > 0: pictures and angles stay.
 [[nodiscard]] Rig scaled(Rig rig, double factor);
 
-/// Cameras that see much of what this one sees: axes within about 75 degrees.
-[[nodiscard]] std::vector<int> adjacent_cameras(const Rig& rig, int camera);
+/// Cameras that see much of what this one sees: the cosine of the angle between their axes is
+/// larger than this; as it stands, they lie within about 75 degrees.
+[[nodiscard]] std::vector<int> adjacent_cameras(const Rig& rig, int camera,
+                                                double min_cosine = 0.25);
 
 }  // namespace pencilscan
