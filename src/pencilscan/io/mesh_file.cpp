@@ -6,9 +6,11 @@
 #include <algorithm>
 #include <assimp/Importer.hpp>
 #include <cmath>
+#include <cstdlib>
 #include <map>
 #include <new>
 #include <span>
+#include <sstream>
 #include <string>
 
 #include "pencilscan/core/check.h"
@@ -128,8 +130,43 @@ TriangleMesh with_joined_vertices(const TriangleMesh& mesh) {
   return joined;
 }
 
+/// An OBJ as Assimp understands it. It passes over coordinates that begin with a point (".5",
+/// "-.5") or are no numbers, and takes those that follow for them.
+std::string with_leading_zeros(const std::filesystem::path& path, const std::string& obj) {
+  std::string text;
+  std::istringstream lines(obj);
+  std::string line;
+  for (int number = 1; std::getline(lines, line); ++number) {
+    while (line.ends_with('\\')) {  // goes on in the next line
+      std::string rest;
+      std::getline(lines, rest);
+      line.back() = ' ';
+      line += rest;
+      ++number;
+    }
+    if (!line.starts_with("v ") && !line.starts_with("v\t")) {
+      text += line + "\n";
+      continue;
+    }
+    std::istringstream words(line.substr(1, line.find('#') - 1));
+    text += "v";
+    for (std::string word; words >> word;) {
+      char* end = nullptr;
+      if (!std::isfinite(std::strtod(word.c_str(), &end)) || *end != '\0')
+        throw InputError(path.string(), "line " + std::to_string(number), word,
+                         "must be a finite number");
+      const std::size_t first = word.find_first_not_of("+-");
+      if (word[first] == '.') word.insert(first, "0");
+      text += " " + word;
+    }
+    text += "\n";
+  }
+  return text;
+}
+
 TriangleMesh read_with_assimp(const std::filesystem::path& path, const std::string& ending) {
-  const std::string bytes = read_file(path);
+  const std::string stored = read_file(path);
+  const std::string bytes = ending == ".obj" ? with_leading_zeros(path, stored) : stored;
   Assimp::Importer importer;
   const aiScene* scene = importer.ReadFileFromMemory(
       bytes.data(), bytes.size(), aiProcess_Triangulate | aiProcess_PreTransformVertices,

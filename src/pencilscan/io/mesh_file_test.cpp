@@ -52,6 +52,24 @@ TEST_F(Io, MeshRoundTripKeepsReasonsOfHolesAndColors) {
   }
 }
 
+TEST_F(Io, ObjCoordinatesMayBeginWithAPoint) {
+  const TriangleMesh mesh =
+      read_mesh(put("t.obj",
+                    "v -.5 0 0 # left\r\nv +.5 1e-3 0\nv\t0  .75 -0.\nv 0 0 \\\n.25 .9 .9 .9#top\n"
+                    "f 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"));
+  ASSERT_EQ(mesh.vertices.size(), 4U);
+  EXPECT_EQ(mesh.faces.size(), 4U);
+  EXPECT_EQ(mesh.vertices[0].x(), -0.5);
+  EXPECT_EQ(mesh.vertices[1].y(), 0.75);  // in the order of the faces
+  for (const char* word : {"nan", "inf", "1.2.3", "x"})
+    EXPECT_NE(error_of([&] {
+                return read_mesh(
+                    put("b.obj", std::string("v 1 0 0\nv 0 ") + word + " 0\nv 0 0 1\nf 1 2 3\n"));
+              }).find("line 2 = " + std::string(word)),
+              std::string::npos)
+        << word;
+}
+
 TEST_F(Io, ObjStlAndOffGiveOneClosedTetrahedron) {
   const auto obj = put("t.obj",
                        "v 0 0 0\nv 6 0 0\nv 0 6 0\nv 0 0 6\nvn 0 0 1\nf 1//1 3//1 2//1\n"
