@@ -1,9 +1,13 @@
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
 #include <cerrno>
 #include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <limits>
 #include <new>
 #include <numbers>
 #include <numeric>
@@ -145,6 +149,79 @@ TEST(Memory, LackOfItIsToldInPlainWordsWhoeverLacksIt) {
   EXPECT_TRUE(is_of_memory(std::bad_alloc()));
   EXPECT_EQ(in_plain_words(StageError("no curve")), "no curve");
   EXPECT_FALSE(is_of_memory(std::system_error(ENOSPC, std::generic_category())));
+}
+
+/// A made-up folder of control groups, removed afterwards.
+class ControlGroups : public ::testing::Test {
+ protected:
+  ControlGroups() { std::filesystem::remove_all(mount_); }
+  ~ControlGroups() override { std::filesystem::remove_all(mount_); }
+  void put(const std::string& file, const std::string& text) {
+    const std::filesystem::path path = mount_ / file;
+    std::filesystem::create_directories(path.parent_path());
+    std::ofstream(path) << text << "\n";
+  }
+
+  std::filesystem::path mount_ = std::filesystem::path(::testing::TempDir()) /
+                                 ("groups_" + std::to_string(::getpid()) + "_" +
+                                  ::testing::UnitTest::GetInstance()->current_test_info()->name());
+};
+
+constexpr double kNoGroupLimit = std::numeric_limits<double>::infinity();
+
+TEST_F(ControlGroups, TheTightestGroupUpToTheRootCounts) {
+  const std::string groups = "0::/slurm/job_7/step_0\n";
+  EXPECT_EQ(memory_of_groups(groups, mount_), kNoGroupLimit);  // no file at all
+  put("slurm/job_7/step_0/memory.max", "max");
+  put("slurm/job_7/step_0/memory.current", "100");
+  EXPECT_EQ(memory_of_groups(groups, mount_), kNoGroupLimit);
+  put("slurm/job_7/memory.max", "5000");
+  put("slurm/job_7/memory.current", "1200");
+  EXPECT_EQ(memory_of_groups(groups, mount_), 3800);
+  // Copies of files count as used, but give way.
+  put("slurm/job_7/memory.stat", "anon 900\ninactive_file 300\nactive_file 50\nslab_reclaimable 7");
+  EXPECT_EQ(memory_of_groups(groups, mount_), 4157);
+  put("slurm/memory.max", "9000");
+  put("slurm/memory.current", "8500");
+  EXPECT_EQ(memory_of_groups(groups, mount_), 500);
+  put("slurm/job_8/memory.max", "1");  // another job's
+  put("slurm/job_8/memory.current", "1");
+  EXPECT_EQ(memory_of_groups(groups, mount_), 500);
+  put("slurm/memory.current", "9100");
+  EXPECT_EQ(memory_of_groups(groups, mount_), 0);
+}
+
+TEST_F(ControlGroups, AContainerSeesItsOwnAsTheRoot) {
+  put("memory.max", "7000");
+  put("memory.current", "3000");
+  EXPECT_EQ(memory_of_groups("0::/\n", mount_), 4000);
+  EXPECT_EQ(memory_of_groups("0::/docker/of_the_host\n", mount_), 4000);
+}
+
+TEST_F(ControlGroups, TheFirstVersionCountsToo) {
+  const std::string groups = "5:cpu,cpuacct:/a\n4:hugetlb,memory:/job\n1:name=systemd:/\n0::/\n";
+  put("memory/memory.limit_in_bytes", "9223372036854771712");
+  put("memory/memory.usage_in_bytes", "123456");
+  EXPECT_EQ(memory_of_groups(groups, mount_), kNoGroupLimit);
+  put("memory/job/memory.limit_in_bytes", "6000");
+  EXPECT_EQ(memory_of_groups(groups, mount_), kNoGroupLimit);  // used by whom is not known
+  put("memory/job/memory.usage_in_bytes", "4000");
+  put("memory/job/memory.stat", "inactive_file 7\ntotal_inactive_file 1000\ntotal_active_file 200");
+  EXPECT_EQ(memory_of_groups(groups, mount_), 3200);
+  put("memory.max", "700");  // of version 2, where both are
+  put("memory.current", "0");
+  EXPECT_EQ(memory_of_groups(groups, mount_), 700);
+}
+
+TEST_F(ControlGroups, WhatIsNoListOfGroupsIsNoLimit) {
+  put("memory.max", "1");
+  put("memory.current", "0");
+  for (const char* text : {"", "\n", "0", "0:", "x:y", "3:cpu:/"})
+    EXPECT_EQ(memory_of_groups(text, mount_), kNoGroupLimit) << text;
+  for (const char* absurd : {"-1", "", "many", "18446744073709551615"}) {
+    put("memory.max", absurd);
+    EXPECT_EQ(memory_of_groups("0::/", mount_), kNoGroupLimit) << absurd;
+  }
 }
 
 TEST(Lanes, ExponentialIsThatOfTheLibrary) {

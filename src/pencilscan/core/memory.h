@@ -1,6 +1,7 @@
 #pragma once
 
 #include <exception>
+#include <filesystem>
 #include <string>
 
 namespace pencilscan {
@@ -9,9 +10,15 @@ namespace pencilscan {
 /// which would clear every page again. For programs, at their start; glibc only, else nothing.
 void keep_freed_memory();
 
-/// Bytes that this process may still take before the system or its own limit (RLIMIT_AS) has no
-/// more; infinity where neither tells.
+/// Bytes that this process may still take before the system, its own limit (RLIMIT_AS) or that of a
+/// control group (a container, a job of Slurm) has no more; infinity where none tells.
 [[nodiscard]] double available_memory();
+
+/// The same by control groups alone. `groups` is the text of /proc/self/cgroup, and `mount` the
+/// folder of the groups (/sys/fs/cgroup). Each group counts with all above it, of version 2 and 1.
+/// "max", sizes that no computer has and files that cannot be read are no limit.
+[[nodiscard]] double memory_of_groups(const std::string& groups,
+                                      const std::filesystem::path& mount);
 
 /// True for an error that says, in its own or a library's way, that memory could not be had, or a
 /// thread, which needs some.

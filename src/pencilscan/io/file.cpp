@@ -67,15 +67,14 @@ class DescriptorBuffer : public std::streambuf {
 class TemporaryFile {
  public:
   explicit TemporaryFile(const std::filesystem::path& target) {
-    static std::atomic<unsigned> counter{0};
-    path_ = target;
-    path_ += ".part" + std::to_string(::getpid()) + "_" + std::to_string(counter++);
     const std::filesystem::path folder = target.has_parent_path() ? target.parent_path() : ".";
     if (::access("/proc/self/fd", X_OK) == 0)
       descriptor_ = ::open(folder.c_str(), O_WRONLY | O_TMPFILE | O_CLOEXEC, 0666);
     if (descriptor_ >= 0) return;
-    descriptor_ = ::open(path_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-    named_ = descriptor_ >= 0;
+    take_name_beside(target, [this] {
+      descriptor_ = ::open(path_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+      return descriptor_ >= 0;
+    });
   }
   TemporaryFile(const TemporaryFile&) = delete;
   TemporaryFile& operator=(const TemporaryFile&) = delete;
@@ -91,8 +90,9 @@ class TemporaryFile {
     if (!flushed && errno != EINVAL) return errno;
     // A new file needs no other name even for a moment.
     if (!named_ && link_as(target) == 0) return 0;
-    if (!named_ && (errno != EEXIST || link_as(path_) != 0)) return errno;
-    named_ = true;
+    if (!named_ && errno == EEXIST)
+      take_name_beside(target, [this] { return link_as(path_) == 0; });
+    if (!named_) return errno;
     const int descriptor = std::exchange(descriptor_, -1);
     if (::close(descriptor) != 0 || ::rename(path_.c_str(), target.c_str()) != 0) return errno;
     named_ = false;
@@ -100,6 +100,17 @@ class TemporaryFile {
   }
 
  private:
+  /// Tries names until `take` gets one, or cannot for another reason than that the name is taken: a
+  /// killed program may have left a file, and the numbers of processes repeat.
+  template <typename Take>
+  void take_name_beside(const std::filesystem::path& target, Take take) {
+    static std::atomic<unsigned> counter{0};
+    do {
+      path_ = target;
+      path_ += ".part" + std::to_string(::getpid()) + "_" + std::to_string(counter++);
+      named_ = take();
+    } while (!named_ && errno == EEXIST);
+  }
   int link_as(const std::filesystem::path& name) const {
     const std::string unnamed = "/proc/self/fd/" + std::to_string(descriptor_);
     return ::linkat(AT_FDCWD, unnamed.c_str(), AT_FDCWD, name.c_str(), AT_SYMLINK_FOLLOW);
@@ -142,14 +153,31 @@ void write_json(const std::filesystem::path& path, const nlohmann::ordered_json&
   write_text(path, json_text(value), durability);
 }
 
-std::string json_text(const nlohmann::ordered_json& value) { return value.dump(2) + "\n"; }
+std::string json_text(const nlohmann::ordered_json& value) {
+  return value.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
+}
+
+std::string json_line(const nlohmann::ordered_json& value) {
+  return value.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+}
+
+bool is_utf8(const std::string& text) {
+  try {
+    static_cast<void>(nlohmann::json(text).dump());
+    return true;
+  } catch (const nlohmann::json::type_error&) {
+    return false;
+  }
+}
 
 std::string read_file(const std::filesystem::path& path) {
   std::error_code error;
   const auto status = std::filesystem::status(path, error);
-  if (!std::filesystem::exists(status)) {
+  if (status.type() == std::filesystem::file_type::not_found) {
     throw InputError(path.string(), "", "", "the file does not exist");
   }
+  if (status.type() == std::filesystem::file_type::none)
+    throw InputError(path.string(), "", "", "cannot be opened: " + error.message());
   if (std::filesystem::is_directory(status)) {
     throw InputError(path.string(), "", "", "must be a file, is a folder");
   }

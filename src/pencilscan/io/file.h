@@ -22,6 +22,7 @@ void write_atomically(const std::filesystem::path& path,
                       Durability durability = Durability::kDisk);
 void write_text(const std::filesystem::path& path, const std::string& text,
                 Durability durability = Durability::kDisk);
+/// What is not UTF-8 becomes U+FFFD.
 void write_json(const std::filesystem::path& path, const nlohmann::ordered_json& value,
                 Durability durability = Durability::kDisk);
 

@@ -18,6 +18,10 @@ std::string some_of(std::vector<std::string>& names) {
 
 }  // namespace
 
+bool is_absence(const std::error_code& error) {
+  return error == std::errc::no_such_file_or_directory || error == std::errc::not_a_directory;
+}
+
 std::string holdings(const std::filesystem::path& folder) {
   std::vector<std::string> files;
   std::vector<std::string> folders;
@@ -28,6 +32,7 @@ std::string holdings(const std::filesystem::path& folder) {
     std::error_code ignored;
     if (!name.starts_with('.')) (it->is_directory(ignored) ? folders : files).push_back(name);
   }
+  if (error && !is_absence(error)) return "it cannot be listed: " + error.message();
   if (!files.empty()) return "it holds " + some_of(files);
   return folders.empty() ? "it is empty" : "it holds only folders: " + some_of(folders);
 }

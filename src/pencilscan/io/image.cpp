@@ -14,6 +14,7 @@
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/lower_case.h"
 #include "pencilscan/io/file.h"
+#include "pencilscan/io/found_files.h"
 #include "pencilscan/io/png.h"
 
 namespace pencilscan {
@@ -136,25 +137,46 @@ cv::Mat read_image(const std::filesystem::path& path) {
   return unit_image(read_stored_image(path));
 }
 
-std::optional<std::filesystem::path> find_image(const std::filesystem::path& folder,
-                                                const std::string& stem) {
-  std::vector<std::string> found;
+FolderImages::FolderImages(std::filesystem::path folder) : folder_(std::move(folder)) {
   std::error_code error;
-  for (std::filesystem::directory_iterator it(folder, error), end; !error && it != end;
+  for (std::filesystem::directory_iterator it(folder_, error), end; !error && it != end;
        it.increment(error)) {
-    std::error_code ignored;
     const std::filesystem::path name = it->path().filename();
-    if (name.stem() == stem && name.has_extension() &&
-        std::find(kEndings.begin(), kEndings.end(), lower_ending(name)) != kEndings.end() &&
-        it->is_regular_file(ignored))
-      found.push_back(name.string());
+    if (name.has_extension() &&
+        std::find(kEndings.begin(), kEndings.end(), lower_ending(name)) != kEndings.end())
+      names_[name.stem().string()].push_back(name.string());
+  }
+  if (error && !is_absence(error))
+    throw InputError(folder_.string(), "", "", "cannot be listed: " + error.message());
+}
+
+std::optional<std::filesystem::path> FolderImages::find(const std::string& stem) const {
+  const auto at = names_.find(stem);
+  if (at == names_.end()) return std::nullopt;
+  // A name of which the system does not tell whether it is a file counts: reading it says why.
+  std::vector<std::string> found;
+  for (const std::string& name : at->second) {
+    std::error_code unknown;
+    const bool is_file = std::filesystem::is_regular_file(folder_ / name, unknown);
+    if (is_file || (unknown && !is_absence(unknown))) found.push_back(name);
   }
   if (found.empty()) return std::nullopt;
   std::sort(found.begin(), found.end());
   if (found.size() > 1)
-    throw InputError(folder.string(), stem, found[0] + " and " + found[1],
+    throw InputError(folder_.string(), stem, found[0] + " and " + found[1],
                      "must be one file: which of them is the picture?");
-  return folder / found.front();
+  return folder_ / found.front();
+}
+
+std::vector<std::string> FolderImages::stems() const {
+  std::vector<std::string> stems;
+  for (const auto& [stem, names] : names_) stems.push_back(stem);
+  return stems;
+}
+
+std::optional<std::filesystem::path> find_image(const std::filesystem::path& folder,
+                                                const std::string& stem) {
+  return FolderImages(folder).find(stem);
 }
 
 namespace {

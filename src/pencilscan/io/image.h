@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <opencv2/core.hpp>
 #include <optional>
 
@@ -25,8 +26,23 @@ namespace pencilscan {
 /// checksums of its chunks: a tenth of the time that decoding takes. Nothing of any other file.
 [[nodiscard]] std::optional<ImageShape> sound_png(const std::filesystem::path& path);
 
-/// The file of `stem` in `folder` with one of the known endings (.png .tiff .tif .jpg .jpeg .bmp),
-/// in capitals or not. InputError that names both where there are two.
+/// The pictures in a folder (.png .tiff .tif .jpg .jpeg .bmp, in capitals or not), listed once;
+/// none where there is no such folder. InputError where it cannot be listed.
+class FolderImages {
+ public:
+  explicit FolderImages(std::filesystem::path folder);
+
+  /// The file of that name without its ending. InputError that names both where there are two.
+  [[nodiscard]] std::optional<std::filesystem::path> find(const std::string& stem) const;
+  /// All names without their endings, sorted.
+  [[nodiscard]] std::vector<std::string> stems() const;
+
+ private:
+  std::filesystem::path folder_;
+  std::map<std::string, std::vector<std::string>> names_;  ///< by stem
+};
+
+/// FolderImages(folder).find(stem), for one picture of a folder.
 [[nodiscard]] std::optional<std::filesystem::path> find_image(const std::filesystem::path& folder,
                                                               const std::string& stem);
 

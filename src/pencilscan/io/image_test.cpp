@@ -114,6 +114,22 @@ TEST_F(Io, ImagesAreFoundWithEndingsInCapitals) {
   EXPECT_EQ(find_image(folder_ / "none", "cam0"), std::nullopt);
 }
 
+TEST_F(Io, AFolderThatCannotBeListedHasNoLackOfImages) {
+  fs::create_symlink("loop", folder_ / "loop");
+  const std::string reason = "loop: cannot be listed: Too many levels of symbolic links";
+  EXPECT_THAT(error_of([&] { return find_image(folder_ / "loop", "cam0"); }),
+              ::testing::HasSubstr(reason));
+  EXPECT_EQ(find_image(put("file", "x"), "cam0"), std::nullopt);
+}
+
+TEST_F(Io, AnImageThatCannotBeReachedIsFoundAndReadingItSaysWhy) {
+  fs::create_symlink("cam0.png", folder_ / "cam0.png");
+  const auto found = find_image(folder_, "cam0");
+  ASSERT_EQ(found, folder_ / "cam0.png");
+  EXPECT_THAT(error_of([&] { return read_image(*found); }),
+              ::testing::HasSubstr("cam0.png: cannot be opened: Too many levels"));
+}
+
 TEST_F(Io, TwoImagesOfOneNameAreRefusedByName) {
   put("cam0.png", "x");
   put("cam0.jpg", "x");

@@ -3,6 +3,8 @@
 // A folder for each test of files, and what reading says.
 
 #include <gtest/gtest.h>
+#include <sys/prctl.h>
+#include <unistd.h>
 
 #include <filesystem>
 #include <fstream>
@@ -31,6 +33,23 @@ class Io : public ::testing::Test {
 
   TemporaryFolder temporary_{::testing::UnitTest::GetInstance()->current_test_info()->name()};
   std::filesystem::path folder_ = temporary_.path();
+};
+
+/// A user whom permissions bind, while it lives: of tests that root runs, nobody.
+class BoundUser {
+ public:
+  BoundUser() : was_root_(::geteuid() == 0 && ::setresuid(kNobody, kNobody, 0) == 0) {}
+  ~BoundUser() {
+    if (!was_root_) return;
+    EXPECT_EQ(::setresuid(0, 0, 0), 0);
+    ::prctl(PR_SET_DUMPABLE, 1);  // which the change took away, and sanitizers need
+  }
+  BoundUser(const BoundUser&) = delete;
+  BoundUser& operator=(const BoundUser&) = delete;
+
+ private:
+  static constexpr uid_t kNobody = 65534;
+  bool was_root_;
 };
 
 /// The one-line error of reading; empty when nothing was thrown.

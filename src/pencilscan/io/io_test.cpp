@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <csignal>
@@ -11,6 +12,7 @@
 #include "pencilscan/io/file.h"
 #include "pencilscan/io/found_files.h"
 #include "pencilscan/io/io_fixture.h"
+#include "pencilscan/io/json_text.h"
 #include "pencilscan/io/partial_folder.h"
 #include "pencilscan/io/zarr_array.h"
 
@@ -51,6 +53,44 @@ TEST_F(Io, AFileInTheMakingHasNoNameThatAKilledProgramCouldLeave) {
   EXPECT_EQ(fs::file_size(folder_ / "a.txt"), std::uintmax_t{1} << 20);
 }
 
+/// Files of killed programs that had the number of this process.
+void leave_parts_of(const fs::path& target) {
+  constexpr int kMoreThanTestsWrite = 300;
+  for (int i = 0; i < kMoreThanTestsWrite; ++i)
+    std::ofstream(target.string() + ".part" + std::to_string(::getpid()) + "_" + std::to_string(i));
+}
+
+TEST_F(Io, WhatAKilledProgramLeftIsInNobodysWay) {
+  const fs::path path = put("a.txt", "old");
+  leave_parts_of(path);
+  const std::size_t before = file_count();
+  write_text(path, "new");
+  EXPECT_EQ(read_file(path), "new");
+  EXPECT_EQ(file_count(), before);
+}
+
+TEST_F(Io, WhatAKilledProgramLeftIsInNobodysWayWhereEachFileHasAName) {
+  const fs::path path = folder_ / "a.txt";
+  const pid_t child = ::fork();
+  if (child == 0) {
+    leave_parts_of(path);
+    // Without /proc a file cannot get its name late.
+    if (::chroot(folder_.c_str()) != 0) ::_exit(2);
+    try {
+      write_text("/a.txt", "new");
+    } catch (const StageError&) {
+      ::_exit(1);
+    }
+    ::_exit(0);
+  }
+  int status = 0;
+  ASSERT_EQ(::waitpid(child, &status, 0), child);
+  ASSERT_TRUE(WIFEXITED(status));
+  if (WEXITSTATUS(status) == 2) GTEST_SKIP() << "only root can take /proc away";
+  EXPECT_EQ(WEXITSTATUS(status), 0);
+  EXPECT_EQ(read_file(path), "new");
+}
+
 TEST_F(Io, APartialFolderStartsEmptyAndLeavesNothing) {
   const fs::path path = folder_ / "film.partial";
   write_text(path / "old.txt", "of a killed program");
@@ -61,6 +101,55 @@ TEST_F(Io, APartialFolderStartsEmptyAndLeavesNothing) {
     fs::rename(making.path() / "new.txt", folder_ / "new.txt");
   }
   EXPECT_EQ(file_count(), 1U);
+}
+
+TEST_F(Io, WhatAKilledProgramWasReplacingIsPutBack) {
+  const auto target = folder_ / "film";
+  write_text(folder_ / "film.partial" / "old" / "frame", "before");
+  write_text(folder_ / "film.partial" / "new" / "frame", "half");
+  {
+    const ReplacingFolder making(target);
+    EXPECT_EQ(read_file(target / "frame"), "before");
+    EXPECT_FALSE(std::filesystem::exists(making.path()));
+    EXPECT_NE(error_of([&] { return ReplacingFolder(target).path(); }), "");
+  }
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "film.partial"));
+  // A link stays one.
+  std::filesystem::create_directory_symlink(target, folder_ / "link");
+  {
+    ReplacingFolder making(folder_ / "link");
+    write_text(making.path() / "frame", "after");
+    making.publish();
+  }
+  EXPECT_EQ(read_file(target / "frame"), "after");
+  EXPECT_TRUE(std::filesystem::is_symlink(folder_ / "link"));
+}
+
+TEST_F(Io, AFolderTakesAnothersPlaceWhenItIsWhole) {
+  const fs::path target = folder_ / "film";
+  write_text(target / "old.txt", "old");
+  {
+    const ReplacingFolder making(target / "");
+    write_text(making.path() / "new.txt", "half");
+  }
+  EXPECT_TRUE(fs::exists(target / "old.txt"));
+  {
+    ReplacingFolder making(target / "");
+    write_text(making.path() / "new.txt", "whole");
+    making.publish();
+  }
+  EXPECT_EQ(read_file(target / "new.txt"), "whole");
+  EXPECT_FALSE(fs::exists(target / "old.txt"));
+  EXPECT_EQ(file_count(), 1U);
+}
+
+TEST_F(Io, NamesCanStandBesideABareFolder) {
+  EXPECT_EQ(bare_folder("a/film/"), "a/film");
+  EXPECT_EQ(bare_folder("a/./film/."), "a/film");
+  EXPECT_EQ(bare_folder("film"), "film");
+  EXPECT_EQ(bare_folder("."), fs::current_path());
+  EXPECT_EQ(bare_folder("./"), fs::current_path());
+  EXPECT_EQ(bare_folder(".."), fs::current_path().parent_path());
 }
 
 TEST_F(Io, WhatCannotBeReplacedIsAStageErrorAndLeavesNoTemporary) {
@@ -122,6 +211,15 @@ TEST_F(Io, JsonErrorsNameTheFileAndThePlace) {
               ::testing::HasSubstr("c.json"));
 }
 
+TEST_F(Io, NamesInLatin1DoNotKeepJsonFromBeingWritten) {
+  const fs::path path = folder_ / "f\xfcr.json";
+  write_json(path, {{"folder", path.filename().string()}});
+  EXPECT_EQ(read_json(path).at("folder"), "f\xef\xbf\xbdr.json");  // U+FFFD
+  EXPECT_EQ(json_line({{"a", "\xe9"}}), "{\"a\":\"\xef\xbf\xbd\"}");
+  EXPECT_TRUE(is_utf8("f\xc3\xbcr"));
+  EXPECT_FALSE(is_utf8("f\xfcr"));
+}
+
 TEST_F(Io, HoldingsNameFilesBeforeFolders) {
   EXPECT_EQ(holdings(folder_), "it is empty");
   std::filesystem::create_directories(folder_ / "b");
@@ -129,6 +227,29 @@ TEST_F(Io, HoldingsNameFilesBeforeFolders) {
   for (int i = 0; i < 7; ++i) put("IMG_" + std::to_string(i), "x");
   put(".hidden", "x");
   EXPECT_EQ(holdings(folder_), "it holds IMG_0, IMG_1, IMG_2, IMG_3 and 3 more");
+}
+
+TEST_F(Io, WhatCannotBeReachedIsNotCalledAbsent) {
+  const fs::path priv = folder_ / "priv";
+  fs::create_directories(priv);
+  put("priv/rig.json", "{}");
+  fs::permissions(priv, ::geteuid() == 0 ? fs::perms::owner_all : fs::perms::none);
+  {
+    const BoundUser user;
+    if (::access(priv.c_str(), R_OK) == 0) GTEST_SKIP() << "permissions do not bind this user";
+    EXPECT_THAT(error_of([&] { return read_json(priv / "rig.json"); }),
+                ::testing::HasSubstr("priv/rig.json: cannot be opened: Permission denied"));
+    EXPECT_EQ(holdings(priv), "it cannot be listed: Permission denied");
+  }
+  fs::permissions(priv, fs::perms::owner_all);
+  fs::create_symlink("loop", folder_ / "loop");
+  EXPECT_THAT(error_of([&] { return read_file(folder_ / "loop"); }),
+              ::testing::HasSubstr("loop: cannot be opened: Too many levels of symbolic links"));
+  EXPECT_EQ(holdings(folder_ / "loop"), "it cannot be listed: Too many levels of symbolic links");
+  EXPECT_THAT(error_of([&] { return read_file(folder_ / std::string(300, 'x')); }),
+              ::testing::HasSubstr("cannot be opened: File name too long"));
+  EXPECT_THAT(error_of([&] { return read_file(folder_ / "priv/rig.json/x"); }),
+              ::testing::HasSubstr("the file does not exist"));
 }
 
 TEST_F(Io, JsonThatIsNestedTooDeepIsRefused) {

@@ -3,6 +3,7 @@
 #include <exception>
 
 #include "pencilscan/io/file.h"
+#include "pencilscan/io/json_text.h"
 #include "pencilscan/page/block.h"
 #include "pencilscan/page/result_files.h"
 
@@ -57,9 +58,9 @@ std::string sequence_part(const std::filesystem::path& root) {
   const std::filesystem::path file = root / "sequence.json";
   if (!is_file(file)) return {};
   try {
-    return compress(sequence_columns(ordered_json(read_json(file))).dump());
+    return compress(json_line(sequence_columns(ordered_json(read_json(file)))));
   } catch (const std::exception& error) {
-    return compress(ordered_json{{"broken", error.what()}}.dump());
+    return compress(json_line({{"broken", error.what()}}));
   }
 }
 

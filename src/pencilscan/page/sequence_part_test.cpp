@@ -45,7 +45,7 @@ TEST(SequencePart, ToleratesAnyJson) {
 }
 
 TEST(SequencePart, IsThatOfTheFolderAndSaysWhyItIsBroken) {
-  const TemporaryFolder folder("SequencePart");
+  const TemporaryFolder folder("SequencePart_\xe9");  // a name in Latin-1
   const auto& root = folder.path();
   EXPECT_TRUE(sequence_part(root).empty());
   const auto read = [&] {

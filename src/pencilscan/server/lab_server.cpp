@@ -2,6 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "pencilscan/io/json_text.h"
 #include "pencilscan/server/guarded_server.h"
 #include "pencilscan/server/lab_page.h"
 
@@ -34,7 +35,7 @@ LabServer::LabServer(int port) : PageServer("127.0.0.1", port, kLabThreads, "lab
     response.set_content(kLabPage, "text/html; charset=utf-8");
   });
   server().Get(root + "status", [this](const httplib::Request&, httplib::Response& response) {
-    response.set_content(desk_->status().dump(), "application/json");
+    response.set_content(json_line(desk_->status()), "application/json");
   });
   server().Get(root + R"(preview/(\d+))", [this](const auto& request, auto& response) {
     answer_preview(*desk_, request, response);

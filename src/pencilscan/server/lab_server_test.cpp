@@ -16,7 +16,7 @@ using ::testing::HasSubstr;
 /// Notes what was pressed.
 class NotingDesk final : public LabDesk {
  public:
-  nlohmann::ordered_json status() override { return {{"poses", 3}}; }
+  nlohmann::ordered_json status() override { return {{"poses", 3}, {"folder", "\xe9"}}; }
   std::string preview(std::size_t camera) override { return camera == 1 ? "JPEG" : ""; }
   std::string act(const std::string& action,
                   const std::map<std::string, std::string>& values) override {
@@ -55,7 +55,8 @@ TEST_F(LabPage, ShowsThePageItsStatusAndPictures) {
   EXPECT_EQ(page->status, 200);
   EXPECT_THAT(page->body, HasSubstr("<title>Laboratory"));
   EXPECT_THAT(page->get_header_value("Content-Security-Policy"), HasSubstr("default-src 'none'"));
-  EXPECT_EQ(client_.Get((root_ + "status").c_str())->body, "{\"poses\":3}");
+  EXPECT_EQ(client_.Get((root_ + "status").c_str())->body,
+            "{\"poses\":3,\"folder\":\"\xef\xbf\xbd\"}");  // U+FFFD for what is not UTF-8
   EXPECT_EQ(client_.Get((root_ + "preview/1").c_str())->body, "JPEG");
   EXPECT_EQ(client_.Get((root_ + "preview/0").c_str())->status, 404);
   EXPECT_EQ(client_.Get((root_ + "preview/99999999999999999999").c_str())->status, 404);

@@ -79,6 +79,12 @@ TEST_F(Served, GivesThePageItsPartsAndTheFiles) {
   EXPECT_THAT(body("/list/0"), HasSubstr("000000/mesh.ply"));
 }
 
+TEST_F(Served, ListsFilesWithNamesInLatin1) {
+  write_text(root_ / "000000" / "caf\xe9.txt", "x");
+  EXPECT_THAT(body("/list/0"),
+              AllOf(HasSubstr("000000/mesh.ply"), HasSubstr("caf\xef\xbf\xbd.txt")));
+}
+
 TEST_F(Served, SaysWhatItDoesNotHave) {
   for (const char* path :
        {"/part/1/mesh", "/part/99999999999999999999/mesh", "/part/0/image/7", "/part/sequence/0",
@@ -230,6 +236,11 @@ TEST_F(Served, APortInUseIsAFailureAndNotShared) {
   ViewOptions same;
   same.port = server_->port();
   EXPECT_THROW(ViewServer(root_, same), StageError);
+}
+
+TEST_F(Served, AFolderWithoutResultsIsRefused) {
+  fs::create_directories(base_ / "empty");
+  EXPECT_THROW(ViewServer(base_ / "empty", ViewOptions{}), InputError);
 }
 
 TEST_F(Served, OnlyAnAddressOfThisComputerIsListenedOn) {

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "pencilscan/core/error.h"
+#include "pencilscan/io/json_text.h"
 #include "pencilscan/page/sequence_part.h"
 #include "pencilscan/server/guarded_server.h"
 #include "pencilscan/server/served_files.h"
@@ -141,7 +142,7 @@ void ViewServer::State::answer_list(const httplib::Request& request, httplib::Re
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
   for (const ServedFile& file : files_below(root, data.folder().results[*result].folder))
     list.push_back({{"path", file.path}, {"bytes", file.bytes}});
-  response.set_content(list.dump(), "application/json");
+  response.set_content(json_line(list), "application/json");
 }
 
 /// As bytes only: a drawing that is opened by its address must not run as a page of this server.
@@ -197,6 +198,7 @@ void ViewServer::State::add_routes(GuardedServer& server) {
 ViewServer::ViewServer(const fs::path& root, const ViewOptions& options)
     : PageServer(options.address, options.port, kRequestThreads, "view"),
       state_(std::make_unique<State>(root, options)) {
+  state_->data.require_content("view");
   state_->page = state_->make_page();
   state_->add_routes(server());
 }

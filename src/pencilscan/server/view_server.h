@@ -22,8 +22,9 @@ struct ViewOptions {
 /// files of the folder. Bound to 127.0.0.1 unless told. Nothing outside of the folder is served.
 class ViewServer : public PageServer {
  public:
-  /// Takes the port and finds the results. InputError when the folder is none, or the address is
-  /// none of this computer; StageError when the port is not free.
+  /// Takes the port and finds the results, once: what is made later is in the page of another one.
+  /// InputError when the folder is none or holds none, or the address is none of this computer;
+  /// StageError when the port is not free.
   ViewServer(const std::filesystem::path& root, const ViewOptions& options);
   ~ViewServer();
 
