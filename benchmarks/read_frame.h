@@ -11,7 +11,7 @@ namespace pencilscan {
 inline Frame read_frame(const Rig& rig, const std::filesystem::path& folder) {
   Frame frame;
   frame.name = folder.filename().string();
-  FrameFiles files{frame.name, {}};
+  FrameFiles files{frame.name, {}, {}};
   for (const Camera& camera : rig.cameras) files.images.push_back(find_image(folder, camera.name));
   frame.images = read_images(rig, files);
   return frame;

@@ -121,8 +121,15 @@ class Sequence(unittest.TestCase):
         submitted.communicate()
         missing = run("sequence", "finish", "--out", out, code=1)
         self.assertIn("was not made by task 6", missing.stderr)
-        run("sequence", "finish", "--out", out, "--resubmit", code=1)
-        self.assert_whole(out)
+        # Other options are refused before they take the place of what can go on.
+        run("sequence", "submit", "--local", "2", *self.input, "--method", "linear", "--out", out, code=2)
+        # Moved, it goes on where it is now.
+        moved = self.at("moved")
+        os.rename(out, moved)
+        os.rename(f"{out}.job", f"{moved}.job")
+        run("sequence", "finish", "--out", moved, "--resubmit", code=1)
+        self.assertFalse(os.path.exists(out))
+        self.assert_whole(moved)
 
     def test_ssh(self):
         tools = self.at("tools")
@@ -227,7 +234,7 @@ class BumpedCamera(unittest.TestCase):
 
     def check(self, rig, frames, code):
         run("rig", "check", "--rig", rig, "--frames", frames, "--json", self.at("fit.json"),
-            "--put-back", self.at("put_back.json"), code=code)
+            "--put-back", self.at("put_back.json"), "--overwrite", code=code)
         with open(self.at("fit.json")) as f:
             return json.load(f)
 

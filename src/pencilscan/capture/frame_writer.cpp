@@ -7,6 +7,7 @@
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/io/image.h"
+#include "pencilscan/io/partial_folder.h"
 #include "pencilscan/recording/recording_writer.h"
 
 namespace pencilscan {
@@ -55,10 +56,10 @@ nlohmann::ordered_json attributes_of(const CameraGroup& cameras, bool shared_clo
 
 FrameWriter::FrameWriter(const CameraGroup& cameras, const fs::path& out, std::int64_t utc_ns,
                          bool shared_clock)
-    : cameras_(cameras), out_(out), utc_ns_(utc_ns) {
+    : cameras_(cameras), out_(bare_folder(out)), utc_ns_(utc_ns) {
   if (fs::exists(out) && !(fs::is_directory(out) && fs::is_empty(out)))
     throw InputError("--out", "", out.string(), "must be new or an empty folder");
-  if (is_zarr(out)) {
+  if (is_zarr(out_)) {
     std::vector<RecordedCamera> recorded;
     for (std::size_t c = 0; c < cameras.size(); ++c) {
       recorded.push_back(expected(cameras, c));
@@ -67,9 +68,9 @@ FrameWriter::FrameWriter(const CameraGroup& cameras, const fs::path& out, std::i
     }
     RecordingOptions options;
     options.attributes = attributes_of(cameras, shared_clock);
-    zarr_ = std::make_unique<RecordingWriter>(out, std::move(recorded), options);
+    zarr_ = std::make_unique<RecordingWriter>(out_, std::move(recorded), options);
   } else {
-    fs::create_directories(out);
+    fs::create_directories(out_);
   }
   const auto count =
       std::min<std::size_t>(cameras.size(), static_cast<std::size_t>(thread_count()));

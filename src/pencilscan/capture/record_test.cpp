@@ -94,6 +94,18 @@ TEST(Record, FramesOfOneMomentGoToARecording) {
   }
 }
 
+TEST(Record, ANameThatEndsWithASlashIsThatOfARecordingToo) {
+  const TemporaryFolder folder("record_slash");
+  LiveCameras cameras(scripted(1));
+  cameras.group().configure(0, fast());
+  cameras.start();
+  RecordOptions options;
+  options.rate_hz = 50;
+  options.frames = 2;
+  EXPECT_EQ(record(cameras, folder.path() / "recording.zarr" / "", options).frames, 2U);
+  EXPECT_TRUE(Recording::is_one(folder.path() / "recording.zarr"));
+}
+
 TEST(Record, LostPicturesAreNamedAndNoFrame) {
   const TemporaryFolder folder("record_lost");
   LiveCameras cameras(scripted(2, [](std::size_t c, CameraScript& script) {

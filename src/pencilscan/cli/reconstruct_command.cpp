@@ -36,25 +36,7 @@ std::size_t points_of(const FrameOutcome& outcome, const std::string& out) {
 
 void reconstruct(const ReconstructOptions& options) {
   const ThreadLimit limit(options.common.threads);
-  SequenceOptions sequence;
-  const SolutionMethod& method = *find_method(options.method);
-  FrameOptions& frame = sequence.output.frame;
-  frame.points.method = method.defaults;
-  if (!set_multiview_cost(options.cost, frame.points.method))
-    throw InputError("--multiview-cost", "", options.cost, "must be published or normalized");
-  frame.shape.depth.enabled = !options.no_depth && method.capabilities.allows_dense_depth;
-  sequence.plain_frames = options.plain_frames;
-  sequence.output.refine_rig = options.refine_rig;
-  frame.meshes = !options.no_mesh;
-  frame.joined_pixels = options.join_pixels;
-  sequence.output.tracks = !options.independent;
-  sequence.output.pictures = !options.no_pictures;
-  sequence.output.depth_maps = options.depth_maps;
-  sequence.output.mesh_formats = options.mesh_formats;
-  sequence.overwrite = options.overwrite;
-  if (!options.shard.empty())
-    sequence.shard = shard_from_text(options.shard, process_environment());
-  sequence.program = own_hash();
+  const SequenceOptions sequence = sequence_options(options);
   warn_of_rig(read_rig(options.rig));
   const auto [outcomes, refinement, warnings] =
       reconstruct_sequence(options.rig, options.frames, options.out, sequence,
@@ -95,6 +77,29 @@ void reconstruct(const ReconstructOptions& options) {
 
 }  // namespace
 
+SequenceOptions sequence_options(const ReconstructOptions& options) {
+  SequenceOptions sequence;
+  const SolutionMethod& method = *find_method(options.method);
+  FrameOptions& frame = sequence.output.frame;
+  frame.points.method = method.defaults;
+  if (!set_multiview_cost(options.cost, frame.points.method))
+    throw InputError("--multiview-cost", "", options.cost, "must be published or normalized");
+  frame.shape.depth.enabled = !options.no_depth && method.capabilities.allows_dense_depth;
+  sequence.plain_frames = options.plain_frames;
+  sequence.output.refine_rig = options.refine_rig;
+  frame.meshes = !options.no_mesh;
+  frame.joined_pixels = options.join_pixels;
+  sequence.output.tracks = !options.independent;
+  sequence.output.pictures = !options.no_pictures;
+  sequence.output.depth_maps = options.depth_maps;
+  sequence.output.mesh_formats = options.mesh_formats;
+  sequence.overwrite = options.overwrite;
+  if (!options.shard.empty())
+    sequence.shard = shard_from_text(options.shard, process_environment());
+  sequence.program = own_hash();
+  return sequence;
+}
+
 void add_reconstruct_options(CLI::App& command, ReconstructOptions& options) {
   command.add_option("--rig", options.rig, "rig.json of the calibrated devices")->required();
   command
@@ -117,22 +122,34 @@ void add_reconstruct_options(CLI::App& command, ReconstructOptions& options) {
           "of the sweep: published (a sum over the reprojected points) or normalized (a mean "
           "in which points outside the other images count too)")
       ->check(one_of({"published", "normalized"}))
+      ->check(told_where_not(
+          "--multiview-cost", [&options] { return options.method == "multiview"; },
+          "needs --method multiview"))
       ->capture_default_str();
-  command.add_flag("--no-depth", options.no_depth,
-                   "surface from the labelled curves alone, without depth between them");
-  command.add_flag("--no-mesh", options.no_mesh, "labelled points alone, without a surface");
+  CLI::Option* no_depth =
+      command.add_flag("--no-depth", options.no_depth,
+                       "surface from the labelled curves alone, without depth between them");
+  CLI::Option* no_mesh =
+      command.add_flag("--no-mesh", options.no_mesh, "labelled points alone, without a surface");
   command
       .add_option("--join-pixels", options.join_pixels,
                   "N: join N x N pixels to one, for a quicker, coarser look")
-      ->check(CLI::Range(1, 16))
+      ->check(between(1, 16))
       ->capture_default_str();
-  command.add_flag("--depth-maps", options.depth_maps,
-                   "depth and its deviation per camera: float TIFF and 16-bit PNG");
+  command
+      .add_flag("--depth-maps", options.depth_maps,
+                "depth and its deviation per camera: float TIFF and 16-bit PNG")
+      ->check(only_where(
+          [&options] { return find_method(options.method)->capabilities.allows_dense_depth; },
+          "needs --method joint"))
+      ->excludes(no_depth)
+      ->excludes(no_mesh);
   command
       .add_option("--mesh-formats", options.mesh_formats,
                   "the closed mesh also as obj, stl or glb (several with commas)")
       ->delimiter(',')
-      ->check(one_of({"obj", "stl", "glb"}));
+      ->check(one_of({"obj", "stl", "glb"}))
+      ->excludes(no_mesh);
   command.add_flag("--refine-rig", options.refine_rig,
                    "correct the poses of the devices from the lines that cross in the frames");
   command.add_flag("--independent", options.independent,

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "pencilscan/cli/command.h"
+#include "pencilscan/pipeline/sequence.h"
 
 namespace pencilscan::cli {
 
@@ -27,6 +28,9 @@ struct ReconstructOptions {
   std::string shard;
   bool overwrite = false;
 };
+
+/// The same for the library. InputError when they do not go together.
+[[nodiscard]] SequenceOptions sequence_options(const ReconstructOptions& options);
 
 /// Adds the options of `reconstruct` to a command: all but --shard and the common ones.
 void add_reconstruct_options(CLI::App& command, ReconstructOptions& options);

@@ -90,7 +90,7 @@ void add_unpack(CLI::App& group) {
       group.add_subcommand("unpack", "A recording into folders of PNG files, one per moment");
   command->add_option("--frames", options->frames, "The recording")->required();
   command->add_option("--out", options->out, "Folder for the frame folders")->required();
-  command->add_flag("--overwrite", options->pack.overwrite, "Write into a folder with files");
+  command->add_flag("--overwrite", options->pack.overwrite, "Replace pictures that are there");
   add_common_options(*command, options->common,
                      "pencilscan sequence unpack --frames recording.zarr --out frames");
   command->callback([options] { run_unpack(*options); });

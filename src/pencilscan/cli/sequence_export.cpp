@@ -18,12 +18,14 @@ struct FilmCommand {
   std::string usd;
   double frames_per_second = 25;
   bool measured_only = false;
+  bool overwrite = false;
 };
 
 void run_film_export(const FilmCommand& command) {
   const ThreadLimit threads(command.common.threads);
   if (command.zarr.empty() && command.usd.empty())
     throw InputError("command line", "--zarr, --usd", "", "at least one must be given");
+  if (!command.usd.empty()) refuse_existing("--usd", command.usd, command.overwrite);
   const Film film = find_film(command.result, command.measured_only);
   nlohmann::ordered_json figures;
   figures["frames"] = film.frames.size();
@@ -54,6 +56,7 @@ void add_sequence_export(CLI::App& group) {
       ->capture_default_str();
   command->add_flag("--measured", options->measured_only,
                     "What was measured, without what closes the surface");
+  add_overwrite(*command, options->overwrite, "With --usd: replace a file that is there");
   add_common_options(*command, options->common,
                      "pencilscan sequence export --result film --zarr surface.zarr");
   command->callback([options] { run_film_export(*options); });

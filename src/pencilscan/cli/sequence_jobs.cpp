@@ -17,6 +17,8 @@
 #include "pencilscan/jobs/task_queue.h"
 #include "pencilscan/pipeline/frame_source.h"
 #include "pencilscan/pipeline/run_folder.h"
+#include "pencilscan/pipeline/sequence.h"
+#include "pencilscan/pipeline/sequence_inputs.h"
 #include "pencilscan/pipeline/shard.h"
 
 namespace pencilscan::cli {
@@ -154,7 +156,9 @@ std::size_t task_count(const SubmitCommand& submit, std::size_t frames) {
 
 Job make_job(const SubmitCommand& submit, const CLI::App& command) {
   const Rig rig = read_rig(submit.reconstruct.rig);
-  const std::size_t frames = FrameSource::open(rig, submit.reconstruct.frames).size();
+  const FrameSource frames = FrameSource::open(rig, submit.reconstruct.frames);
+  if (const auto warning = open_recording_warning(frames))
+    std::cerr << "pencilscan: warning: " << *warning << "\n";
   Job job;
   job.kind = submit.slurm           ? JobKind::kSlurm
              : submit.hosts.empty() ? JobKind::kLocal
@@ -165,7 +169,7 @@ Job make_job(const SubmitCommand& submit, const CLI::App& command) {
   job.arguments = passed_on(command, {"out", "json", "local", "ssh", "slurm", "limit", "max-tasks",
                                       "retries", "sbatch", "help"});
   job.arguments.insert(job.arguments.end(), {"--out", job.out.string()});
-  job.tasks = task_count(submit, frames);
+  job.tasks = task_count(submit, frames.size());
   job.limit = submit.local > 0 ? static_cast<std::size_t>(submit.local) : submit.limit;
   job.retries = submit.retries;
   job.hosts = submit.hosts;
@@ -182,6 +186,9 @@ void run_submit(const SubmitCommand& submit, const CLI::App& command) {
     throw InputError("command line", "--local, --ssh, --slurm", "", "exactly one must be given");
   Interruption interruption;
   const Job job = make_job(submit, command);
+  // Before the job of what is there is replaced by one that every task would refuse.
+  check_sequence(submit.reconstruct.rig, submit.reconstruct.frames, job.out,
+                 sequence_options(submit.reconstruct));
   write_job(job);
   std::vector<std::size_t> tasks(job.tasks);
   for (std::size_t i = 0; i < tasks.size(); ++i) tasks[i] = i;
@@ -236,6 +243,20 @@ struct FinishCommand {
   int rounds = 0;
 };
 
+/// The output may have been moved, with its job beside it: it goes on where it is now.
+void move_job(Job& job, const fs::path& to) {
+  const fs::path out = fs::absolute(to).lexically_normal();
+  const auto option = std::find(job.arguments.begin(), job.arguments.end(), "--out");
+  std::error_code ignored;  // where the old place is gone
+  if (out == job.out || fs::equivalent(out, job.out, ignored)) return;
+  if (option == job.arguments.end() || option + 1 == job.arguments.end()) return;
+  std::cerr << "pencilscan: the output was moved from " << job.out.string() << " to "
+            << out.string() << ", where all tasks have to find it\n";
+  job.out = out;
+  *(option + 1) = out.string();
+  write_job(job);
+}
+
 void run_finish(const FinishCommand& command) {
   const ThreadLimit threads(command.common.threads);
   if (!command.resubmit) return report_sequence(command.common, command.out);
@@ -243,7 +264,8 @@ void run_finish(const FinishCommand& command) {
   if (!has_job(command.out))
     throw InputError("--resubmit", "", job_folder(command.out).string(),
                      "must hold the job.json that sequence submit writes");
-  const Job job = read_job(command.out);
+  Job job = read_job(command.out);
+  move_job(job, command.out);
   const std::vector<std::size_t> tasks =
       tasks_with_holes(summarize_sequence(command.out), job.tasks);
   if (tasks.empty()) return report_sequence(command.common, command.out);

@@ -38,6 +38,8 @@ const char* to_string(WarningCode code) {
       return "views-disagree";
     case WarningCode::kMissingLines:
       return "missing-lines";
+    case WarningCode::kFewNames:
+      return "few-names";
     case WarningCode::kMotion:
       return "motion";
   }

@@ -169,8 +169,8 @@ void write_film_zarr(const Film& film, const fs::path& folder, const Progress& p
     if (!is_zarr_group(folder) || read_zarr_group(folder).value("format", "") != kFilmFormat)
       throw InputError(folder.string(), "", "", "must be new, empty or an earlier film");
   }
-  const PartialFolder making(folder.string() + ".partial");
-  const fs::path& partial = making.path();
+  ReplacingFolder making(folder);
+  const fs::path partial = making.path();
   write_zarr_group(partial, {{"format", kFilmFormat}, {"frames", film.frames}});
   const auto at_once = static_cast<std::size_t>(thread_count());
   for (std::size_t first = 0; first < film.frames.size(); first += at_once) {
@@ -184,8 +184,7 @@ void write_film_zarr(const Film& film, const fs::path& folder, const Progress& p
       progress("film",
                static_cast<double>(first + count) / static_cast<double>(film.frames.size()));
   }
-  fs::remove_all(folder);
-  fs::rename(partial, folder);
+  making.publish();
 }
 
 void write_film_usd(const Film& film, double frames_per_second, const fs::path& file,

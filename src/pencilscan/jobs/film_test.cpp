@@ -71,6 +71,28 @@ TEST_F(Films, PythonOpensTheSurfaces) {
             0);
 }
 
+TEST_F(Films, AnEarlierFilmIsReplacedByANameThatEndsWithASlash) {
+  const fs::path folder = temporary_.path() / "surface.zarr";
+  const Film film = find_film(out(), false);
+  write_film_zarr(film, folder);
+  write_text(folder / "old.txt", "of the earlier film");
+  write_film_zarr(film, folder / "");
+  EXPECT_TRUE(is_zarr_group(folder));
+  EXPECT_TRUE(fs::exists(folder / "000002" / "faces"));
+  EXPECT_FALSE(fs::exists(folder / "old.txt"));
+  EXPECT_FALSE(fs::exists(folder.string() + ".partial"));
+  EXPECT_FALSE(fs::exists(folder / ".partial"));
+}
+
+TEST_F(Films, AnEarlierFilmStaysWhereTheNewOneFails) {
+  const fs::path folder = temporary_.path() / "surface.zarr";
+  const Film film = find_film(out(), false);
+  write_film_zarr(film, folder);
+  write_text(film.mesh_file(2), "no mesh");
+  EXPECT_THROW(write_film_zarr(film, folder / ""), InputError);
+  EXPECT_TRUE(fs::exists(folder / "000002" / "faces"));
+}
+
 std::size_t count_of(const std::string& text, const std::string& part) {
   std::size_t count = 0;
   for (auto at = text.find(part); at != std::string::npos; at = text.find(part, at + 1)) ++count;

@@ -5,6 +5,7 @@
 
 #include "pencilscan/core/error.h"
 #include "pencilscan/io/file.h"
+#include "pencilscan/io/partial_folder.h"
 
 namespace pencilscan {
 namespace {
@@ -18,11 +19,7 @@ constexpr std::array<const char*, 3> kKinds = {"local", "ssh", "slurm"};
 
 }  // namespace
 
-fs::path job_folder(const fs::path& out) {
-  fs::path plain = out.lexically_normal();
-  if (!plain.has_filename()) plain = plain.parent_path();
-  return plain += ".job";
-}
+fs::path job_folder(const fs::path& out) { return bare_folder(out) += ".job"; }
 
 bool has_job(const fs::path& out) {
   std::error_code ignored;
@@ -86,11 +83,13 @@ std::string shell_word(const std::string& text) {
 }
 
 std::string task_command(const Job& job, const std::string& shard, bool shell_makes_way) {
-  std::string command = "cd " + shell_word(job.directory.string()) + " && " +
-                        (shell_makes_way ? "exec " : "{ ") + shell_word(job.program.string()) +
+  // 126: as if the program could not be started. A machine without the folder is no place for any
+  // task.
+  std::string command = "cd " + shell_word(job.directory.string()) + " || exit 126; " +
+                        (shell_makes_way ? "exec " : "") + shell_word(job.program.string()) +
                         " reconstruct";
   for (const std::string& argument : job.arguments) command += " " + shell_word(argument);
-  return command + " --shard " + shard + (shell_makes_way ? "" : "; exit $?; }");
+  return command + " --shard " + shard + (shell_makes_way ? "" : "; exit $?");
 }
 
 }  // namespace pencilscan

@@ -122,7 +122,7 @@ TEST_F(Jobs, StoppingEndsWhatRuns) {
   EXPECT_THROW((void)run_tasks(job, all(job), options), StageError);
 }
 
-/// An ssh that runs things here; the host `dead` cannot be reached, `dying` once runs half a task.
+/// An ssh that runs things here; the host `dead` cannot be reached, `apart` has other folders.
 class Ssh : public Jobs {
  protected:
   QueueOptions options() {
@@ -130,6 +130,7 @@ class Ssh : public Jobs {
     std::ofstream(ssh) << "#!/bin/sh\n[ \"$1\" = -o ] && shift 2\necho \"$1\" >> '"
                        << path().string() << "/hosts'\n"
                        << "[ $1 = dead ] && echo 'ssh: no route to host' && exit 255\n"
+                       << "[ $1 = apart ] && set \"$1\" \"cd /not/there ${2#cd \'*\'}\"\n"
                        << "exec sh -c \"$2\"\n";
     fs::permissions(ssh, fs::perms::owner_all);
     QueueOptions options;
@@ -152,6 +153,14 @@ TEST_F(Ssh, HostsTakeTasksAndALostOneGetsNoMore) {
   EXPECT_EQ(report.restarts, 2U);
   const std::string hosts = read_file(path() / "hosts");
   EXPECT_EQ(std::count(hosts.begin(), hosts.end(), '\n'), 8);
+  EXPECT_EQ(read_file(path() / "ran").size(), 6 * 4U);
+}
+
+TEST_F(Ssh, AHostWithoutTheFolderDoesNoTask) {
+  const Job job = job_on({"good", "apart"}, "sleep 0.05; echo $shard >> ran");
+  const TaskReport report = run_tasks(job, all(job), options());
+  EXPECT_EQ(report.done, 6U);
+  EXPECT_THAT(report.hosts_left_out, ElementsAre("apart"));
   EXPECT_EQ(read_file(path() / "ran").size(), 6 * 4U);
 }
 

@@ -18,7 +18,7 @@ struct Known {
 };
 
 /// What to do about warnings, by their code (core/warning.h).
-constexpr std::array<Known, 14> kKnown = {{
+constexpr std::array<Known, 15> kKnown = {{
     {"saturated",
      "Close the aperture or shorten the exposure until the brightest lines stay below "
      "full scale, and capture again."},
@@ -51,6 +51,9 @@ constexpr std::array<Known, 14> kKnown = {{
     {"missing-lines",
      "Look whether the projector shines, and whether its picture is the one that the rig states "
      "(pencilscan pattern writes it)."},
+    {"few-names",
+     "Check that rig and pictures belong together: the rig's file, the names of its cameras, and "
+     "what the projectors show."},
     {"motion", "Shorten the exposure, or flash the projectors for a part of it."},
     {"colors-filled-in", "Let the camera give raw pictures and state its mosaic in the rig."},
 }};

@@ -37,6 +37,12 @@ void restore_light(const Frame& frame, PointResult& result) {
   }
 }
 
+/// What is done once no line's name changes any more.
+void end_points(const Frame& frame, PointResult& result) {
+  if (auto warning = few_names_warning(result)) result.warnings.push_back(std::move(*warning));
+  restore_light(frame, result);
+}
+
 }  // namespace
 
 FrameResult reconstruct_frame(const Rig& stated, const Frame& frame, const FrameOptions& options,
@@ -70,7 +76,7 @@ FrameResult measure_frame(const Rig& rig, const Frame& frame, PointResult lines,
       rig, std::move(lines), looks_again ? before_surface(options.points) : options.points, clock);
   if (result.points.points.empty()) throw NothingFound(why_nothing(result.points));
   if (!options.meshes) {
-    restore_light(frame, result.points);
+    end_points(frame, result.points);
     return result;
   }
   const Frame right = without(frame, result.points.left_out);
@@ -79,7 +85,7 @@ FrameResult measure_frame(const Rig& rig, const Frame& frame, PointResult lines,
   result = match_on_surface(rig, std::move(result), options.points, clock);
   clock("confirmation",
         [&] { result = finish_shape(rig, std::move(result), options.shape.fusion); });
-  restore_light(frame, result.points);
+  end_points(frame, result.points);
   return count_motion(rig, std::move(result));
 }
 

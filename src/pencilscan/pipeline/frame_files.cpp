@@ -9,6 +9,8 @@
 #include "pencilscan/io/found_files.h"
 #include "pencilscan/io/hash.h"
 #include "pencilscan/io/image.h"
+#include "pencilscan/io/json_text.h"
+#include "pencilscan/recording/pack.h"
 #include "pencilscan/rig/camera_light.h"
 
 namespace pencilscan {
@@ -33,23 +35,15 @@ std::string camera_names(const Rig& rig) {
 }
 
 std::vector<FrameFiles> find_frames(const Rig& rig, const std::filesystem::path& folder) {
-  if (!std::filesystem::is_directory(folder)) {
-    throw InputError(folder.string(), "", "", "must be a folder that holds frame folders");
-  }
   std::vector<FrameFiles> frames;
-  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
-    if (entry.is_directory()) frames.push_back({entry.path().filename().string(), {}});
-  }
-  if (frames.empty()) {
-    throw InputError(folder.string(), "frame folders", "none",
-                     "must hold at least one frame folder such as 000000; " + holdings(folder));
-  }
-  std::sort(frames.begin(), frames.end(),
-            [](const FrameFiles& a, const FrameFiles& b) { return a.name < b.name; });
+  for (std::string& name : frame_folder_names(folder)) frames.push_back({std::move(name), {}, {}});
   for (FrameFiles& frame : frames) {
+    if (!is_utf8(frame.name))
+      throw InputError(folder.string(), "frame folder", frame.name, "must have a name in UTF-8");
+    const FolderImages images(folder / frame.name);
     bool any = false;
     for (const Camera& camera : rig.cameras) {
-      frame.images.push_back(find_image(folder / frame.name, camera.name));
+      frame.images.push_back(images.find(camera.name));
       any = any || frame.images.back().has_value();
     }
     if (!any) {
@@ -57,6 +51,11 @@ std::vector<FrameFiles> find_frames(const Rig& rig, const std::filesystem::path&
                        "must hold an image of a camera of the rig (" + camera_names(rig) +
                            "), named like it, as " + rig.cameras.front().name + ".png; " +
                            holdings(folder / frame.name));
+    }
+    for (std::string& stem : images.stems()) {
+      const bool is_known = std::any_of(rig.cameras.begin(), rig.cameras.end(),
+                                        [&](const Camera& camera) { return camera.name == stem; });
+      if (!is_known) frame.strangers.push_back(std::move(stem));
     }
     for (std::size_t c = 0; c < rig.cameras.size(); ++c)
       if (!frame.images[c]) refuse_other_case(folder / frame.name, rig.cameras[c].name);

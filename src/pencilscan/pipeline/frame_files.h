@@ -14,10 +14,12 @@ namespace pencilscan {
 struct FrameFiles {
   std::string name;                                          ///< of the folder
   std::vector<std::optional<std::filesystem::path>> images;  ///< one per camera of the rig
+  std::vector<std::string> strangers = {};  ///< pictures that are named like no camera of the rig
 };
 
-/// Frame folders below `folder`, by name. InputError when the folder is not there, holds no frame
-/// folder, or a frame folder has no image of any camera of the rig.
+/// Frame folders below `folder`, in the order of frame_folder_names(). InputError when the folder
+/// is not there, holds no frame folder, or a frame folder has no image of any camera of the rig or
+/// a name that is not UTF-8, which no report could hold.
 [[nodiscard]] std::vector<FrameFiles> find_frames(const Rig& rig,
                                                   const std::filesystem::path& folder);
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <set>
 
 #include "pencilscan/core/error.h"
 #include "pencilscan/io/file.h"
@@ -102,11 +103,17 @@ FrameSource FrameSource::open(const Rig& rig, const fs::path& path) {
   if (!Recording::is_one(path)) {
     auto folders = std::make_shared<Folders>();
     folders->frames = find_frames(rig, path);
-    for (const FrameFiles& files : folders->frames) source.names_.push_back(files.name);
+    std::set<std::string> strangers;
+    for (const FrameFiles& files : folders->frames) {
+      source.names_.push_back(files.name);
+      strangers.insert(files.strangers.begin(), files.strangers.end());
+    }
+    source.strangers_.assign(strangers.begin(), strangers.end());
     source.storage_ = std::move(folders);
     return source;
   }
   Recording recording = Recording::open(path);
+  source.closed_ = recording.is_closed();
   FrameSets sets = group_frames(recording);
   auto recorded = std::make_shared<Recorded>(std::move(recording), std::move(sets));
   bool any = false;
@@ -124,6 +131,12 @@ FrameSource FrameSource::open(const Rig& rig, const fs::path& path) {
                            " of the rig");
     }
   }
+  for (const RecordedCamera& of : recorded->recording.cameras()) {
+    const bool is_known = std::any_of(rig.cameras.begin(), rig.cameras.end(),
+                                      [&](const Camera& camera) { return camera.name == of.name; });
+    if (!is_known) source.strangers_.push_back(of.name);
+  }
+  std::sort(source.strangers_.begin(), source.strangers_.end());
   if (!any) {
     throw InputError(path.string(), "cameras", "none of the rig",
                      "must hold a camera of the rig (" + camera_names(rig) + ")");

@@ -25,6 +25,10 @@ class FrameSource {
   [[nodiscard]] std::size_t size() const { return names_.size(); }
   [[nodiscard]] const std::string& name(std::size_t frame) const { return names_[frame]; }
   [[nodiscard]] const std::vector<std::string>& names() const { return names_; }
+  /// Cameras, by name, that have pictures here and are not of the rig; sorted.
+  [[nodiscard]] const std::vector<std::string>& strangers() const { return strangers_; }
+  /// False of a recording that was cut off, or goes on: frames may lack at its end.
+  [[nodiscard]] bool is_closed() const { return closed_; }
   /// The pictures of a frame. InputError for a broken one or, of image folders, one of another size
   /// than its camera. `rig` is the one that it was opened with.
   [[nodiscard]] Frame read(const Rig& rig, std::size_t frame) const;
@@ -48,6 +52,8 @@ class FrameSource {
 
   std::shared_ptr<const Storage> storage_;
   std::vector<std::string> names_;
+  std::vector<std::string> strangers_;
+  bool closed_ = true;
   std::shared_ptr<const FrameSource> plain_;
   std::vector<std::size_t> plain_of_;  ///< frame of plain_
 };

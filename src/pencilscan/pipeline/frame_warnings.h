@@ -39,6 +39,9 @@ namespace pencilscan {
 [[nodiscard]] std::vector<Warning> missing_lines_warnings(const Rig& rig,
                                                           std::span<const ExpectedLines> expected);
 
+/// That hardly any of the lines in the pictures could be named.
+[[nodiscard]] std::optional<Warning> few_names_warning(const PointResult& result);
+
 /// That what one camera sees lies apart from what the others see, and that it was left out, or not.
 [[nodiscard]] Warning another_moment_warning(const Rig& rig, std::size_t camera,
                                              const ViewsApart& apart, bool is_left_out);

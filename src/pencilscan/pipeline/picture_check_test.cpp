@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "pencilscan/core/error.h"
+#include "pencilscan/pipeline/frame_warnings.h"
 #include "pencilscan/pipeline/sample_frame.h"
 #include "pencilscan/planning/ring.h"
 #include "pencilscan/simulation/simulated_object.h"
@@ -238,6 +239,21 @@ TEST_F(PictureCheck, AMovedCameraIsNamed) {
   const auto said = said_of(*frame_, moved);
   ASSERT_EQ(said.size(), 1U);
   EXPECT_THAT(said[0], HasSubstr("camera cam2: its picture does not fit the rig"));
+}
+
+TEST(FewNames, IsSaidBelowATenthOfTheLines) {
+  PointResult result;
+  EXPECT_FALSE(few_names_warning(result));
+  result.graphs.resize(2);
+  result.graphs[1].curves.resize(1);
+  result.graphs[1].curves[0].points.resize(1000);
+  result.labeling.runs.resize(2);
+  result.labeling.runs[1].push_back({0, 0, 99, {}});
+  const auto warning = few_names_warning(result);
+  ASSERT_TRUE(warning);
+  EXPECT_THAT(warning->text, HasSubstr("only 9.9 % of the lines"));
+  result.labeling.runs[1][0].end = 100;
+  EXPECT_FALSE(few_names_warning(result));
 }
 
 }  // namespace

@@ -15,6 +15,7 @@
 #include "pencilscan/core/error.h"
 #include "pencilscan/io/file.h"
 #include "pencilscan/io/hash.h"
+#include "pencilscan/io/image.h"
 
 namespace pencilscan {
 namespace {
@@ -54,13 +55,14 @@ std::string host_name() {
 struct FolderLock {
   int file = -1;          ///< -1: not taken
   bool is_taken = false;  ///< somebody else has it, or has removed the folder
+  int error = 0;          ///< why it could not be opened
 };
 
 /// File systems without locks give neither.
 FolderLock lock_folder(const fs::path& folder) {
   FolderLock lock;
   lock.file = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (lock.file < 0) return {-1, true};
+  if (lock.file < 0) return {-1, true, errno};
   struct stat status {};
   const bool locked = ::flock(lock.file, LOCK_EX | LOCK_NB) == 0;
   lock.is_taken = !locked && errno == EWOULDBLOCK;
@@ -173,11 +175,17 @@ FrameFolder::FrameFolder(const fs::path& out, std::string frame, const std::stri
       const FolderLock lock = lock_folder(path_);
       lock_ = lock.file;
       if (!lock.is_taken) break;
+      error = std::error_code(lock.error, std::generic_category());
     }
     if (trial == kTrials) throw StageError(path_.string() + ": cannot be made: " + error.message());
   }
-  write_json(path_ / kFrameInputFile, {{"settings", settings}, {"images", images}},
-             Durability::kProcess);
+  try {
+    write_json(path_ / kFrameInputFile, {{"settings", settings}, {"images", images}},
+               Durability::kProcess);
+  } catch (const std::exception&) {
+    leave();
+    throw;
+  }
 }
 
 FrameFolder::~FrameFolder() { leave(); }
@@ -214,6 +222,14 @@ void write_failure(const fs::path& out, const std::string& frame, const std::str
              {{"frame", frame}, {"reason", failure.reason}, {"is_passing", failure.is_passing}},
              Durability::kProcess);
   folder.publish();
+}
+
+void check_replaceable(const fs::path& out, const std::string& frame) {
+  // Of a result that a killed program was removing, anything may be left, but no picture: those lie
+  // in folders of their own.
+  if (FolderImages(out / frame).stems().empty()) return;
+  throw InputError("--out", "", out.string(),
+                   "holds pictures in " + frame + ", which no result does: they are not replaced");
 }
 
 void remove_abandoned(const fs::path& out) {

@@ -83,6 +83,10 @@ void write_failure(const std::filesystem::path& out, const std::string& frame,
                    const std::string& settings, const std::string& images,
                    const FrameFailure& failure);
 
+/// InputError where something else than a result is in the place of a frame's: the frames
+/// themselves, when `out` is their folder.
+void check_replaceable(const std::filesystem::path& out, const std::string& frame);
+
 /// Removes what programs left behind that were killed while making a frame; not what one is making
 /// now.
 void remove_abandoned(const std::filesystem::path& out);

@@ -243,6 +243,36 @@ std::vector<FrameOutcome> make_frames(const Run& run, const std::vector<std::siz
   return outcomes;
 }
 
+/// What is read is not written to.
+void refuse_as_output(const std::string& option, const fs::path& input, const fs::path& out) {
+  std::error_code ignored;
+  if (fs::equivalent(input, out, ignored))
+    throw InputError("--out", "", out.string(), "must not be that of " + option);
+}
+
+struct SequenceInput {
+  Rig rig;
+  FrameSource frames;
+};
+
+/// InputError where rig, frames and options do not go together.
+SequenceInput open_input(const fs::path& rig_path, const fs::path& frames_path, const fs::path& out,
+                         const SequenceOptions& options) {
+  Rig rig = read_rig(rig_path);
+  require_patterns(rig, rig_path.string(), "there is nothing to see of this projector");
+  FrameSource frames = FrameSource::open(rig, frames_path);
+  if (!options.plain_frames.empty()) frames.add_plain(rig, options.plain_frames);
+  refuse_as_output("--frames", frames_path, out);
+  refuse_as_output("--plain-frames", options.plain_frames, out);
+  if (options.output.refine_rig && is_output_rig(rig_path, out)) {
+    throw InputError("--rig", "", rig_path.string(),
+                     "must not be the rig.json in --out, where the refined rig is written");
+  }
+  const std::string_view rule = broken_rule(rig, options.output.frame.points.method);
+  if (!rule.empty()) throw InputError(rig_path.string(), "projectors", "", std::string(rule));
+  return {std::move(rig), std::move(frames)};
+}
+
 }  // namespace
 
 std::size_t frames_at_once(const Rig& rig) {
@@ -257,18 +287,16 @@ std::size_t frames_at_once(const Rig& rig) {
   return static_cast<std::size_t>(std::max(1.0, std::min(useful, std::floor(most))));
 }
 
+void check_sequence(const fs::path& rig_path, const fs::path& frames, const fs::path& out,
+                    const SequenceOptions& options) {
+  const SequenceInput input = open_input(rig_path, frames, out, options);
+  refuse_other_settings(out, describe_inputs(rig_path, input.frames, options), options);
+}
+
 SequenceOutcome reconstruct_sequence(const fs::path& rig_path, const fs::path& frames_path,
                                      const fs::path& out, const SequenceOptions& options,
                                      const Progress& progress) {
-  Rig rig = read_rig(rig_path);
-  FrameSource frames = FrameSource::open(rig, frames_path);
-  if (!options.plain_frames.empty()) frames.add_plain(rig, options.plain_frames);
-  if (options.output.refine_rig && is_output_rig(rig_path, out)) {
-    throw InputError("--rig", "", rig_path.string(),
-                     "must not be the rig.json in --out, where the refined rig is written");
-  }
-  const std::string_view rule = broken_rule(rig, options.output.frame.points.method);
-  if (!rule.empty()) throw InputError(rig_path.string(), "projectors", "", std::string(rule));
+  auto [rig, frames] = open_input(rig_path, frames_path, out, options);
   // One of several shards leaves the other frames to the others, and a broken one is a failed one.
   if (!options.shard) check_images(rig, frames, progress);
   const std::vector<std::size_t> own = options.shard.value_or(Shard{}).frames_of(frames.size());
@@ -276,6 +304,10 @@ SequenceOutcome reconstruct_sequence(const fs::path& rig_path, const fs::path& f
   const std::vector<PictureHashes> images = picture_hashes(frames, own, options);
   const std::vector<std::string> keys = frame_keys(images, options);
   const std::vector<char> there = resumable(out, inputs, own, keys, options);
+
+  for (std::size_t i = 0; i < own.size(); ++i) {
+    if (there[i] == 0) check_replaceable(out, frames.name(own[i]));
+  }
 
   // From here on the output may change. What is to be made anew goes first.
   for (std::size_t i = 0; i < own.size(); ++i) {
@@ -288,6 +320,8 @@ SequenceOutcome reconstruct_sequence(const fs::path& rig_path, const fs::path& f
 
   SequenceOutcome result;
   result.warnings = repetitions(rig, frames, own, images);
+  if (auto warning = strangers_warning(frames)) result.warnings.push_back(std::move(*warning));
+  if (auto warning = open_recording_warning(frames)) result.warnings.push_back(std::move(*warning));
   if (options.output.refine_rig)
     rig = refined_rig(rig, frames, out, options, progress, result.refinement.emplace());
   // The rig in use, so that the output can be looked at without its input.

@@ -97,33 +97,61 @@ std::vector<std::string> repetitions(const Rig& rig, const FrameSource& frames,
   return warnings;
 }
 
+std::optional<std::string> strangers_warning(const FrameSource& frames) {
+  if (frames.strangers().empty()) return std::nullopt;
+  std::string names;
+  for (const std::string& name : frames.strangers()) names += (names.empty() ? "" : ", ") + name;
+  return "the frames hold pictures that are named like no camera of the rig, and nobody looks at "
+         "them: " +
+         names;
+}
+
+std::optional<std::string> open_recording_warning(const FrameSource& frames) {
+  if (frames.is_closed()) return std::nullopt;
+  return "the recording was cut off or goes on: the sequence ends with frame " +
+         frames.names().back() + ", the last one that is there now";
+}
+
+namespace {
+
+void refuse_output(const fs::path& out, const std::string& rule, const SequenceOptions& options) {
+  if (!options.overwrite)
+    throw InputError("--out", "", out.string(), rule + " (or give --overwrite)");
+}
+
+}  // namespace
+
+bool refuse_other_settings(const fs::path& out, const RunInputs& inputs,
+                           const SequenceOptions& options) {
+  if (is_new_run(out)) return true;
+  if (!fs::is_directory(out)) throw InputError("--out", "", out.string(), "must be a folder");
+  if (!has_run_inputs(out)) {
+    refuse_output(out, "must be new, empty or the output of the same inputs", options);
+    return false;
+  }
+  const RunInputs earlier = read_run_inputs(out);
+  if (earlier.settings() == inputs.settings()) return true;
+  RunInputs of_other_frames = earlier;
+  of_other_frames.refined_from = inputs.refined_from;
+  refuse_output(
+      out,
+      of_other_frames.settings() == inputs.settings()
+          ? "holds a rig refined from other frames"
+          : "holds the output of another rig, other options or another build of the program",
+      options);
+  return false;
+}
+
 std::vector<char> resumable(const fs::path& out, const RunInputs& inputs,
                             const std::vector<std::size_t>& own,
                             const std::vector<std::string>& keys, const SequenceOptions& options) {
   std::vector<char> done(own.size(), 0);
-  if (is_new_run(out)) return done;
-  const auto refuse = [&](const std::string& what) {
-    if (!options.overwrite)
-      throw InputError("--out", "", out.string(), what + " (or give --overwrite)");
-  };
-  if (!fs::is_directory(out)) throw InputError("--out", "", out.string(), "must be a folder");
-  if (!has_run_inputs(out)) {
-    refuse("must be new, empty or the output of the same inputs");
-    return done;
-  }
-  const RunInputs earlier = read_run_inputs(out);
-  if (earlier.settings() != inputs.settings()) {
-    RunInputs of_other_frames = earlier;
-    of_other_frames.refined_from = inputs.refined_from;
-    refuse(of_other_frames.settings() == inputs.settings()
-               ? "holds a rig refined from other frames"
-               : "holds the output of another rig, other options or another build of the program");
-    return done;
-  }
+  if (!refuse_other_settings(out, inputs, options) || is_new_run(out)) return done;
   for (std::size_t i = 0; i < own.size(); ++i) {
     const std::string& name = inputs.frames[own[i]];
     const FrameState state = frame_status(out, name, inputs.settings(), keys[own[i]]).state;
-    if (state == FrameState::kOther) refuse("holds the output of other images in frame " + name);
+    if (state == FrameState::kOther)
+      refuse_output(out, "holds the output of other images in frame " + name, options);
     done[i] = state == FrameState::kDone ? 1 : 0;
   }
   return done;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -42,6 +43,17 @@ struct PictureHashes {
 [[nodiscard]] std::vector<std::string> repetitions(const Rig& rig, const FrameSource& frames,
                                                    const std::vector<std::size_t>& own,
                                                    const std::vector<PictureHashes>& images);
+
+/// InputError where `out` is there and not the output of these settings, unless it may be replaced.
+/// True where it is new or theirs.
+bool refuse_other_settings(const std::filesystem::path& out, const RunInputs& inputs,
+                           const SequenceOptions& options);
+
+/// Warns of pictures that belong to no camera of the rig.
+[[nodiscard]] std::optional<std::string> strangers_warning(const FrameSource& frames);
+
+/// Warns of a recording that was cut off or goes on.
+[[nodiscard]] std::optional<std::string> open_recording_warning(const FrameSource& frames);
 
 /// Decides which of the frames `own` are there already; refuses the output of other inputs
 /// (InputError).

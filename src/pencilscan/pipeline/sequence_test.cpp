@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -10,6 +11,7 @@
 #include <fstream>
 #include <map>
 #include <opencv2/core.hpp>
+#include <utility>
 
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/parallel.h"
@@ -19,6 +21,7 @@
 #include "pencilscan/pipeline/frame_source.h"
 #include "pencilscan/pipeline/repeated_pictures.h"
 #include "pencilscan/pipeline/run_folder.h"
+#include "pencilscan/pipeline/sequence_inputs.h"
 #include "pencilscan/recording/pack.h"
 #include "pencilscan/rig/sample_devices.h"
 
@@ -27,6 +30,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using ::testing::ElementsAre;
+using ::testing::EndsWith;
 using ::testing::HasSubstr;
 
 std::string error_of(const std::function<void()>& call) {
@@ -158,6 +162,38 @@ TEST_F(Run, AFailureOfOtherPicturesIsNothingToKeep) {
   EXPECT_EQ(frame_status(out(), "000000", "t", "i").state, FrameState::kOther);
 }
 
+TEST_F(Run, AFullDiskLeavesNothingOpen) {
+  const auto open_files = [] {
+    return std::distance(fs::directory_iterator("/proc/self/fd"), fs::directory_iterator{});
+  };
+  const auto before = open_files();
+  rlimit limit{};
+  ASSERT_EQ(::getrlimit(RLIMIT_FSIZE, &limit), 0);
+  const auto usual = std::exchange(limit.rlim_cur, 0);
+  const auto signals = std::signal(SIGXFSZ, SIG_IGN);  // as the program does
+  ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &limit), 0);
+  EXPECT_THROW(FrameFolder(out(), "000000", "s", "i"), StageError);
+  limit.rlim_cur = usual;
+  ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &limit), 0);
+  std::signal(SIGXFSZ, signals);
+  EXPECT_EQ(open_files(), before);
+  EXPECT_FALSE(fs::exists(out() / ".making"));
+}
+
+TEST_F(Run, OnlyResultsMakeWay) {
+  fs::create_directories(out() / "000000");
+  EXPECT_NO_THROW(check_replaceable(out(), "000000"));
+  EXPECT_NO_THROW(check_replaceable(out(), "000001"));
+  write_text(out() / "000000" / "cam0.png", "a picture");
+  EXPECT_THAT(error_of([&] { check_replaceable(out(), "000000"); }),
+              HasSubstr("holds pictures in 000000"));
+  fs::remove(out() / "000000" / "cam0.png");
+  write_text(out() / "000000" / "points.ply", "of a result that was being removed");
+  EXPECT_NO_THROW(check_replaceable(out(), "000000"));
+  write_failure(out(), "000002", "s", "i", {"no curve", false});
+  EXPECT_NO_THROW(check_replaceable(out(), "000002"));
+}
+
 TEST_F(Run, WhatAKilledProgramLeftIsRemovedAndNothingElse) {
   const pid_t child = ::fork();
   ASSERT_GE(child, 0);
@@ -261,6 +297,44 @@ TEST_F(Sequence, ARecordingGivesTheFramesOfItsFolders) {
               HasSubstr("must hold a camera of the rig"));
 }
 
+TEST_F(Sequence, WarnsOfPicturesOfNoCamera) {
+  EXPECT_FALSE(strangers_warning(FrameSource::open(rig_, frames())));
+  EXPECT_FALSE(strangers_warning(FrameSource::open(rig_, recording())));
+  const cv::Mat picture(4, 4, CV_8UC3, cv::Scalar(9, 9, 9));
+  write_image(frames() / six_digits(3) / "cam9.png", picture);
+  write_image(frames() / six_digits(5) / "cam8.tiff", picture);
+  EXPECT_THAT(strangers_warning(FrameSource::open(rig_, frames())).value(),
+              EndsWith("nobody looks at them: cam8, cam9"));
+  const fs::path recorded = temporary_.path() / "strangers.zarr";
+  pack_recording(frames(), recorded);
+  EXPECT_THAT(strangers_warning(FrameSource::open(rig_, recorded)).value(),
+              EndsWith(": cam8, cam9"));
+}
+
+TEST_F(Sequence, WarnsOfARecordingThatWasCutOff) {
+  EXPECT_FALSE(open_recording_warning(FrameSource::open(rig_, frames())));
+  EXPECT_FALSE(open_recording_warning(FrameSource::open(rig_, recording())));
+  const fs::path cut = temporary_.path() / "cut.zarr";
+  {
+    const Camera& camera = rig_.cameras[0];
+    RecordingWriter writer(cut, {{camera.name, camera.width, camera.height, 3, 8, 0}});
+    for (std::size_t k = 0; k < 3; ++k)
+      writer.write(k, 0, read_stored_image(frames() / six_digits(k) / "cam0.png"), kUnknownTime);
+  }
+  const SequenceOutcome outcome = run(cut, temporary_.path() / "out", {});
+  EXPECT_EQ(outcome.frames.size(), 3U);
+  EXPECT_THAT(outcome.warnings, ElementsAre(HasSubstr("the recording was cut off or goes on")));
+  EXPECT_THAT(outcome.warnings.front(), HasSubstr("frame 000002"));
+}
+
+TEST_F(Sequence, FramesThatAreCountedComeInTheOrderOfTheirNumbers) {
+  const fs::path counted = temporary_.path() / "counted";
+  const cv::Mat picture(rig_.cameras[0].height, rig_.cameras[0].width, CV_8UC3, cv::Scalar(9));
+  for (const char* name : {"1", "2", "3", "10"}) write_image(counted / name / "cam0.png", picture);
+  fs::create_directories(counted / ".ipynb_checkpoints");
+  EXPECT_THAT(FrameSource::open(rig_, counted).names(), ElementsAre("1", "2", "3", "10"));
+}
+
 TEST_F(Sequence, ShardsInAnyNumberGiveTheSameBytes) {
   const fs::path one = temporary_.path() / "one";
   const fs::path three = temporary_.path() / "three";
@@ -276,6 +350,18 @@ TEST_F(Sequence, ShardsInAnyNumberGiveTheSameBytes) {
   EXPECT_THAT(error_of([&] { (void)run(recording(), temporary_.path() / "none", {}); }),
               HasSubstr("60.0.0.0"));
   EXPECT_FALSE(fs::exists(temporary_.path() / "none"));
+}
+
+TEST_F(Sequence, NeverReplacesItsFrames) {
+  EXPECT_THAT(error_of([&] { (void)run(frames(), frames(), {}, true); }),
+              HasSubstr("must not be that of --frames"));
+  // Reached on another way, too: as a part of the output.
+  const fs::path out = temporary_.path() / "out";
+  fs::create_directories(out);
+  fs::create_directory_symlink(frames() / six_digits(3), out / six_digits(3));
+  EXPECT_THAT(error_of([&] { (void)run(frames(), out, {}, true); }),
+              HasSubstr("holds pictures in 000003"));
+  EXPECT_TRUE(fs::exists(frames() / six_digits(3) / "cam0.png"));
 }
 
 TEST_F(Sequence, WarnsOfACameraThatHangs) {

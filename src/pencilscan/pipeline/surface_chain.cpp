@@ -16,6 +16,15 @@ namespace fs = std::filesystem;
 constexpr const char* kSurfacesFolder = ".surfaces";
 constexpr std::size_t kRunIn = kMemoryMoments;
 
+/// The file only saves time, should the program be killed: a full disk, or another program that
+/// just removed the empty folder, is no reason to fail the frame.
+void write_or_leave(const fs::path& file, const TrackedSurface& surface, const std::string& key) {
+  try {
+    write_tracked_surface(file, surface, key);
+  } catch (const StageError&) {
+  }
+}
+
 }  // namespace
 
 std::size_t first_of_chain(std::size_t frame) {
@@ -101,7 +110,7 @@ void SurfaceChain::hand_on(std::size_t step, Surface surface) {
   // A run-in is no place to go on from: its frames belong to the chunk before.
   const std::size_t frame = steps_[step].frame;
   if (surface && steps_[step].is_written && is_followed(step))
-    write_tracked_surface(file_of(frame), *surface, keys_[frame]);
+    write_or_leave(file_of(frame), *surface, keys_[frame]);
   is_handed_on_[step] = 1;
   promises_[step].set_value(std::move(surface));
   promises_[step] = {};  // it would hold the surface as long as the chain lives
@@ -116,7 +125,7 @@ void SurfaceChain::end(std::size_t step, bool broken) {
   } else if (is_handed_on_[step] == 0) {
     try {
       hand_on(step, before(step));
-    } catch (const ChainBroken&) {
+    } catch (const std::exception&) {
       cut(step, std::current_exception());
     }
   }

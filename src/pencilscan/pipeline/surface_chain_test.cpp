@@ -4,6 +4,7 @@
 
 #include <numeric>
 
+#include "pencilscan/io/file.h"
 #include "pencilscan/io/temporary_folder.h"
 #include "pencilscan/tracking/tracked_surface.h"
 
@@ -31,6 +32,29 @@ TEST(SurfaceChain, ASurfaceIsLetGoOnceTheNextFrameIsMade) {
     before = handed_on;
   }
   EXPECT_TRUE(before.expired()) << "nothing comes after the last frame";
+}
+
+TEST(SurfaceChain, GoesOnWhereItsFilesCannotBeWritten) {
+  const TemporaryFolder out("SurfaceChainOnAFullDisk");
+  write_text(out.path() / ".surfaces", "in the way of the folder");
+  const std::vector<std::string> names = {"000000", "000001", "000002"};
+  SurfaceChain chain(out.path(), names, names, {0, 1, 2}, {0, 0, 0});
+  const auto made = std::make_shared<const TrackedSurface>();
+  chain.linked({}, 0).hand_on(made);
+  chain.end(0, false);
+  chain.end(1, false);  // failed: what it got goes on
+  EXPECT_EQ(chain.linked({}, 2).before(), made);
+  chain.end(2, false);
+}
+
+TEST(SurfaceChain, WhatFollowsABrokenFrameIsToldSoWhateverItDoes) {
+  const TemporaryFolder out("SurfaceChainBroken");
+  const std::vector<std::string> names = {"000000", "000001", "000002"};
+  SurfaceChain chain(out.path(), names, names, {0, 1, 2}, {0, 0, 0});
+  chain.end(0, true);
+  chain.end(1, false);
+  EXPECT_THROW((void)chain.linked({}, 2).before(), ChainBroken);
+  chain.end(2, false);
 }
 
 }  // namespace

@@ -5,13 +5,17 @@
 #include <charconv>
 #include <cstdio>
 #include <map>
+#include <nlohmann/json.hpp>
 #include <sstream>
+#include <system_error>
 
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/io/file.h"
 #include "pencilscan/io/found_files.h"
 #include "pencilscan/io/image.h"
+#include "pencilscan/io/partial_folder.h"
+#include "pencilscan/io/zarr_array.h"
 
 namespace pencilscan {
 namespace {
@@ -28,28 +32,34 @@ struct FoundFrames {
   std::map<std::string, CameraFiles> cameras;  ///< by name
 };
 
-bool is_six_digits(const std::string& name) {
-  return name.size() == 6 &&
-         std::all_of(name.begin(), name.end(), [](char c) { return c >= '0' && c <= '9'; });
+bool is_number(const std::string& name) {
+  return std::all_of(name.begin(), name.end(), [](char c) { return c >= '0' && c <= '9'; });
 }
 
-std::vector<std::string> folder_names(const fs::path& folder) {
-  if (!fs::is_directory(folder))
-    throw InputError(folder.string(), "", "", "must be a folder that holds frame folders");
-  std::vector<std::string> names;
-  for (const auto& entry : fs::directory_iterator(folder)) {
-    if (entry.is_directory()) names.push_back(entry.path().filename().string());
-  }
-  std::sort(names.begin(), names.end());
-  if (names.empty()) {
-    throw InputError(folder.string(), "frame folders", "none",
-                     "must hold at least one frame folder such as 000000; " + holdings(folder));
-  }
-  return names;
+bool is_six_digits(const std::string& name) { return name.size() == 6 && is_number(name); }
+
+/// Order of whole numbers of any length, and by name where they are equal (1, 01).
+bool is_less_by_number(const std::string& a, const std::string& b) {
+  const auto digits = [](const std::string& name) {
+    return name.substr(std::min(name.find_first_not_of('0'), name.size()));
+  };
+  const std::string x = digits(a);
+  const std::string y = digits(b);
+  if (x.size() != y.size()) return x.size() < y.size();
+  return x == y ? a < b : x < y;
+}
+
+/// Not the pictures' own folder, nor one around it: both would go where they are replaced.
+void refuse_frames_as_output(const fs::path& frames, const fs::path& out) {
+  const fs::path inner = fs::weakly_canonical(bare_folder(frames));
+  const fs::path outer = fs::weakly_canonical(bare_folder(out));
+  if (std::mismatch(outer.begin(), outer.end(), inner.begin(), inner.end()).first == outer.end())
+    throw InputError("--out", "", out.string(),
+                     "must not be the folder of --frames, nor one around it");
 }
 
 FoundFrames find_pictures(const fs::path& folder) {
-  const std::vector<std::string> names = folder_names(folder);
+  const std::vector<std::string> names = frame_folder_names(folder);
   const bool numbered = std::all_of(names.begin(), names.end(), is_six_digits);
   FoundFrames found;
   for (std::size_t i = 0; i < names.size(); ++i) {
@@ -121,9 +131,10 @@ std::map<std::string, std::map<std::string, std::int64_t>> read_times(const fs::
     for (std::size_t c = 1; c < cells.size() && c < header.size(); ++c) {
       std::int64_t time = kUnknownTime;
       const char* const end = cells[c].data() + cells[c].size();
-      if (!cells[c].empty() && std::from_chars(cells[c].data(), end, time).ptr != end) {
+      const auto [last, fault] = std::from_chars(cells[c].data(), end, time);
+      if (!cells[c].empty() && (fault != std::errc() || last != end)) {
         throw InputError(file.string(), "line " + std::to_string(number) + ", " + header[c],
-                         cells[c], "must be whole nanoseconds or nothing");
+                         cells[c], "must be whole nanoseconds of at most 64 bits, or nothing");
       }
       times[cells[0]][header[c]] = time;
     }
@@ -131,7 +142,62 @@ std::map<std::string, std::map<std::string, std::int64_t>> read_times(const fs::
   return times;
 }
 
+/// True where unpacking writes a picture of this row.
+bool is_there(const Recording& recording, std::optional<std::size_t> row, std::size_t camera) {
+  std::error_code ignored;
+  return row && recording.valid(*row, camera) &&
+         fs::exists(recording.picture_file(*row, camera), ignored);
+}
+
+/// What is there and is not written anew would be one sequence with what is. It may be foreign, so
+/// it is named and not deleted.
+void refuse_what_would_stay(const Recording& recording, const FrameSets& sets,
+                            const fs::path& out) {
+  if (!fs::is_directory(out)) return;
+  const auto refuse = [](const fs::path& file) {
+    throw InputError("--out", "", file.string(),
+                     "must not stay: it would be taken for a part of this recording; remove it, or "
+                     "name a new folder");
+  };
+  if (sets.period_ns <= 0 && fs::exists(out / kTimesFile)) refuse(out / kTimesFile);
+  std::map<std::string, std::size_t> frames;
+  for (std::size_t k = 0; k < sets.sets.size(); ++k) frames[six_digits(k)] = k;
+  for (const auto& entry : fs::directory_iterator(out)) {
+    const std::string name = entry.path().filename().string();
+    if (!entry.is_directory() || name.starts_with('.')) continue;
+    const auto frame = frames.find(name);
+    const FolderImages images(entry.path());
+    for (const std::string& stem : images.stems()) {
+      const fs::path file = images.find(stem).value_or("");
+      if (file.empty()) continue;
+      const auto camera = recording.camera_named(stem);
+      const bool is_replaced = frame != frames.end() && camera && file.extension() == ".png" &&
+                               is_there(recording, sets.sets[frame->second].rows[*camera], *camera);
+      if (!is_replaced) refuse(file);
+    }
+  }
+}
+
 }  // namespace
+
+std::vector<std::string> frame_folder_names(const fs::path& folder) {
+  if (!fs::is_directory(folder))
+    throw InputError(folder.string(), "", "", "must be a folder that holds frame folders");
+  std::vector<std::string> names;
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    std::string name = entry.path().filename().string();
+    if (entry.is_directory() && !name.starts_with('.')) names.push_back(std::move(name));
+  }
+  if (names.empty()) {
+    throw InputError(folder.string(), "frame folders", "none",
+                     "must hold at least one frame folder such as 000000; " + holdings(folder));
+  }
+  if (std::all_of(names.begin(), names.end(), is_number))
+    std::sort(names.begin(), names.end(), is_less_by_number);
+  else
+    std::sort(names.begin(), names.end());
+  return names;
+}
 
 std::string six_digits(std::size_t frame) {
   char name[24];
@@ -141,6 +207,7 @@ std::string six_digits(std::size_t frame) {
 
 PackReport pack_recording(const fs::path& frames, const fs::path& out, const PackOptions& options,
                           const Progress& progress) {
+  refuse_frames_as_output(frames, out);
   const FoundFrames found = find_pictures(frames);
   fs::path times_file = options.times;
   if (times_file.empty() && fs::exists(frames / kTimesFile)) times_file = frames / kTimesFile;
@@ -156,10 +223,14 @@ PackReport pack_recording(const fs::path& frames, const fs::path& out, const Pac
     report.pictures += pictures.size();
   }
   report.missing = report.frames * cameras.size() - report.pictures;
-  if (options.overwrite && Recording::is_one(out)) fs::remove_all(out);
+  // A film is a Zarr group, too.
+  const bool replaces =
+      options.overwrite && Recording::is_one(out) && read_zarr_group(out).contains("cameras");
+  check_recorded(out, cameras, replaces ? OutFolder::kReplaced : OutFolder::kNew);
   RecordingOptions recording_options;
   recording_options.compression = options.compression;
-  RecordingWriter writer(out, cameras, recording_options);
+  ReplacingFolder making(out);
+  RecordingWriter writer(making.path(), cameras, recording_options);
   std::atomic<std::size_t> written{0};
   parallel_for(cameras.size(), [&](std::size_t c) {
     for (const auto& [row, file] : *files[c]) {
@@ -175,11 +246,13 @@ PackReport pack_recording(const fs::path& frames, const fs::path& out, const Pac
     }
   });
   writer.close();
+  making.publish();
   return report;
 }
 
 PackReport unpack_recording(const Recording& recording, const FrameSets& sets, const fs::path& out,
                             const Progress& progress) {
+  refuse_what_would_stay(recording, sets, out);
   PackReport report;
   report.frames = sets.sets.size();
   for (const RecordedCamera& camera : recording.cameras()) report.cameras.push_back(camera.name);

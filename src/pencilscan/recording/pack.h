@@ -27,13 +27,19 @@ struct PackOptions {
 
 /// Makes a recording of image folders (`frames/<frame>/<camera>.png` and so on), pixels as stored.
 /// Folders of six digits keep their number as their row, so that a gap stays a gap. InputError for
-/// pictures that are damaged or of another size or type than the camera's others.
+/// pictures that are damaged or of another size or type than the camera's others. The recording is
+/// made in `<out>.partial` and appears whole; an earlier one stays until then.
 PackReport pack_recording(const std::filesystem::path& frames, const std::filesystem::path& out,
                           const PackOptions& options = {}, const Progress& progress = {});
 
 /// The opposite: a folder of PNG files per frame set, and timestamps.csv where there are times.
+/// InputError where `out` holds pictures or times that would stay, and be taken for this set's.
 PackReport unpack_recording(const Recording& recording, const FrameSets& sets,
                             const std::filesystem::path& out, const Progress& progress = {});
+
+/// The frame folders below `folder` in their order: by number where all names are digits, else by
+/// name; not those whose names begin with a dot. InputError when there is none.
+[[nodiscard]] std::vector<std::string> frame_folder_names(const std::filesystem::path& folder);
 
 /// The name of frame k: six digits.
 [[nodiscard]] std::string six_digits(std::size_t frame);

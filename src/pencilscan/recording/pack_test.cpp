@@ -6,6 +6,7 @@
 #include <fstream>
 
 #include "pencilscan/core/error.h"
+#include "pencilscan/io/file.h"
 #include "pencilscan/io/image.h"
 #include "pencilscan/io/temporary_folder.h"
 
@@ -13,6 +14,9 @@ namespace pencilscan {
 namespace {
 
 namespace fs = std::filesystem;
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
 
 class Pack : public ::testing::Test {
  protected:
@@ -25,6 +29,16 @@ class Pack : public ::testing::Test {
 
   TemporaryFolder temporary_{::testing::UnitTest::GetInstance()->current_test_info()->name()};
 };
+
+template <class Call>
+std::string refusal(const Call& call) {
+  try {
+    call();
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "";
+}
 
 bool equal_pixels(const cv::Mat& a, const cv::Mat& b) {
   return a.size() == b.size() && a.type() == b.type() && cv::norm(a, b, cv::NORM_INF) == 0;
@@ -68,6 +82,112 @@ TEST_F(Pack, PicturesOfAnotherKindAreRefusedByName) {
                                                ::testing::HasSubstr("16x12 colour, 8 bit"),
                                                ::testing::HasSubstr("16x12 grey, 8 bit")));
   }
+}
+
+TEST_F(Pack, AnEarlierRecordingStaysUntilTheNewOneIsWhole) {
+  put("000000/cam0.png", CV_8UC1, 3);
+  put("000001/cam0.png", CV_8UC1, 4);
+  pack_recording(frames(), packed());
+  put("000000/cam0.png", CV_8UC1, 5);
+  fs::resize_file(frames() / "000001" / "cam0.png", 60);
+  PackOptions options;
+  EXPECT_THAT(refusal([&] { pack_recording(frames(), packed(), options); }),
+              HasSubstr("must be new"));
+  options.overwrite = true;
+  EXPECT_THAT(refusal([&] { pack_recording(frames(), packed() / "", options); }),
+              HasSubstr("000001/cam0.png"));
+  ASSERT_TRUE(Recording::is_one(packed()));
+  EXPECT_EQ(Recording::open(packed()).read(0, 0).at<std::uint8_t>(0, 0), 3);
+  EXPECT_EQ(Recording::open(packed()).row_count(), 2U);
+
+  const fs::path other = temporary_.path() / "other.zarr";
+  EXPECT_THROW(pack_recording(frames(), other), InputError);
+  EXPECT_FALSE(fs::exists(other));
+
+  put("000001/cam0.png", CV_8UC1, 6);
+  pack_recording(frames(), packed() / "", options);
+  EXPECT_EQ(Recording::open(packed()).read(1, 0).at<std::uint8_t>(0, 0), 6);
+  EXPECT_TRUE(Recording::open(packed()).is_closed());
+  EXPECT_FALSE(fs::exists(packed().string() + ".partial"));
+}
+
+TEST_F(Pack, AFilmIsNoEarlierRecording) {
+  put("000000/cam0.png", CV_8UC1, 3);
+  write_text(packed() / ".zgroup", "{\"zarr_format\": 2}");
+  write_text(packed() / ".zattrs", "{\"format\": \"pencilscan-film/1\"}");
+  PackOptions options;
+  options.overwrite = true;
+  EXPECT_THAT(refusal([&] { pack_recording(frames(), packed(), options); }),
+              HasSubstr("must be new or an empty folder"));
+  EXPECT_TRUE(fs::exists(packed() / ".zattrs"));
+}
+
+TEST_F(Pack, TheFramesThemselvesAreNoOutput) {
+  put("000000/cam0.png", CV_8UC1, 3);
+  write_text(frames() / ".zgroup", "{\"zarr_format\": 2}");
+  write_text(temporary_.path() / ".zgroup", "{\"zarr_format\": 2}");
+  PackOptions options;
+  options.overwrite = true;
+  for (const fs::path& out : {frames(), frames() / "", temporary_.path()})
+    EXPECT_THAT(refusal([&] { pack_recording(frames(), out, options); }),
+                HasSubstr("must not be the folder of --frames"));
+  EXPECT_TRUE(fs::exists(frames() / "000000" / "cam0.png"));
+}
+
+TEST_F(Pack, FramesThatAreCountedComeInTheOrderOfTheirNumbers) {
+  for (const char* name : {"1", "2", "3", "10", ".ipynb_checkpoints"})
+    put(std::string(name) + "/cam0.png", CV_8UC1, 3);
+  EXPECT_THAT(frame_folder_names(frames()), ElementsAre("1", "2", "3", "10"));
+  pack_recording(frames(), packed());
+  EXPECT_EQ(Recording::open(packed()).row_count(), 4U);
+  put("02/cam0.png", CV_8UC1, 3);
+  put("000/cam0.png", CV_8UC1, 3);
+  EXPECT_THAT(frame_folder_names(frames()), ElementsAre("000", "1", "02", "2", "3", "10"));
+  put("b/cam0.png", CV_8UC1, 3);
+  EXPECT_THAT(frame_folder_names(frames()), ElementsAre("000", "02", "1", "10", "2", "3", "b"));
+}
+
+TEST_F(Pack, PicturesThatWouldStayAmongUnpackedOnesAreNamed) {
+  put("000000/cam0.png", CV_8UC1, 3);
+  put("000001/cam0.png", CV_8UC1, 4);
+  pack_recording(frames(), packed());
+  const Recording recording = Recording::open(packed());
+  const FrameSets sets = group_frames(recording);
+  const fs::path out = temporary_.path() / "out";
+  write_text(out / "notes.txt", "mine");
+  write_text(out / "notes" / "a.txt", "mine");
+  unpack_recording(recording, sets, out);
+  EXPECT_EQ(unpack_recording(recording, sets, out).pictures, 2U);  // all of it is written anew
+  for (const char* file : {"000002/cam0.png", "000001/cam1.png", "000001/cam0.tiff"}) {
+    const cv::Mat picture(12, 16, CV_8UC1, cv::Scalar(9));
+    write_image(out / file, picture);
+    EXPECT_NE(refusal([&] { unpack_recording(recording, sets, out); }), "") << file;
+    EXPECT_TRUE(fs::exists(out / file));
+    fs::remove(out / file);
+  }
+  write_image(out / "000002" / "cam0.png", cv::Mat(12, 16, CV_8UC1, cv::Scalar(9)));
+  EXPECT_THAT(refusal([&] { unpack_recording(recording, sets, out); }),
+              HasSubstr("000002/cam0.png: must not stay"));
+  fs::remove(out / "000002" / "cam0.png");
+  write_text(out / "timestamps.csv", "frame,cam0\n000000,1\n");
+  EXPECT_THAT(refusal([&] { unpack_recording(recording, sets, out); }),
+              HasSubstr("timestamps.csv: must not stay"));
+}
+
+TEST_F(Pack, ATimeStampThatIsNoWholeNumberIsRefused) {
+  put("000000/cam0.png", CV_8UC1, 3);
+  const auto with = [&](const std::string& time) {
+    fs::remove_all(packed());
+    write_text(frames() / "timestamps.csv", "frame,cam0\n000000," + time + "\n");
+    return refusal([&] { pack_recording(frames(), packed()); });
+  };
+  EXPECT_THAT(with("9223372036854775808"),
+              AllOf(HasSubstr("timestamps.csv"), HasSubstr("line 2, cam0"),
+                    HasSubstr("9223372036854775808"), HasSubstr("must be whole nanoseconds")));
+  EXPECT_THAT(with("12x"), HasSubstr("12x"));
+  EXPECT_EQ(with("9223372036854775807"), "");
+  EXPECT_EQ(Recording::open(packed()).timestamp_ns(0, 0), 9223372036854775807);
+  EXPECT_EQ(with(""), "");
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <optional>
 
 #include "pencilscan/core/error.h"
 #include "pencilscan/recording/layout.h"
@@ -61,23 +62,54 @@ RecordedCamera camera_of(const fs::path& folder, const std::string& name, const 
   return camera;
 }
 
+/// The rows that all arrays state. Those of a recording that is open may differ: a writer that
+/// makes them grow does so one after another, and may end between two of them. What the shortest
+/// does not state, nothing was written to.
+class SharedRows {
+ public:
+  explicit SharedRows(bool is_closed) : is_closed_(is_closed) {}
+
+  void add(const fs::path& folder, const std::string& name, const ZarrArray& array) {
+    const std::string file = (folder / name / ".zarray").string();
+    const std::int64_t rows = array.shape[0];
+    if (is_closed_ && rows_ && rows != *rows_) {
+      throw InputError(file, "shape", json(array.shape).dump(),
+                       "must have as many frames as the other arrays, " + std::to_string(*rows_));
+    }
+    if (rows > kMostFrames) {
+      throw InputError(file, "shape", json(array.shape).dump(),
+                       "must have at most " + std::to_string(kMostFrames) + " frames");
+    }
+    rows_ = std::min(rows, rows_.value_or(rows));
+  }
+  [[nodiscard]] std::size_t count() const { return static_cast<std::size_t>(rows_.value_or(0)); }
+
+ private:
+  bool is_closed_;
+  std::optional<std::int64_t> rows_;
+};
+
 /// A table [frame, camera] of a type; InputError for another.
 template <class Number>
-std::vector<Number> read_table(const fs::path& folder, const char* name, std::size_t rows,
-                               std::size_t cameras) {
-  const ZarrArray array = read_zarr_array(folder / name);
+ZarrArray open_table(const fs::path& folder, const char* name, std::size_t cameras) {
+  ZarrArray array = read_zarr_array(folder / name);
   const std::string file = (folder / name / ".zarray").string();
-  const std::vector<std::int64_t> shape = {static_cast<std::int64_t>(rows),
-                                           static_cast<std::int64_t>(cameras)};
-  if (array.shape != shape) {
+  if (array.shape.size() != 2 || array.shape[1] != static_cast<std::int64_t>(cameras)) {
     throw InputError(file, "shape", json(array.shape).dump(),
-                     "must be " + json(shape).dump() + ", frames and cameras");
+                     "must be frames and cameras, [frame, " + std::to_string(cameras) + "]");
   }
   if (array.type != zarr_type<Number>())
     throw InputError(file, "dtype", "", sizeof(Number) == 1 ? "must be |u1" : "must be <i8");
+  return array;
+}
+
+/// The first rows of a table that has as many or more.
+template <class Number>
+std::vector<Number> read_table(const fs::path& folder, const char* name, const ZarrArray& array,
+                               std::size_t rows) {
   const std::vector<std::uint8_t> bytes = read_zarr_bytes(folder / name, array);
-  std::vector<Number> table(rows * cameras);
-  if (!table.empty()) std::memcpy(table.data(), bytes.data(), bytes.size());
+  std::vector<Number> table(rows * static_cast<std::size_t>(array.shape[1]));
+  if (!table.empty()) std::memcpy(table.data(), bytes.data(), table.size() * sizeof(Number));
   return table;
 }
 
@@ -117,29 +149,24 @@ Recording Recording::open(const fs::path& folder) {
   Recording recording;
   recording.folder_ = folder;
   recording.attributes_ = read_zarr_group(folder);
-  std::int64_t rows = -1;
+  recording.closed_ = !flag_of(folder, recording.attributes_, kOpenAttribute).value_or(false);
+  SharedRows rows(recording.closed_);
   for (const std::string& name : camera_names(folder, recording.attributes_)) {
     ZarrArray array = read_zarr_array(folder / name);
     recording.cameras_.push_back(camera_of(folder, name, array));
-    if (rows >= 0 && array.shape[0] != rows) {
-      throw InputError((folder / name / ".zarray").string(), "shape", json(array.shape).dump(),
-                       "must have as many frames as the other cameras, " + std::to_string(rows));
-    }
-    rows = array.shape[0];
-    if (rows > kMostFrames) {
-      throw InputError((folder / name / ".zarray").string(), "shape", json(array.shape).dump(),
-                       "must have at most " + std::to_string(kMostFrames) + " frames");
-    }
+    rows.add(folder, name, array);
     recording.pictures_.push_back(std::move(array));
   }
   const std::size_t cameras = recording.cameras_.size();
-  recording.rows_ = static_cast<std::size_t>(rows);
-  recording.timestamps_ =
-      read_table<std::int64_t>(folder, kTimestampArray, recording.rows_, cameras);
-  recording.valid_ = read_table<std::uint8_t>(folder, kValidArray, recording.rows_, cameras);
+  const ZarrArray times = open_table<std::int64_t>(folder, kTimestampArray, cameras);
+  const ZarrArray valid = open_table<std::uint8_t>(folder, kValidArray, cameras);
+  rows.add(folder, kTimestampArray, times);
+  rows.add(folder, kValidArray, valid);
+  recording.rows_ = rows.count();
+  recording.timestamps_ = read_table<std::int64_t>(folder, kTimestampArray, times, recording.rows_);
+  recording.valid_ = read_table<std::uint8_t>(folder, kValidArray, valid, recording.rows_);
   read_exposures(folder, recording.attributes_, recording.cameras_);
   recording.shares_clock_ = flag_of(folder, recording.attributes_, kSharedClockAttribute);
-  recording.closed_ = !flag_of(folder, recording.attributes_, kOpenAttribute).value_or(false);
   if (!recording.closed_) {
     // The arrays are longer than what was written to them.
     while (recording.rows_ > 0) {

@@ -202,6 +202,34 @@ TEST_F(RecordingFolder, WhatWasWrittenOutlivesAKilledWriter) {
   }
 }
 
+TEST_F(RecordingFolder, AWriterKilledWhileItsArraysGrowLeavesWhatWasWritten) {
+  const std::vector<RecordedCamera> cameras = three_kinds();
+  {
+    RecordingWriter writer(folder_, cameras);
+    for (std::size_t c = 0; c < cameras.size(); ++c) writer.write(5, c, picture(cameras[c], 5), 50);
+  }
+  // Arrays grow one after another, in this order.
+  for (const char* array : {"cam0", "cam1", "cam2", "timestamp_ns", "valid"}) {
+    nlohmann::ordered_json object = read_json(folder_ / array / ".zarray");
+    object["shape"][0] = 2 * object["shape"][0].get<int>();
+    write_json(folder_ / array / ".zarray", object);
+    const Recording recording = Recording::open(folder_);
+    EXPECT_FALSE(recording.is_closed());
+    ASSERT_EQ(recording.row_count(), 6U) << array;
+    EXPECT_EQ(recording.timestamp_ns(5, 2), 50);
+    EXPECT_TRUE(same(recording.read(5, 1), picture(cameras[1], 5)));
+  }
+  nlohmann::ordered_json object = read_json(folder_ / "cam1" / ".zarray");
+  object["shape"][0] = 7;
+  write_json(folder_ / "cam1" / ".zarray", object);
+  EXPECT_EQ(Recording::open(folder_).row_count(), 6U);
+  nlohmann::ordered_json closed = read_json(folder_ / ".zattrs");
+  closed["is_open"] = false;
+  write_json(folder_ / ".zattrs", closed);
+  EXPECT_THAT(error_of([&] { (void)Recording::open(folder_); }),
+              ::testing::HasSubstr("must have as many frames"));
+}
+
 TEST_F(RecordingFolder, PythonReadsIt) {
   const std::vector<RecordedCamera> cameras = {{"cam0", 5, 4, 1, 8, 0}, {"cam1", 5, 4, 3, 16, 0}};
   RecordingWriter writer(folder_, cameras);

@@ -22,8 +22,17 @@ constexpr std::int64_t kTableRows = 64;
 /// Rows by which the arrays grow: so many pictures of a camera cost one more `.zarray` each.
 constexpr std::int64_t kGrowth = 16 * kTableRows;
 
-void check_folder(const fs::path& folder, const std::vector<RecordedCamera>& cameras) {
-  if (fs::exists(folder) && !(fs::is_directory(folder) && fs::is_empty(folder)))
+template <class Number>
+std::span<const std::uint8_t> as_bytes_of(std::span<const Number> numbers) {
+  return {reinterpret_cast<const std::uint8_t*>(numbers.data()), numbers.size_bytes()};
+}
+
+}  // namespace
+
+void check_recorded(const fs::path& folder, const std::vector<RecordedCamera>& cameras,
+                    OutFolder out) {
+  const bool is_free = !fs::exists(folder) || (fs::is_directory(folder) && fs::is_empty(folder));
+  if (out == OutFolder::kNew && !is_free)
     throw InputError(folder.string(), "", "", "must be new or an empty folder");
   std::set<std::string> names = {kTimestampArray, kValidArray};
   for (const RecordedCamera& camera : cameras) {
@@ -36,13 +45,6 @@ void check_folder(const fs::path& folder, const std::vector<RecordedCamera>& cam
     }
   }
 }
-
-template <class Number>
-std::span<const std::uint8_t> as_bytes_of(std::span<const Number> numbers) {
-  return {reinterpret_cast<const std::uint8_t*>(numbers.data()), numbers.size_bytes()};
-}
-
-}  // namespace
 
 struct RecordingWriter::State {
   /// Times and validity of one camera, written by its thread alone.
@@ -127,7 +129,7 @@ RecordingWriter::RecordingWriter(const fs::path& folder, std::vector<RecordedCam
                                  const RecordingOptions& options)
     : state_(std::make_unique<State>()) {
   PENCILSCAN_CHECK(!cameras.empty());
-  check_folder(folder, cameras);
+  check_recorded(folder, cameras, OutFolder::kNew);
   State& state = *state_;
   state.folder = folder;
   state.attributes = options.attributes;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -16,13 +17,20 @@ struct RecordingOptions {
   nlohmann::ordered_json attributes = nlohmann::ordered_json::object();  ///< free, of the group
 };
 
+/// What may be where a recording is made: nothing, or an earlier one that it replaces.
+enum class OutFolder : std::uint8_t { kNew, kReplaced };
+
+/// InputError where `folder` is there already and not empty (of kNew), or a camera's name is no
+/// file name.
+void check_recorded(const std::filesystem::path& folder, const std::vector<RecordedCamera>& cameras,
+                    OutFolder out);
+
 /// Writes recording.zarr while cameras deliver. Pictures that were written stay readable whatever
 /// happens to the program (kill -9): a picture counts from the moment its row says that it is
 /// valid, which comes last. One thread per camera may write at a time.
 class RecordingWriter {
  public:
-  /// Makes the folder; InputError when it is there already and not empty, or a name is no file
-  /// name.
+  /// Makes the folder; InputError as check_recorded() of a new one.
   RecordingWriter(const std::filesystem::path& folder, std::vector<RecordedCamera> cameras,
                   const RecordingOptions& options = {});
   /// Leaves the recording open where close() was not called.
