@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "pencilscan/artefact/find_shapes.h"
 #include "pencilscan/artefact/plate_face.h"
@@ -11,22 +12,44 @@
 #include "pencilscan/core/check.h"
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/formatted.h"
+#include "pencilscan/core/length_units.h"
 
 namespace pencilscan {
 namespace {
 
 constexpr std::size_t kWorstShown = 10;
 
-[[noreturn]] void no_fit(const ArtefactPoints& points, const char* shape) {
+[[noreturn]] void no_fit(const ArtefactPoints& points, const char* shape,
+                         const std::string& why = {}) {
   Vec3 low = Vec3::Constant(std::numeric_limits<double>::infinity()), high = -low;
   for (const Vec3& x : points.points) {
     low = low.cwiseMin(x);
     high = high.cwiseMax(x);
   }
-  throw StageError(points.source + ": no " + shape + " fits " +
-                   std::to_string(points.points.size()) + " points, which reach over " +
-                   formatted((high - low).maxCoeff(), "%.3g") +
-                   " mm (lengths are taken as millimetres)");
+  throw StageError(
+      points.source + ": no " + shape + " fits " + std::to_string(points.points.size()) +
+      " points, which reach over " + formatted((high - low).maxCoeff(), "%.3g") +
+      " mm (lengths are taken as millimetres)" + why +
+      (points.outside_region > 0 ? "; --region left out " + std::to_string(points.outside_region)
+                                 : std::string()));
+}
+
+/// InputError where `option` has left none of the points.
+void require_some(const ArtefactPoints& points, const char* option, const std::string& value,
+                  const std::string& what) {
+  if (points.points.empty())
+    throw InputError(points.source, option, value, "must leave some of the " + what);
+}
+
+std::string mm_text(const Vec3& v) {
+  std::string text;
+  for (const double value : {v.x(), v.y(), v.z()})
+    text += (text.empty() ? "" : " ") + formatted(value, "%.6g");
+  return text;
+}
+
+std::string mm_text(double a, double b) {
+  return formatted(a, "%.6g") + " x " + formatted(b, "%.6g");
 }
 
 std::size_t removed_of(std::size_t count) {
@@ -81,7 +104,18 @@ std::optional<SphereFits> fit_both(std::span<const Vec3> points, const Sphere& s
 }
 
 ArtefactPoints of_region(const ArtefactPoints& points, const ArtefactOptions& options) {
-  return options.region ? within(points, *options.region) : points;
+  if (!options.region || points.points.empty()) return points;
+  ArtefactPoints part = within(points, *options.region);
+  Vec3 low = points.points.front(), high = low;
+  for (const Vec3& x : points.points) {
+    low = low.cwiseMin(x);
+    high = high.cwiseMax(x);
+  }
+  require_some(part, "--region",
+               mm_text(options.region->center) + " " + formatted(options.region->radius, "%.6g"),
+               std::to_string(points.points.size()) + " points, which lie from " + mm_text(low) +
+                   " to " + mm_text(high));
+  return part;
 }
 
 /// Without the points in a cone seen from the ball's centre.
@@ -96,13 +130,31 @@ ArtefactPoints without_cone(const ArtefactPoints& points, const Vec3& center,
   return points.subset(kept);
 }
 
+bool is_near(const Sphere& sphere, const Vec3& point) {
+  constexpr double kNear = 0.05;  // of the radius; more than twice what a vote allows
+  return std::abs(signed_distance(sphere, point)) < kNear * sphere.radius;
+}
+
 /// A found sphere refined by the points near it alone, so that stems and bars do not pull at it.
 Sphere refined(std::span<const Vec3> points, const Sphere& found) {
-  constexpr double kNear = 0.05;  // of the radius; more than twice what a vote allows
   std::vector<Vec3> near;
   for (const Vec3& point : points)
-    if (std::abs(signed_distance(found, point)) < kNear * found.radius) near.push_back(point);
+    if (is_near(found, point)) near.push_back(point);
   return fit_sphere(near, found).value_or(found);
+}
+
+bool has_size(const Sphere& sphere, double radius) {
+  return std::abs(sphere.radius - radius) <= kSizeTolerance * radius;
+}
+
+/// Whether a ball was found, and not some points of another thing that lie on one by chance: of
+/// balls that hold fewer than a quarter of the points the search cannot be sure (find_shapes.cpp).
+bool is_ball(const ArtefactPoints& points, const Sphere& found, double radius) {
+  constexpr double kLeastShare = 0.25;
+  const auto near = std::count_if(points.points.begin(), points.points.end(),
+                                  [&](const Vec3& point) { return is_near(found, point); });
+  return has_size(found, radius) &&
+         static_cast<double>(near) >= kLeastShare * static_cast<double>(points.points.size());
 }
 
 /// The figures of one ball whose rough place is known.
@@ -153,6 +205,27 @@ std::size_t count_between(std::span<const Vec3> points, const Vec3& a, const Vec
   return static_cast<std::size_t>(std::count_if(points.begin(), points.end(), lies_between));
 }
 
+/// A plate's surface that covers as much beyond the stated sides as on them is that of another
+/// plate, of sides in another unit (which makes one side 2.5 times as long at least), or of a
+/// table.
+void require_stated_sides(const PlateFigures& plate, const ArtefactOptions& options) {
+  constexpr double kFarBeyond = 2;  // of the stated area
+  if (!options.plate_length_mm || !options.plate_width_mm) return;
+  const double length = *options.plate_length_mm, width = *options.plate_width_mm;
+  const PlaneSurface& surface = plate.surface;
+  if (surface.area_mm2 <= kFarBeyond * length * width) return;
+  constexpr double kUnitTolerance = 0.15;  // of the surface's sides: its rim may be missing
+  const UnitFactor* unit = unit_behind_factor(
+      std::sqrt(surface.length_mm * surface.width_mm / (length * width)), kUnitTolerance);
+  throw InputError(
+      plate.points.source, "--length x --width", mm_text(length, width),
+      "must be the sides of the plate in mm, whose surface goes on over " +
+          formatted(surface.length_mm, "%.4g") + " x " + formatted(surface.width_mm, "%.4g") +
+          " mm" +
+          (unit != nullptr ? ": they are probably in " + std::string(unit->words)
+                           : std::string("; --region leaves out what is not the plate")));
+}
+
 }  // namespace
 
 BallFigures measure_sphere(const ArtefactPoints& given, const Rig* rig,
@@ -164,10 +237,20 @@ BallFigures measure_sphere(const ArtefactPoints& given, const Rig* rig,
   if (options.stem) {
     ArtefactPoints kept =
         without_cone(points, refined(points.points, *start).center, *options.stem);
+    require_some(kept, "--stem",
+                 mm_text(options.stem->direction) + " " +
+                     formatted(options.stem->half_angle_rad * 180 / std::numbers::pi, "%.4g"),
+                 std::to_string(points.points.size()) + " points");
     left_out = points.points.size() - kept.points.size();
     points = std::move(kept);
   }
   BallFigures ball = measure_ball(std::move(points), *start, rig, options);
+  if (options.diameter_mm && !has_size(ball.sphere, *options.diameter_mm / 2)) {
+    no_fit(ball.points, "sphere",
+           ": the one nearest to all of them is " + formatted(2 * ball.sphere.radius, "%.4g") +
+               " mm across, and --diameter says " + formatted(*options.diameter_mm, "%.6g") +
+               "; --region and --stem leave out what is not the ball");
+  }
   ball.left_out = left_out;
   return ball;
 }
@@ -212,7 +295,7 @@ BallBarFigures measure_ball_bar(const ArtefactPoints& given, const Rig* rig,
                           {(other.center - own.center).normalized(), std::asin(sine)});
     }
     const auto held = fit_both(part.points, own, radius);
-    if (!held) no_fit(part, "ball of this diameter");
+    if (!held || !is_ball(part, own, radius)) no_fit(part, "ball of this diameter");
     center[b] = held->all.center;
     trimmed_center[b] = held->trimmed.model.center;
     bar.balls.push_back(measure_ball(std::move(part), own, rig, options));
@@ -233,9 +316,14 @@ PlateFigures measure_plate(const ArtefactPoints& given, const Rig* rig,
   plate.points = of_region(given, options);
   if (options.plate_thickness_mm) {
     const std::size_t whole = plate.points.points.size();
-    plate.points = points_of_face(
+    FacePoints face = points_of_face(
         plate.points, {*options.plate_thickness_mm, options.border_mm, options.plate_length_mm,
                        options.plate_width_mm, options.seed});
+    plate.points = std::move(face.points);
+    plate.surface = face.surface;
+    require_stated_sides(plate, options);
+    require_some(plate.points, "--border", formatted(options.border_mm, "%.6g"),
+                 "plate's face of " + mm_text(face.rim.length, face.rim.width) + " mm");
     plate.left_out = whole - plate.points.points.size();
   }
   const std::span<const Vec3> all(plate.points.points);
@@ -263,6 +351,10 @@ PlateFigures measure_plate(const ArtefactPoints& given, const Rig* rig,
   if (options.plate_length_mm && options.plate_width_mm) {
     plate.rectangle.length = std::max(*options.plate_length_mm, *options.plate_width_mm);
     plate.rectangle.width = std::min(*options.plate_length_mm, *options.plate_width_mm);
+  }
+  if (!options.plate_thickness_mm) {
+    plate.surface = connected_surface(kept, smallest_rectangle(kept, plate.trimmed));
+    require_stated_sides(plate, options);
   }
   plate.coverage = plate_coverage(all, plate.rectangle);
   plate.z = z_scores(plate.points, rig, [&](const Vec3& point, const std::optional<Vec3>& center) {

@@ -8,6 +8,7 @@
 #include "pencilscan/artefact/artefact_points.h"
 #include "pencilscan/artefact/coverage.h"
 #include "pencilscan/artefact/plane_fit.h"
+#include "pencilscan/artefact/plane_surface.h"
 #include "pencilscan/artefact/z_scores.h"
 
 namespace pencilscan {
@@ -43,7 +44,7 @@ struct ArtefactOptions {
   std::optional<double> length_mm;    ///< between the balls' centres, calibrated
   std::optional<double> plate_length_mm, plate_width_mm;
   std::optional<double> plate_thickness_mm;  ///< takes one of two faces
-  double border_mm = 0;                      ///< at the plate's rim, left out
+  double border_mm = 0;                      ///< at the rim, left out; needs the thickness
   double bar_diameter_mm = 0;       ///< of what joins the balls: points around it are left out
   std::optional<LeftOutCone> stem;  ///< of a single ball: points in it are left out
   std::optional<Sphere> region;     ///< only what lies inside is the artefact
@@ -76,6 +77,7 @@ struct PlateFigures {
   std::size_t removed = 0;
   double coverage = 0;  ///< share of the plate within 1 % of its diagonal of a point
   PlateRectangle rectangle;
+  PlaneSurface surface;    ///< in the plate's plane, also beyond the stated sides
   Plane plane;             ///< least squares, all points
   Plane trimmed;           ///< of the points that remain
   TwoFigures flatness_mm;  ///< F
@@ -83,14 +85,24 @@ struct PlateFigures {
   std::optional<ZScores> z;
 };
 
-/// StageError when no sphere (plane) fits. The rig is for z-scores; may be null.
+// The rig is for z-scores; may be null. InputError where an option leaves none of the points.
+
+/// StageError when no sphere fits, or none whose size differs by kSizeTolerance at most.
 [[nodiscard]] BallFigures measure_sphere(const ArtefactPoints& points, const Rig* rig,
                                          const ArtefactOptions& options);
-/// Needs options.diameter_mm.
+/// Needs options.diameter_mm. StageError where there are no two balls of about this size.
 [[nodiscard]] BallBarFigures measure_ball_bar(const ArtefactPoints& points, const Rig* rig,
                                               const ArtefactOptions& options);
+/// StageError when no plane fits. InputError when the surface goes on so far beyond the stated
+/// sides that they cannot be this plate's.
 [[nodiscard]] PlateFigures measure_plate(const ArtefactPoints& points, const Rig* rig,
                                          const ArtefactOptions& options);
+
+/// What a user should know of a position: one sentence each.
+[[nodiscard]] std::vector<std::string> artefact_warnings(const BallBarFigures& bar,
+                                                         const ArtefactOptions& options);
+[[nodiscard]] std::vector<std::string> artefact_warnings(const PlateFigures& plate,
+                                                         const ArtefactOptions& options);
 
 /// All positions of one artefact; one of the lists is filled.
 struct ArtefactTest {

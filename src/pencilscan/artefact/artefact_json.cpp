@@ -111,7 +111,7 @@ class Worst {
 };
 
 template <typename Positions>
-void add_positions(Json& json, const Positions& positions) {
+void add_positions(Json& json, const Positions& positions, const ArtefactOptions& options) {
   for (const auto& position : positions) {
     Json entry;
     if constexpr (requires { position.balls; }) {
@@ -120,6 +120,10 @@ void add_positions(Json& json, const Positions& positions) {
       entry["file"] = position.points.source;
     }
     entry.update(to_json(position));
+    if constexpr (requires { artefact_warnings(position, options); }) {
+      const auto warnings = artefact_warnings(position, options);
+      if (!warnings.empty()) entry["warnings"] = warnings;
+    }
     json["positions"].push_back(std::move(entry));
   }
 }
@@ -140,9 +144,9 @@ Json artefact_json(const ArtefactTest& test) {
   if (options.plate_width_mm) json["calibrated"]["plate_width_mm"] = *options.plate_width_mm;
   json["trimmed_share"] = kTrimmedShare;
   json["positions"] = Json::array();
-  add_positions(json, test.spheres);
-  add_positions(json, test.ball_bars);
-  add_positions(json, test.plates);
+  add_positions(json, test.spheres, options);
+  add_positions(json, test.ball_bars, options);
+  add_positions(json, test.plates, options);
   Worst worst;
   for (const Json& position : json["positions"]) worst.take(position);
   json["worst"] = worst.worst;

@@ -227,8 +227,7 @@ std::string positions_table(const ArtefactTest& test) {
 }
 
 /// "Worst of all positions: PF 0.1234, PF trimmed 0.0456, ..."
-std::string worst_line(const ArtefactTest& test) {
-  const nlohmann::ordered_json json = artefact_json(test);
+std::string worst_line(const nlohmann::ordered_json& json) {
   std::string html = "<p><strong>Worst of all positions:</strong> ";
   bool first = true;
   for (const auto& [key, value] : json["worst"].items()) {
@@ -241,6 +240,18 @@ std::string worst_line(const ArtefactTest& test) {
     first = false;
   }
   return html + ".</p>";
+}
+
+std::string warning_lines(const nlohmann::ordered_json& json) {
+  std::string html;
+  for (const auto& position : json["positions"]) {
+    if (!position.contains("warnings")) continue;
+    for (const auto& warning : position["warnings"]) {
+      html += "<p><strong>Warning:</strong> " + escaped(position["file"].get<std::string>()) +
+              ": " + escaped(warning.get<std::string>()) + ".</p>";
+    }
+  }
+  return html;
 }
 
 constexpr const char* kLegend = R"(<dl>
@@ -273,7 +284,8 @@ std::string artefact_html(const ArtefactTest& test, const std::string& program) 
   html += std::to_string(positions) +
           (positions == 1 ? " position." : " positions; the worst counts.") +
           " All figures in mm.</p>" + positions_table(test);
-  html += worst_line(test) + kLegend;
+  const nlohmann::ordered_json json = artefact_json(test);
+  html += worst_line(json) + warning_lines(json) + kLegend;
   for (const BallFigures& ball : test.spheres)
     html += "<h2>" + escaped(ball.points.source) + "</h2>" + ball_part(ball);
   for (const BallBarFigures& bar : test.ball_bars) {

@@ -137,6 +137,17 @@ TEST(ArtefactSphere, ScoresOfPointsThatKnowTheirErrorAreIdeal) {
   EXPECT_FALSE(measure_sphere(points, nullptr, {}).z) << "where the cameras are is not known";
 }
 
+TEST(ArtefactSphere, AScaleThatIsOffBySomePerCentIsMeasured) {
+  for (const double scale : {0.94, 1.06}) {
+    std::vector<Vec3> points;
+    add_ball(points, {{3, 4, 5}, scale * 40}, 2000, [](int) { return 0.0; });
+    ArtefactOptions options;
+    options.diameter_mm = 80;
+    EXPECT_NEAR(measure_sphere(as_points(points), nullptr, options).size_mm->all, 80 * (scale - 1),
+                1e-6);
+  }
+}
+
 TEST(ArtefactBallBar, SpacingIsTheErrorOfTheDistance) {
   std::vector<Vec3> points;
   Random random(7);
@@ -188,6 +199,28 @@ TEST(ArtefactBallBar, TheBarIsLeftOutWhereItIsStatedAndElsewhereNoticed) {
   const BallBarFigures without = measure_ball_bar(as_points(points), nullptr, options);
   EXPECT_NEAR(without.spacing_mm->all, 0, 1e-6);
   EXPECT_GT(without.balls[0].left_out, 900U);
+}
+
+TEST(ArtefactBallBar, ALengthThatIsNotThisBarsIsTold) {
+  std::vector<Vec3> points;
+  add_ball(points, {{-80, 0, 0}, 15}, 3000, [](int) { return 0.0; });
+  add_ball(points, {{80, 0, 0}, 15}, 3000, [](int) { return 0.0; });
+  ArtefactOptions options;
+  options.diameter_mm = 30;
+  const auto warnings_of = [&](double length) {
+    options.length_mm = length;
+    return artefact_warnings(measure_ball_bar(as_points(points), nullptr, options), options);
+  };
+  for (const double right : {150.0, 160.0, 170.0})  // scales may be off by some per cent
+    EXPECT_THAT(warnings_of(right), ::testing::IsEmpty()) << right;
+  EXPECT_THAT(
+      warnings_of(0.16),
+      ::testing::ElementsAre(HasSubstr("1000 times --length = 0.16 mm: it is probably in metres")));
+  EXPECT_THAT(warnings_of(160 / 25.4), ::testing::ElementsAre(HasSubstr("probably in inches")));
+  EXPECT_THAT(warnings_of(120), ::testing::ElementsAre(HasSubstr("is that the length of this")));
+  ArtefactTest test{options, {}, {measure_ball_bar(as_points(points), nullptr, options)}, {}};
+  EXPECT_EQ(artefact_json(test)["positions"][0]["warnings"].size(), 1U);
+  EXPECT_THAT(artefact_html(test, ""), HasSubstr("is that the length of this bar"));
 }
 
 std::vector<Vec3> plate_points(double thickness, const RigidTransform& world_from_plate,
@@ -262,6 +295,68 @@ TEST(ArtefactPlate, AKnownRectangleIsPlacedWherePointsStandOutLeast) {
   EXPECT_EQ(placed.length, 80);
 }
 
+TEST(ArtefactPlate, SidesInAnotherUnitAreRefused) {
+  const RigidTransform pose = look_at({-300, 100, 400}, Vec3(5, 5, 5)).inverse();
+  const ArtefactPoints points = as_points(plate_points(10, pose, 13));
+  for (const auto& [factor, unit] :
+       {std::pair{10.0, "centimetres"}, std::pair{25.4, "inches"}, std::pair{1000.0, "metres"}}) {
+    for (const double thickness : {0.0, 10.0, 10 / factor}) {
+      ArtefactOptions options;
+      options.plate_length_mm = 200 / factor;
+      options.plate_width_mm = 120 / factor;
+      if (thickness > 0) options.plate_thickness_mm = thickness;
+      try {
+        (void)measure_plate(points, nullptr, options);
+        ADD_FAILURE() << unit << " " << thickness;
+      } catch (const InputError& error) {
+        EXPECT_EQ(error.field, "--length x --width");
+        EXPECT_THAT(error.rule, HasSubstr(std::string("probably in ") + unit)) << thickness;
+      }
+    }
+  }
+  ArtefactOptions options;
+  options.plate_thickness_mm = 10;
+  options.plate_length_mm = 200;
+  options.plate_width_mm = 120 / 2.54;  // one side
+  EXPECT_THROW((void)measure_plate(points, nullptr, options), InputError);
+}
+
+TEST(ArtefactPlate, SidesOfASmallerPlateAreTold) {
+  const ArtefactPoints points = as_points(plate_points(10, RigidTransform(), 14));
+  ArtefactOptions options;
+  options.plate_thickness_mm = 10;
+  const auto warnings_of = [&](double length) {
+    options.plate_length_mm = length;
+    options.plate_width_mm = 120;
+    return artefact_warnings(measure_plate(points, nullptr, options), options);
+  };
+  EXPECT_THAT(warnings_of(200), ::testing::IsEmpty());
+  EXPECT_THAT(warnings_of(400), ::testing::IsEmpty());  // half of it was measured
+  EXPECT_THAT(warnings_of(130), ::testing::ElementsAre(HasSubstr("are they this plate's?")));
+}
+
+TEST(ArtefactPlate, OtherThingsInItsPlaneDoNotMakeItLarger) {
+  // A plate that stands on a table before a wall, beside a cylinder.
+  std::vector<Vec3> points = plate_points(10, RigidTransform(), 15);
+  Random random(15);
+  for (int i = 0; i < 4000; ++i) {
+    points.push_back({random.uniform(-300, 300), -60, random.uniform(-100, 100)});
+    points.push_back({random.uniform(-300, 300), random.uniform(-60, 200), -200});
+    const double angle = random.uniform(0, 2 * std::numbers::pi);
+    points.push_back({180 + 40 * std::cos(angle), random.uniform(-60, 200), 40 * std::sin(angle)});
+    points.push_back({random.uniform(-300, -150), random.uniform(-50, 50), 0});  // in its plane
+  }
+  ArtefactOptions options;
+  options.plate_thickness_mm = 10;
+  options.border_mm = 3;
+  options.plate_length_mm = 200;
+  options.plate_width_mm = 120;
+  const PlateFigures plate = measure_plate(as_points(points), nullptr, options);
+  EXPECT_NEAR(plate.rectangle.center.x(), 0, 1);
+  EXPECT_NEAR(plate.surface.area_mm2 / (200 * 120), 1, 0.15);
+  EXPECT_THAT(artefact_warnings(plate, options), ::testing::IsEmpty());
+}
+
 TEST(ArtefactPlate, CoverageIsTheShareOfTheStatedPlate) {
   std::vector<Vec3> points;
   for (int x = 0; x <= 200; ++x)
@@ -322,6 +417,55 @@ TEST(ArtefactReport, TheWorstPositionCounts) {
   for (const char* text : {"After the manner of", "a &lt;program&gt;", "PF 0.100"})
     EXPECT_NE(html.find(text), std::string::npos) << text;
   EXPECT_EQ(html.find("nan"), std::string::npos);
+}
+
+/// field of the InputError that measuring ends with.
+template <typename Measure>
+std::string refused_option(const Measure& measure) {
+  try {
+    (void)measure();
+  } catch (const InputError& error) {
+    return error.field;
+  }
+  return "none";
+}
+
+TEST(ArtefactFigures, NameTheOptionThatLeavesNoPoints) {
+  std::vector<Vec3> ball;
+  add_ball(ball, {{0, 0, 0}, 20}, 2000, [](int) { return 0.0; });
+  const ArtefactPoints plate = as_points(plate_points(10, RigidTransform(), 16));
+  ArtefactOptions options;
+  options.diameter_mm = 40;
+  options.region = Sphere{{500, 0, 0}, 30};
+  const auto sphere = [&] { return measure_sphere(as_points(ball), nullptr, options); };
+  const auto bar = [&] { return measure_ball_bar(as_points(ball), nullptr, options); };
+  const auto face = [&] { return measure_plate(plate, nullptr, options); };
+  EXPECT_EQ(refused_option(sphere), "--region");
+  EXPECT_EQ(refused_option(bar), "--region");
+  EXPECT_EQ(refused_option(face), "--region");
+  options.region.reset();
+  options.stem = LeftOutCone{Vec3::UnitZ(), 0.9999 * std::numbers::pi};
+  EXPECT_EQ(refused_option(sphere), "--stem");
+  options.plate_thickness_mm = 10;
+  options.border_mm = 61;
+  EXPECT_EQ(refused_option(face), "--border");
+  options.plate_length_mm = 200;
+  options.plate_width_mm = 120;
+  EXPECT_EQ(refused_option(face), "--border");
+}
+
+TEST(ArtefactFigures, AreNotOfWhatIsNoBallOfThisSize) {
+  const ArtefactPoints plate = as_points(plate_points(10, RigidTransform(), 17));
+  std::vector<Vec3> two;
+  add_ball(two, {{-60, 0, 0}, 30}, 2000, [](int) { return 0.0; });
+  add_ball(two, {{60, 0, 0}, 30}, 2000, [](int) { return 0.0; });
+  ArtefactOptions options;
+  for (const double diameter : {50.0, 60.0, 80.0, 100.0}) {
+    options.diameter_mm = diameter;
+    EXPECT_THROW((void)measure_sphere(plate, nullptr, options), StageError) << diameter;
+    EXPECT_THROW((void)measure_sphere(as_points(two), nullptr, options), StageError) << diameter;
+    EXPECT_THROW((void)measure_ball_bar(plate, nullptr, options), StageError) << diameter;
+  }
 }
 
 TEST(ArtefactFigures, SayWhenNothingFits) {

@@ -15,8 +15,6 @@ namespace {
 constexpr int kDraws = 2000;
 /// Points that vote; more refine a start that is refined anyway.
 constexpr std::size_t kVoters = 3000;
-constexpr double kRadiusTolerance = 0.1;  ///< of the expected radius
-constexpr double kOnSphere = 0.02;        ///< of the expected radius
 constexpr double kOfExtent = 0.01;
 
 std::vector<Vec3> evenly_picked(std::span<const Vec3> points) {
@@ -76,7 +74,7 @@ std::optional<Sphere> find_sphere(std::span<const Vec3> points, const SphereSear
     // Of a small cap the median is a fraction of the radius; a plane would be a larger sphere yet.
     constexpr double kLargest = 10;
     return search.radius
-               ? std::abs(sphere.radius - *search.radius) <= kRadiusTolerance * *search.radius
+               ? std::abs(sphere.radius - *search.radius) <= kSizeTolerance * *search.radius
                : sphere.radius <= kLargest * extent;
   };
   Random random(search.seed);

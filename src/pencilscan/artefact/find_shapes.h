@@ -13,15 +13,21 @@ namespace pencilscan {
 // through as few points as determine one (RANSAC: Fischler, Bolles, CACM 24 (6), 1981). Rough: a
 // start for a fit by least squares.
 
+/// By so much of its expected size may a sphere differ: the scale of a scanner is off by some per
+/// cent at most, and units that are mixed up differ by a factor of 2.5 and more.
+inline constexpr double kSizeTolerance = 0.1;
+/// Points vote for a sphere from which they are less than this off, of its expected radius.
+inline constexpr double kOnSphere = 0.02;
+
 /// Where to look for a sphere.
 struct SphereSearch {
-  std::optional<double> radius;  ///< expected; spheres that differ by more than a tenth are ignored
+  std::optional<double> radius;  ///< expected; spheres that differ by > kSizeTolerance are ignored
   std::optional<Sphere> not_here;  ///< centres inside this are ignored
   std::uint64_t seed = 1;
 };
 
-/// Points vote for a sphere from which they are less than 2 % of the expected radius off, or 1 % of
-/// their extent where none is expected. Nothing where no sphere was found.
+/// Points vote for a sphere from which they are less than kOnSphere of the expected radius off, or
+/// 1 % of their extent where none is expected. Nothing where no sphere was found.
 [[nodiscard]] std::optional<Sphere> find_sphere(std::span<const Vec3> points,
                                                 const SphereSearch& search = {});
 

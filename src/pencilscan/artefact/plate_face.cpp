@@ -6,10 +6,10 @@
 #include "pencilscan/artefact/find_shapes.h"
 
 namespace pencilscan {
-ArtefactPoints points_of_face(const ArtefactPoints& points, const PlateFace& face) {
+FacePoints points_of_face(const ArtefactPoints& points, const PlateFace& face) {
   const double thickness = face.thickness_mm;
   const auto found = find_plane(points.points, face.seed, thickness / 4);
-  if (!found) return points;
+  if (!found) return {points, {}, {}};
   std::vector<Vec3> near;
   for (const Vec3& point : points.points)
     if (std::abs(found->signed_distance(point)) < thickness / 4) near.push_back(point);
@@ -38,7 +38,7 @@ ArtefactPoints points_of_face(const ArtefactPoints& points, const PlateFace& fac
     const bool is_other = two_faces && plane.signed_distance(points.points[i]) < -thickness / 2;
     if (inside && !is_other) kept.push_back(i);
   }
-  return points.subset(kept);
+  return {points.subset(kept), rim, connected_surface(near, rim)};
 }
 
 }  // namespace pencilscan

@@ -7,8 +7,10 @@
 
 #include "pencilscan/boards/board.h"
 #include "pencilscan/calibration/mirrored.h"
+#include "pencilscan/core/error.h"
 #include "pencilscan/gray/gray_decode.h"
 #include "pencilscan/gray/image_order.h"
+#include "pencilscan/planning/units.h"
 #include "pencilscan/rig/device_list.h"
 
 namespace pencilscan {
@@ -64,6 +66,19 @@ DecodeSummary decode_pair(const CapturePair& pair, std::size_t capture, const Ri
   return summary;
 }
 
+/// InputError where two of the folders are one, however they are spelt.
+void require_different(const std::vector<std::filesystem::path>& folders) {
+  std::error_code ignored;  // of what does not exist, which reading it tells
+  for (std::size_t b = 0; b < folders.size(); ++b) {
+    for (std::size_t a = 0; a < b; ++a) {
+      if (std::filesystem::equivalent(folders[a], folders[b], ignored))
+        throw InputError(folders[b].string(), "", "",
+                         "must be another folder than " + folders[a].string() +
+                             ": each holds the captures of one pose");
+    }
+  }
+}
+
 }  // namespace
 
 CapturesCalibration calibrate_captures(const UncalibratedRig& devices,
@@ -72,6 +87,7 @@ CapturesCalibration calibrate_captures(const UncalibratedRig& devices,
   const auto tell = [&](const char* stage, double done) {
     if (progress) progress(stage, done);
   };
+  require_different(folders);
   CapturesCalibration all;
   CalibrationInput& input = all.input;
   input.rig = devices.rig;
@@ -121,6 +137,8 @@ CapturesCalibration calibrate_captures(const UncalibratedRig& devices,
     all.uncertainty = uncertainty(all.result.problem, all.result.adjustment, options.seed);
   all.loop = close_loop(all.result);
   if (const auto finding = judge_loop(all.result, all.loop)) findings.push_back(*finding);
+  if (auto warning = all.result.solved ? pose_unit_warning(all.result.rig) : std::nullopt)
+    findings.push_back({Grade::kDoubtful, std::move(*warning), "give the known distance in mm"});
   all.verdict = judge(input, all.result, all.uncertainty, std::move(findings));
   if (all.verdict.grade == Grade::kUnusable) {
     if (auto finding = find_mirrored(input, all.result, calibrate_options, progress))

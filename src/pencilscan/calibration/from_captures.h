@@ -34,7 +34,7 @@ struct CapturesCalibration {
 };
 
 /// Decodes the captures, one folder per pose of the object, solves for the rig and judges it.
-/// InputError for folders that do not fit the devices.
+/// InputError for folders that do not fit the devices, and for one that is named twice.
 [[nodiscard]] CapturesCalibration calibrate_captures(
     const UncalibratedRig& devices, const std::vector<std::filesystem::path>& captures,
     const CapturesOptions& options = {}, const Progress& progress = {});

@@ -40,6 +40,11 @@ std::optional<Rig> rig_of(const ArtefactCommand& command, const fs::path& file) 
   return std::nullopt;
 }
 
+void tell_warnings(const fs::path& file, const std::vector<std::string>& warnings) {
+  for (const std::string& warning : warnings)
+    std::cerr << "pencilscan: warning: " << file.string() << ": " << warning << "\n";
+}
+
 void measure(const ArtefactCommand& command, const fs::path& file, ArtefactTest& test) {
   const ArtefactPoints points = read_artefact_points(file);
   const std::optional<Rig> rig = rig_of(command, file);
@@ -50,14 +55,11 @@ void measure(const ArtefactCommand& command, const fs::path& file, ArtefactTest&
       break;
     case Artefact::kBallBar:
       test.ball_bars.push_back(measure_ball_bar(points, known, test.options));
-      if (test.ball_bars.back().between > 0) {
-        std::cerr << "pencilscan: warning: " << file.string() << ": "
-                  << test.ball_bars.back().between
-                  << " points lie between the balls; if that is the bar, give --bar-diameter\n";
-      }
+      tell_warnings(file, artefact_warnings(test.ball_bars.back(), test.options));
       break;
     case Artefact::kPlate:
       test.plates.push_back(measure_plate(points, known, test.options));
+      tell_warnings(file, artefact_warnings(test.plates.back(), test.options));
       break;
   }
 }
@@ -167,9 +169,9 @@ void run_artefact(ArtefactCommand command) {
     write_text(command.report_path, artefact_html(test, "pencilscan " PENCILSCAN_VERSION));
 }
 
-void add_positive(CLI::App& command, const char* flag, std::optional<double>& value,
-                  const char* text) {
-  command.add_option(flag, value, text)->check(above_zero());
+CLI::Option* add_positive(CLI::App& command, const char* flag, std::optional<double>& value,
+                          const char* text) {
+  return command.add_option(flag, value, text)->check(above_zero());
 }
 
 std::shared_ptr<ArtefactCommand> add_artefact(CLI::App& group, Artefact artefact, const char* name,
@@ -207,16 +209,20 @@ std::shared_ptr<ArtefactCommand> add_artefact(CLI::App& group, Artefact artefact
         ->check(above_zero());
   }
   if (artefact == Artefact::kPlate) {
-    add_positive(*command, "--length", sizes.plate_length_mm, "Of the plate, mm: for the coverage");
-    add_positive(*command, "--width", sizes.plate_width_mm, "Of the plate, mm: for the coverage");
-    add_positive(*command, "--thickness", sizes.plate_thickness_mm,
-                 "Of the plate, mm, where more than one face was measured: takes the face that "
-                 "has most points");
+    add_positive(*command, "--length", sizes.plate_length_mm,
+                 "Of the plate, mm: with --width for the coverage");
+    add_positive(*command, "--width", sizes.plate_width_mm,
+                 "Of the plate, mm: with --length for the coverage");
+    CLI::Option* thickness =
+        add_positive(*command, "--thickness", sizes.plate_thickness_mm,
+                     "Of the plate, mm, where more than one face was measured: takes the face that "
+                     "has most points");
     command
         ->add_option("--border", sizes.border_mm,
-                     "With --thickness: points closer than this to the rim are left out, mm")
+                     "Points closer than this to the rim are left out, mm")
         ->check(zero_or_more())
-        ->capture_default_str();
+        ->capture_default_str()
+        ->needs(thickness);
   }
   command
       ->add_option("--region", options->region,

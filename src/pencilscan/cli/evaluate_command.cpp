@@ -91,6 +91,14 @@ void run_evaluate(const EvaluateOptions& options) {
   try {
     const Evaluation evaluation = evaluate(truth, rig, result.input, evaluation_options);
     const nlohmann::ordered_json figures = figures_json(evaluation, rig);
+    if (evaluation.truth_warning) {
+      std::cerr << "pencilscan: warning: " << options.truth_path << ": "
+                << *evaluation.truth_warning << "\n";
+    }
+    if (evaluation.point_distance && !evaluation.labels) {
+      std::cerr << "pencilscan: " << result.points_path.string()
+                << " is of a scan: it has no lines, and their figures are left out\n";
+    }
     print_evaluation(figures, std::cout);
     write_figures(options.common, figures);
   } catch (const InputError& error) {

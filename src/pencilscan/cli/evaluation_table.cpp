@@ -63,7 +63,8 @@ std::string_view meaning_of(std::string_view key) {
   return "";
 }
 
-std::string_view group_of(std::string_view key) {
+std::string_view group_of(std::string_view key, bool has_lines) {
+  if (key == "points" && !has_lines) return "Points";
   if (key.starts_with("mesh_sigma")) return "Sigma of the mesh against its error";
   if (key.starts_with("sigma")) return "Sigma of the points against their error";
   if (key.starts_with("mesh_")) return "Distance of the mesh";
@@ -92,13 +93,15 @@ void print_keys(const Json& figures, std::ostream& out) {
     key_width = std::max(key_width, key.size());
     value_width = std::max(value_width, text_of(value).size());
   }
+  const bool has_lines = figures.contains("label_error");
   std::string_view group;
   for (const auto& [key, value] : figures.items()) {
+    if (key == "warnings") continue;  // told by the command
     const bool is_list = value.is_array() && (value.empty() || !value[0].is_structured());
     if (value.is_structured() && !is_list) continue;
-    if (group_of(key) != group) {
-      out << (group.empty() ? "" : "\n") << group_of(key) << "\n";
-      group = group_of(key);
+    if (group_of(key, has_lines) != group) {
+      out << (group.empty() ? "" : "\n") << group_of(key, has_lines) << "\n";
+      group = group_of(key, has_lines);
     }
     out << "  " << std::left << std::setw(static_cast<int>(key_width)) << key << "  "
         << std::setw(static_cast<int>(value_width)) << text_of(value) << "  " << meaning_of(key)

@@ -4,6 +4,7 @@
 
 #include "pencilscan/core/counted_progress.h"
 #include "pencilscan/core/error.h"
+#include "pencilscan/evaluation/truth_check.h"
 
 namespace pencilscan {
 namespace {
@@ -16,11 +17,13 @@ void require_index(std::size_t vertex, const char* property, std::size_t value, 
 }
 
 void validate(const Rig& rig, const std::vector<MeasuredPoint>& points) {
+  const bool have_lines = !are_of_gray_scan(points);
   for (std::size_t i = 0; i < points.size(); ++i) {
     const MeasuredPoint& p = points[i];
     require_index(i, "camera", p.camera, rig.cameras.size());
     require_index(i, "projector", p.projector, rig.projectors.size());
-    require_index(i, "pattern", p.pattern, rig.projectors[p.projector].patterns.size());
+    if (have_lines)
+      require_index(i, "pattern", p.pattern, rig.projectors[p.projector].patterns.size());
     for (const float value : {p.x, p.y, p.z, p.u, p.v, p.sigma}) {
       if (std::isfinite(value)) continue;
       throw InputError("points.ply", "vertex " + std::to_string(i), std::to_string(value),
@@ -29,14 +32,17 @@ void validate(const Rig& rig, const std::vector<MeasuredPoint>& points) {
   }
 }
 
+/// Where the result is: its points, or else the vertices of its mesh.
+std::vector<Vec3> positions_of(const EvaluationInput& result) {
+  if (!result.points) return result.mesh->vertices;
+  std::vector<Vec3> positions;
+  for (const MeasuredPoint& p : *result.points) positions.push_back(position_of(p));
+  return positions;
+}
+
 AlignmentReport align(const TriangleMesh& truth, const EvaluationInput& result,
                       AlignmentKind kind) {
-  std::vector<Vec3> points;
-  if (result.points) {
-    for (const MeasuredPoint& p : *result.points) points.push_back(position_of(p));
-  } else {
-    points = result.mesh->vertices;
-  }
+  const std::vector<Vec3> points = positions_of(result);
   constexpr std::size_t kFewest = 10;
   if (points.size() < kFewest) {
     throw InputError("result", "vertices", std::to_string(points.size()),
@@ -66,6 +72,10 @@ void evaluate_points(const TruthScene& truth, const std::vector<MeasuredPoint>& 
   for (double& d : distances) d *= mm_per_unit;
   evaluation.point_distance = distance_figures(distances);
 
+  if (are_of_gray_scan(points)) {
+    evaluation.sigma = sigma_figures(points, judge_rays(truth, points));
+    return;
+  }
   if (progress) progress("judging labels", 0);
   const auto verdicts = judge_points(truth, points);
   evaluation.labels = label_figures(truth, points, verdicts);
@@ -94,6 +104,7 @@ Evaluation evaluate(const TriangleMesh& truth, const Rig& rig, const EvaluationI
     truth_in_rig = transformed(truth, evaluation.alignment->truth_from_result.inverse());
   }
   const TruthScene scene(truth_in_rig, rig);
+  evaluation.truth_warning = truth_warning(scene.scene(), positions_of(result));
   if (result.points) {
     evaluate_points(scene, *result.points, mm_per_unit, options.progress, evaluation);
   }

@@ -24,7 +24,8 @@ struct EvaluationInput {
   std::optional<TriangleMesh> mesh;                  ///< mesh_measured.ply
 };
 
-/// All figures; those of an absent part are absent.
+/// All figures; those of an absent part are absent, and so are labels and recall of a scan's points
+/// (are_of_gray_scan()), which have no lines.
 struct Evaluation {
   std::optional<AlignmentReport> alignment;
   std::size_t point_count = 0;
@@ -33,12 +34,13 @@ struct Evaluation {
   std::optional<DistanceFigures> point_distance;
   std::optional<SigmaFigures> sigma;
   std::optional<SurfaceFigures> surface;
+  std::optional<std::string> truth_warning;  ///< why the mesh can hardly be the truth
 };
 
 /// Computes every figure of docs/figures.md. The rig is the one that the result was made with: with
 /// an alignment the truth is moved into its frame, so that its camera rays stay valid. InputError
-/// when a vertex names a camera, projector or pattern that the rig lacks, has a non-finite number,
-/// or when there is too little to align.
+/// when a vertex names a camera, projector or (but for scans) pattern that the rig lacks, has a
+/// non-finite number, or when there is too little to align.
 [[nodiscard]] Evaluation evaluate(const TriangleMesh& truth, const Rig& rig,
                                   const EvaluationInput& result,
                                   const EvaluationOptions& options = {});

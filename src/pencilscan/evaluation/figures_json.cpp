@@ -114,10 +114,9 @@ void put_alignment(Json& json, const AlignmentReport& alignment) {
 
 nlohmann::ordered_json figures_json(const Evaluation& evaluation, const Rig& rig) {
   Json json;
-  if (evaluation.labels && evaluation.recall) {
-    json["points"] = evaluation.point_count;
+  if (evaluation.point_distance) json["points"] = evaluation.point_count;
+  if (evaluation.labels && evaluation.recall)
     put_lines(json, *evaluation.labels, *evaluation.recall);
-  }
   // The plain keys are those of points.ply where there is one, else of the mesh.
   if (evaluation.point_distance) {
     put_distance(json, "", *evaluation.point_distance);
@@ -135,6 +134,7 @@ nlohmann::ordered_json figures_json(const Evaluation& evaluation, const Rig& rig
     put_breakdown(json, *evaluation.labels, *evaluation.recall, rig);
   }
   if (evaluation.alignment) put_alignment(json, *evaluation.alignment);
+  if (evaluation.truth_warning) json["warnings"] = Json::array({*evaluation.truth_warning});
   return json;
 }
 

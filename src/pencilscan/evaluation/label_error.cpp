@@ -101,6 +101,26 @@ std::vector<PointVerdict> judge_points(const TruthScene& truth,
   return verdicts;
 }
 
+bool are_of_gray_scan(std::span<const MeasuredPoint> points) {
+  const auto is_whole = [](float value) { return value == std::floor(value); };
+  const bool on_pixels = std::all_of(points.begin(), points.end(), [&](const MeasuredPoint& p) {
+    return is_whole(p.u) && is_whole(p.v) && p.pattern == 0 && p.confidence == 1.0F &&
+           static_cast<long>(p.line) == std::max(std::lround(p.plane), 0L);
+  });
+  return on_pixels && std::any_of(points.begin(), points.end(),
+                                  [&](const MeasuredPoint& p) { return !is_whole(p.plane); });
+}
+
+std::vector<PointVerdict> judge_rays(const TruthScene& truth,
+                                     std::span<const MeasuredPoint> points) {
+  std::vector<PointVerdict> verdicts(points.size());
+  mark_duplicates(points, verdicts);
+  parallel_chunks(points.size(), [&](std::size_t i) {
+    if (verdicts[i].counted) verdicts[i].ray_error_mm = ray_error(truth, points[i]);
+  });
+  return verdicts;
+}
+
 LabelFigures label_figures(const TruthScene& truth, std::span<const MeasuredPoint> points,
                            std::span<const PointVerdict> verdicts) {
   LabelFigures figures;

@@ -21,6 +21,11 @@ struct PointVerdict {
   std::optional<double> spacing_px;
 };
 
+/// True for the points of a Gray-code scan (`pencilscan scan`), whose `line` is no line but the
+/// column of the projector's panel: they lie on whole camera pixels, where curves never all lie,
+/// all with pattern 0 and full confidence, and `line` is the fractional `plane`, rounded.
+[[nodiscard]] bool are_of_gray_scan(std::span<const MeasuredPoint> points);
+
 struct LabelOptions {
   double disc_px = 1;             ///< radius of the disc of camera rays that may find the line
   double tolerance_px = 1;        ///< of the true line coordinate, by its local gradient,
@@ -32,6 +37,11 @@ struct LabelOptions {
 [[nodiscard]] std::vector<PointVerdict> judge_points(const TruthScene& truth,
                                                      std::span<const MeasuredPoint> points,
                                                      const LabelOptions& options = {});
+
+/// Verdicts of points without lines: errors along the camera rays alone. Needs camera within the
+/// rig.
+[[nodiscard]] std::vector<PointVerdict> judge_rays(const TruthScene& truth,
+                                                   std::span<const MeasuredPoint> points);
 
 /// Vertices whose confidence lies in [low, next band's low): is their share of right labels what
 /// they say?

@@ -10,6 +10,7 @@
 #include "pencilscan/core/random.h"
 #include "pencilscan/evaluation/evaluate.h"
 #include "pencilscan/evaluation/synthetic_oracle.h"
+#include "pencilscan/evaluation/truth_check.h"
 
 namespace pencilscan {
 namespace {
@@ -219,6 +220,108 @@ TEST(Evaluate, FiguresAreTheSameForAnyThreadCount) {
         .dump();
   };
   EXPECT_EQ(run(1), run(3));
+}
+
+/// What a Gray-code scan measures of the sphere: panel columns at every eighth pixel.
+std::vector<MeasuredPoint> scanned_sphere(const Rig& rig, float sigma) {
+  std::vector<MeasuredPoint> points;
+  for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
+    for (int v = 0; v < rig.cameras[c].height; v += 8) {
+      for (int u = 0; u < rig.cameras[c].width; u += 8) {
+        const auto x = oracle::on_sphere(rig.cameras[c].ray(Vec2(u, v)));
+        if (!x || x->dot(rig.projectors[c].center() - *x) <= 0) continue;
+        MeasuredPoint point;
+        set_position(*x, point);
+        point.u = static_cast<float>(u);
+        point.v = static_cast<float>(v);
+        point.camera = point.projector = static_cast<std::uint8_t>(c);
+        point.plane = static_cast<float>(rig.projectors[c].project(*x)->x());
+        point.line = static_cast<std::uint16_t>(std::lround(point.plane));
+        point.sigma = sigma;
+        point.confidence = 1;
+        points.push_back(point);
+      }
+    }
+  }
+  return points;
+}
+
+TEST(Evaluate, PointsOfAScanHaveNoLinesAndNeedNone) {
+  Rig rig = oracle::ring(3);
+  EvaluationInput input;
+  input.points = scanned_sphere(rig, 1);
+  ASSERT_GT(input.points->size(), 500U);
+  for (const bool with_patterns : {true, false}) {
+    if (!with_patterns)
+      for (Projector& projector : rig.projectors) projector.patterns.clear();
+    const auto json =
+        figures_json(evaluate(make_sphere(oracle::kRadiusMm, kSphereRings), rig, input), rig);
+    EXPECT_EQ(json.at("points"), input.points->size());
+    EXPECT_LT(json.at("distance_median_mm").get<double>(), kSagMm);
+    EXPECT_GT(json.at("sigma_below_1").get<double>(), 0.98);  // but for rays at the rim
+    for (const char* key : {"label_error", "line_recall", "largest_wrong_patch_mm2",
+                            "right_by_confidence", "by_projector", "by_spacing", "warnings"})
+      EXPECT_FALSE(json.contains(key)) << key;
+  }
+}
+
+TEST(Evaluate, PointsWithLinesAreNoScan) {
+  const Rig rig = oracle::ring(2);
+  EXPECT_FALSE(are_of_gray_scan(oracle::sphere_points(rig)));
+  // Of another program, which counts in whole pixels and lines.
+  std::vector<MeasuredPoint> points = scanned_sphere(rig, 1);
+  EXPECT_TRUE(are_of_gray_scan(points));
+  for (MeasuredPoint& point : points) point.plane = point.line;
+  EXPECT_FALSE(are_of_gray_scan(points));
+  EXPECT_FALSE(are_of_gray_scan({}));
+}
+
+/// The warning about a truth, "" without one.
+std::string warning_of(const TriangleMesh& truth, std::span<const Vec3> points) {
+  return truth_warning(RayScene(truth), points).value_or("");
+}
+
+TEST(TruthWarning, NamesAMeshOfAnotherSizeOrPlace) {
+  using ::testing::HasSubstr;
+  const auto sphere = [](double radius, const Vec3& center) {
+    return transformed(make_sphere(radius, kSphereRings), {1, Mat3::Identity(), center});
+  };
+  const std::vector<Vec3> points = make_sphere(100, kSphereRings).vertices;
+  EXPECT_THAT(warning_of(sphere(0.1, Vec3::Zero()), points),
+              HasSubstr("the truth is probably in metres instead of millimetres"));
+  EXPECT_THAT(warning_of(sphere(100 / 25.4, Vec3::Zero()), points), HasSubstr("in inches"));
+  for (const TriangleMesh& truth :
+       {sphere(2.7, Vec3::Zero()), sphere(50, Vec3::Zero()), sphere(700, Vec3::Zero()),
+        sphere(100, {80, 0, 0}), sphere(100, {0, 5000, 0})})
+    EXPECT_THAT(warning_of(truth, points), HasSubstr("it is truth/mesh.ply in the scene's folder"));
+}
+
+TEST(TruthWarning, IsSilentOfPartsAndOfResultsThatAreALittleOff) {
+  const TriangleMesh truth = make_sphere(100, kSphereRings);
+  std::vector<Vec3> part, larger, noisy;
+  Random random(3);
+  for (const Vec3& vertex : truth.vertices) {
+    if (vertex.z() > 90) part.push_back(vertex);
+    larger.push_back(1.1 * vertex);
+    noisy.push_back(vertex + 3 * Vec3(random.normal(), random.normal(), random.normal()));
+    if (noisy.size() % 4 == 0) noisy.back() *= 5;  // a quarter is wrong
+  }
+  for (const auto& points : {truth.vertices, part, larger, noisy, std::vector<Vec3>()})
+    EXPECT_EQ(warning_of(truth, points), "");
+}
+
+TEST(Evaluate, WarnsOfATruthThatIsNoneUnlessItIsMovedThere) {
+  const Rig rig = oracle::ring(2);
+  EvaluationInput input;
+  input.points = oracle::sphere_points(rig);
+  const TriangleMesh truth =
+      transformed(make_sphere(oracle::kRadiusMm, kSphereRings), {1, Mat3::Identity(), {0, 90, 0}});
+  EvaluationOptions options;
+  const auto figures = figures_json(evaluate(truth, rig, input, options), rig);
+  ASSERT_EQ(figures.at("warnings").size(), 1U);
+  EXPECT_THAT(figures.at("warnings")[0].get<std::string>(), ::testing::HasSubstr("hardly"));
+  options.align = AlignmentKind::kRigid;
+  EXPECT_FALSE(evaluate(truth, rig, input, options).truth_warning);
 }
 
 TEST(Evaluate, NamesTheVertexThatTheRigCannotHold) {

@@ -306,15 +306,18 @@ ordered_json PageData::index(const std::string& mode, std::vector<ordered_json> 
   return index;
 }
 
+void PageData::require_content(const std::string& verb) const {
+  if (!is_empty()) return;
+  throw InputError(folder_.root.string(), "", "",
+                   "there is nothing to " + verb +
+                       ": no result of reconstruct or scan (points.ply, report.json), no "
+                       "calibration.json, no experiment, here or in the folders below");
+}
+
 PageReport write_report(const fs::path& root, const fs::path& file, const PageOptions& options,
                         const Progress& progress) {
   const PageData data(root, options);
-  if (data.is_empty()) {
-    throw InputError(root.string(), "", "",
-                     "there is nothing to report: no result of reconstruct or scan (points.ply, "
-                     "report.json), no calibration.json, no experiment, here or in the folders "
-                     "below");
-  }
+  data.require_content("report");
   const auto experiment = data.experiment(experiment_detail(data, options.max_bytes));
   const std::string sequence = sequence_part(root);
   const std::size_t taken =

@@ -43,6 +43,8 @@ class PageData {
     return folder_.results.empty() && folder_.failed.empty() && folder_.calibrations.empty() &&
            !experiment_;
   }
+  /// InputError where that is so; `verb`: what cannot be done then ("report").
+  void require_content(const std::string& verb) const;
   /// A reader of one result.
   [[nodiscard]] std::unique_ptr<ResultReader> open(std::size_t result, const Detail& detail) const;
   /// The index of the page: devices, per result what `entries` holds, and what is known of the

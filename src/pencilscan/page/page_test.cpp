@@ -332,8 +332,9 @@ TEST_F(Folder, OfAScanNothingIsMissingButTheDevices) {
 TEST_F(Folder, AnEmptyFolderHasNoReport) {
   std::filesystem::create_directories(root_ / "000000");
   EXPECT_THROW(static_cast<void>(report()), InputError);
-  const PageData page(root_, {});  // what `view` shows says why it is empty
+  const PageData page(root_, {});
   EXPECT_TRUE(page.is_empty());
+  EXPECT_THROW(page.require_content("view"), InputError);
   EXPECT_EQ(page.index("view", {})["title"], root_.filename().string());
   EXPECT_EQ(folder_name(root_ / ""), root_.filename().string());
   EXPECT_THROW(static_cast<void>(find_results(root_ / "none")), InputError);
@@ -369,6 +370,19 @@ TEST_F(Folder, OfManyFramesSomeAreWholeAndTheOthersHaveTheirShape) {
   EXPECT_LE(last_.bytes, options.max_bytes);
   EXPECT_EQ(index["results"][0]["detail"], "full");
   for (const auto& result : index["results"]) EXPECT_THAT(result["parts"], Contains("mesh"));
+}
+
+TEST_F(Folder, ATruthOfAnotherSizeIsTold) {
+  sample::write_output(root_, 1);
+  write_mesh(root_ / "true.ply", make_sphere(sample::kBallRadius, 60));
+  write_mesh(root_ / "small.ply", make_sphere(0.01 * sample::kBallRadius, 60));
+  PageOptions options;
+  options.sources.truth = root_ / "true.ply";
+  static_cast<void>(report(options));
+  EXPECT_THAT(last_.missing, Not(Contains(HasSubstr("true.ply"))));
+  options.sources.truth = root_ / "small.ply";
+  static_cast<void>(report(options));
+  EXPECT_THAT(last_.missing, Contains(HasSubstr("small.ply: this is hardly the truth")));
 }
 
 TEST_F(Folder, ATruthAddsDistancesAndFigures) {

@@ -6,7 +6,9 @@
 
 #include "pencilscan/core/error.h"
 #include "pencilscan/evaluation/evaluate.h"
+#include "pencilscan/evaluation/truth_check.h"
 #include "pencilscan/io/file.h"
+#include "pencilscan/io/json_text.h"
 #include "pencilscan/io/mesh_file.h"
 #include "pencilscan/page/advice.h"
 #include "pencilscan/page/geometry_blocks.h"
@@ -137,7 +139,7 @@ std::optional<std::string> ResultReader::part(const std::string& name) {
 }
 
 std::optional<std::string> ResultReader::make_part(const std::string& name) {
-  if (name == "details") return compress(details().dump());
+  if (name == "details") return compress(json_line(details()));
   if (name == "thumb") {
     const TriangleMesh* mesh = files_.mesh();
     if (mesh == nullptr) return std::nullopt;
@@ -213,6 +215,17 @@ ordered_json ResultReader::histograms() {
   return result;
 }
 
+void ResultReader::check_truth(const RayScene& truth) {
+  std::vector<Vec3> positions;
+  if (const auto* points = detail_.shape_only ? nullptr : files_.points()) {
+    for (const MeasuredPoint& p : *points) positions.push_back(position_of(p));
+  } else if (const TriangleMesh* mesh = files_.mesh()) {
+    positions = mesh->vertices;
+  }
+  if (const auto warning = truth_warning(truth, positions))
+    note(files_.entry().truth.string(), *warning);
+}
+
 ordered_json ResultReader::details() {
   ordered_json result;
   if (const json* report = files_.report()) {
@@ -224,6 +237,7 @@ ordered_json ResultReader::details() {
   if (const json* timing = files_.timing()) result["timing"] = *timing;
   if (!detail_.shape_only) result["histograms"] = histograms();
   const RayScene* truth = files_.truth();
+  if (truth != nullptr) check_truth(*truth);
   if (const json* figures = files_.figures()) {
     result["figures"] = *figures;
   } else if (truth != nullptr && rig_ != nullptr && detail_.evaluate && !detail_.shape_only) {

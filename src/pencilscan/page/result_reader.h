@@ -54,6 +54,8 @@ class ResultReader {
   [[nodiscard]] std::optional<std::string> make_camera_part(const std::string& name);
   [[nodiscard]] nlohmann::ordered_json details();
   [[nodiscard]] nlohmann::ordered_json histograms();
+  /// Notes a true mesh that can hardly be that of the result.
+  void check_truth(const RayScene& truth);
   void note(const std::string& what, const std::string& why);
   void note_missing_files();
 

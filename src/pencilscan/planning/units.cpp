@@ -5,31 +5,28 @@
 #include <charconv>
 #include <cmath>
 #include <limits>
+#include <span>
 #include <vector>
 
+#include "pencilscan/core/length_units.h"
 #include "pencilscan/core/median.h"
 #include "pencilscan/rig/device_list.h"
 
 namespace pencilscan {
 namespace {
 
-/// What turns lengths of a unit into millimetres, and back.
-struct UnitFactor {
-  double factor;
-  const char* words;
-};
-constexpr std::array kUnits = std::to_array<UnitFactor>({
+/// Units of meshes before a rig in millimetres.
+constexpr std::array kMeshUnits = std::to_array<UnitFactor>({
     {1000, "metres instead of millimetres"},
     {304.8, "feet instead of millimetres"},
-    {39.37, "metres instead of inches"},
     {25.4, "inches instead of millimetres"},
     {10, "centimetres instead of millimetres"},
-    {0.001, "millimetres instead of metres"},
-    {1 / 304.8, "millimetres instead of feet"},
-    {1 / 39.37, "inches instead of metres"},
-    {1 / 25.4, "millimetres instead of inches"},
-    {0.1, "millimetres instead of centimetres"},
+    {0.001, "micrometres instead of millimetres"},
 });
+/// Seldom enough to be thought of only where no other unit explains the size.
+constexpr std::array kSeldomMeshUnits =
+    std::to_array<UnitFactor>({{100, "decimetres instead of millimetres"}});
+constexpr std::array kUnitOfRig = std::to_array<UnitFactor>({{1, "the rig's unit already"}});
 
 // Shares of the volume's radius. An object that reaches a tenth of it is crossed by a tenth of the
 // lines, which is poor but may be meant; the volume "holds the object", so twice of it cannot be.
@@ -77,11 +74,11 @@ double reach_of(const TriangleMesh& object) {
   return reach;
 }
 
-/// The unit that explains a share of the volume; null: none does.
-const UnitFactor* unit_behind(double share) {
+/// The unit of these that explains a share of the volume; null: none does.
+const UnitFactor* unit_behind(double share, std::span<const UnitFactor> units) {
   const UnitFactor* best = nullptr;
   double least = std::numeric_limits<double>::infinity();
-  for (const UnitFactor& unit : kUnits) {
+  for (const UnitFactor& unit : units) {
     const double explained = share * unit.factor;
     if (explained < kExplainedFrom || explained > kExplainedTo) continue;
     const double off = std::abs(std::log(explained / kUsualShare));
@@ -89,6 +86,14 @@ const UnitFactor* unit_behind(double share) {
     least = std::min(least, off);
   }
   return best;
+}
+
+/// The unit of a file whose lengths, as they stand there, are this share of the volume.
+const UnitFactor* unit_of_mesh(double share, const Rig& rig) {
+  if (const UnitFactor* unit = unit_behind(share, kUnitOfRig)) return unit;
+  if (!rig.unit_known) return unit_behind(share, kUnitFactors);
+  const UnitFactor* unit = unit_behind(share, kMeshUnits);
+  return unit != nullptr ? unit : unit_behind(share, kSeldomMeshUnits);
 }
 
 bool sees(const Device& device, const Vec3& point) {
@@ -112,16 +117,17 @@ bool is_plausible(const Rig& rig, const Sphere& volume) {
 
 }  // namespace
 
-std::optional<std::string> object_unit_warning(const TriangleMesh& object, const Rig& rig) {
+std::optional<std::string> object_unit_warning(const TriangleMesh& object, const Rig& rig,
+                                               double scale) {
   const double reach = reach_of(object);
   const Sphere volume = working_volume(rig);
   if (!(reach > 0) || !(volume.radius > 0)) return std::nullopt;
   const double share = reach / volume.radius;
   if (share >= kSmallestShare && share <= kLargestShare) return std::nullopt;
-  const UnitFactor* unit = unit_behind(share);
-  std::string text = "the object is " + rounded(2 * reach) + " " + unit_name(rig) +
-                     " large and the rig's volume " + rounded(2 * volume.radius) + " " +
-                     unit_name(rig);
+  const UnitFactor* unit = unit_of_mesh(share / scale, rig);
+  std::string text = "the object is " + rounded(2 * reach) + " " + unit_name(rig) + " large" +
+                     (scale == 1 ? "" : " with --scale " + factor_text(scale)) +
+                     " and the rig's volume " + rounded(2 * volume.radius) + " " + unit_name(rig);
   if (unit != nullptr) {
     text += ": the mesh is probably in " + std::string(unit->words) + ". --scale " +
             factor_text(unit->factor) + " makes it right, --fit makes it fit";
@@ -158,7 +164,7 @@ std::optional<std::string> volume_unit_warning(const Rig& rig) {
   std::string text = "the rig's volume cannot be what its cameras look at: its radius is " +
                      rounded(rig.volume->radius) + ", their distance to its centre " +
                      rounded(upper_median(std::move(distances))) + " " + unit_name(rig);
-  for (const UnitFactor& unit : kUnits) {
+  for (const UnitFactor& unit : kUnitFactors) {
     const Sphere other{unit.factor * rig.volume->center, unit.factor * rig.volume->radius};
     if (!is_plausible(rig, other)) continue;
     return text + "; \"volume\" is probably in " + unit.words + ": multiply it by " +

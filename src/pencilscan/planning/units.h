@@ -11,12 +11,13 @@
 
 namespace pencilscan {
 
-/// Why the size of an object does not fit the rig's volume, with the unit that it is probably in
-/// and what to do (`--scale F` multiplies the object, `--fit` fits it into the volume); nothing
-/// where it does. An object fits that reaches from a tenth of the volume's radius to twice of it,
-/// around the middle of its bounding box.
+/// Why the size of an object does not fit the rig's volume, with the unit that its file is probably
+/// in and what to do (`--scale F` multiplies the file's lengths, `--fit` fits them into the
+/// volume); nothing where it does. An object fits that reaches from a tenth of the volume's radius
+/// to twice of it, around the middle of its bounding box. `scale`: by what its file was multiplied
+/// already. The advice is the same for any.
 [[nodiscard]] std::optional<std::string> object_unit_warning(const TriangleMesh& object,
-                                                             const Rig& rig);
+                                                             const Rig& rig, double scale = 1);
 
 /// Why the volume that a rig states cannot be what its devices stand around: no camera sees its
 /// middle, or its radius is out of proportion to their distance; with the factor that would put it

@@ -46,13 +46,38 @@ TEST(ObjectUnit, AForeignUnitIsNamedWithItsFactor) {
   for (const Case& c : {Case{1e-3, "metres instead of millimetres", "--scale 1000 "},
                         Case{1 / 25.4, "inches instead of millimetres", "--scale 25.4 "},
                         Case{1 / 304.8, "feet instead of millimetres", "--scale 304.8 "},
-                        Case{1000, "millimetres instead of metres", "--scale 0.001 "}}) {
+                        Case{0.01, "decimetres instead of millimetres", "--scale 100 "},
+                        Case{1000, "micrometres instead of millimetres", "--scale 0.001 "}}) {
     const auto warning = object_unit_warning(cube(c.factor * side, volume.center), ring());
     ASSERT_TRUE(warning) << c.unit;
     EXPECT_THAT(*warning, HasSubstr(c.unit));
     EXPECT_THAT(*warning, HasSubstr(c.remedy));
     EXPECT_THAT(*warning, HasSubstr("--fit"));
   }
+}
+
+TEST(ObjectUnit, BeforeARigOfUnknownUnitItMayBeEitherOfTwo) {
+  Rig rig = scaled(ring(), 0.001);
+  rig.unit_known = false;
+  const Sphere volume = working_volume(rig);
+  EXPECT_THAT(object_unit_warning(cube(1000 * volume.radius, volume.center), rig).value_or(""),
+              HasSubstr("millimetres instead of metres. --scale 0.001 "));
+}
+
+TEST(ObjectUnit, TheAdviceIsTheSameWhateverTheScaleInUse) {
+  // 2.69 units, as large as a bunny that is often met: neither metres nor inches.
+  const double side = 2.69 / std::sqrt(3.0);
+  const Vec3 center = working_volume(ring()).center;
+  for (const double scale : {1.0, 0.1, 39.37 / 4, 1000.0}) {
+    const auto warning = object_unit_warning(cube(scale * side, center), ring(), scale);
+    ASSERT_TRUE(warning) << scale;
+    EXPECT_THAT(*warning,
+                HasSubstr("decimetres instead of millimetres. --scale 100 makes it right"))
+        << scale;
+  }
+  EXPECT_FALSE(object_unit_warning(cube(100 * side, center), ring(), 100));
+  EXPECT_THAT(object_unit_warning(cube(1000 * 200, center), ring(), 1000).value_or(""),
+              HasSubstr("the rig's unit already. --scale 1 makes it right"));
 }
 
 TEST(ObjectUnit, WhatNoUnitExplainsIsStillToldToFit) {

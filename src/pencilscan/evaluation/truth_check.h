@@ -1,0 +1,18 @@
+#pragma once
+
+#include <optional>
+#include <span>
+#include <string>
+
+#include "pencilscan/geometry/ray_scene.h"
+
+namespace pencilscan {
+
+/// Why a mesh can hardly be the true surface of a result: half of the points lie farther off it
+/// than a twentieth of their own extent. A part of the truth lies near it however small it is, and
+/// so does a result whose scale is off by a few per cent. Nothing where the mesh may be the truth,
+/// or where there are no points.
+[[nodiscard]] std::optional<std::string> truth_warning(const RayScene& truth,
+                                                       std::span<const Vec3> points);
+
+}  // namespace pencilscan
