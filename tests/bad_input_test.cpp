@@ -75,11 +75,42 @@ TEST_F(Program, ArtefactsThatAreNoneAreBadInput) {
   expect_bad("artefact plate . ", "must be a PLY file, or hold points.ply");
 }
 
+TEST_F(Program, AnEmptyWordIsNoFolder) {
+  expect_bad("rig ring --out ''", "--out needs a value, and the word behind it is empty");
+  expect_bad("rig ring --out=", "--out= needs a value behind the =");
+  expect_bad("rig ''", "word 2 is empty");
+}
+
+TEST_F(Program, FiguresDoNotTakeThePlaceOfTheOutput) {
+  const Outcome outcome = run("rig ring --out rig.json --json rig.json");
+  EXPECT_EQ(outcome.code, 2);
+  EXPECT_THAT(outcome.error, HasSubstr("--json = rig.json: must not be another output"));
+  EXPECT_EQ(run("rig check --rig rig.json").code, 0);
+}
+
 TEST_F(Program, MissingOrBrokenRigFilesAreBadInput) {
   expect_bad("pattern --rig none.json --out out", "none.json: the file does not exist");
   expect_bad("rig check --rig .", "must be a file");
   std::ofstream(folder_ / "rig.json") << "{\"format\": ";
   expect_bad("rig check --rig rig.json", "rig.json: must be JSON");
+}
+
+TEST_F(Program, WhatCannotBeReachedIsNotCalledAbsent) {
+  fs::create_symlink("loop", folder_ / "loop");
+  expect_bad("pattern --rig loop --out out",
+             "loop: cannot be opened: Too many levels of symbolic links");
+  make_rig();
+  fs::create_directories(folder_ / "frames" / "000000");
+  fs::create_symlink("cam0.png", folder_ / "frames" / "000000" / "cam0.png");
+  expect_bad("reconstruct --rig rig.json --frames frames --out out",
+             "cam0.png: cannot be opened: Too many levels of symbolic links");
+}
+
+TEST_F(Program, AFrameFolderIsNamedInUtf8) {
+  make_rig();
+  fs::create_directories(folder_ / "frames" / "f\xfcr");
+  std::ofstream(folder_ / "frames" / "f\xfcr" / "cam0.png") << "";
+  expect_bad("reconstruct --rig rig.json --frames frames --out out", "must have a name in UTF-8");
 }
 
 TEST_F(Program, RigRulesNameFieldAndValue) {
@@ -115,6 +146,15 @@ TEST_F(Program, AProjectorWithoutPatternShowsNothing) {
   text.erase(begin, text.find('}', begin) + 1 - begin);
   std::ofstream(folder_ / "rig.json") << text;
   expect_bad("pattern --rig rig.json --out out", "rig.json: projectors[0].pattern: this key");
+  // What a calibration of devices without patterns gives.
+  fs::create_directories(folder_ / "frames" / "000000");
+  std::ofstream(folder_ / "frames" / "000000" / "cam0.png") << "";
+  for (const char* command : {"reconstruct --rig rig.json --frames frames --out out",
+                              "sequence submit --local 1 --rig rig.json --frames frames --out out",
+                              "rig check --rig rig.json --frames frames"})
+    expect_bad(command,
+               "rig.json: projectors[0].pattern: this key is missing: there is nothing to "
+               "see of this projector");
 }
 
 TEST_F(Program, AFullDiskIsAFailedStageAndLeavesNothing) {

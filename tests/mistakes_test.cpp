@@ -67,7 +67,7 @@ TEST_F(Newcomer, IsToldWhatIsMissingOrTooMuch) {
   expect_bad("reconstruct --rig --frames f --out o",
              "--rig needs a value, not --frames (see pencilscan reconstruct --help)");
   expect_bad("rig check --rig", "--rig needs a value (see pencilscan rig check --help)");
-  expect_bad("simulate --rig r --mesh m --out o --translate-mm 1 2",
+  expect_bad("simulate --rig r --mesh m --out o --frame-count 2 --translate-mm 1 2",
              "--translate-mm needs 3 values");
   expect_bad("rig check --rig a --rig b", "--rig stands more than once");
   expect_bad("rig check --rig my rig.json", "unexpected word rig.json");
@@ -82,6 +82,68 @@ TEST_F(Newcomer, IsToldWhichNumbersAreRight) {
   expect_bad("rig ring --out rig.json --pitch-px 1e9", "--pitch-px = 1e9: must be a number from 1");
   expect_bad("rig ring --out rig.json --seed -1", "--seed = -1: must be a whole number");
   expect_bad("capture --rate 0 --list", "--rate = 0: must be a number above 0");
+  expect_bad("reconstruct --rig r --frames f --out o --join-pixels 1.5",
+             "--join-pixels = 1.5: must be a whole number from 1 to 16");
+}
+
+TEST_F(Newcomer, IsToldWhichOptionsWouldHaveNoEffect) {
+  const std::string simulate = "simulate --rig r --mesh m --out o ";
+  const std::string reconstruct = "reconstruct --rig r --frames f --out o ";
+  const std::string submit = "sequence submit --local 1 --rig r --frames f --out o ";
+  const std::pair<std::string, const char*> mistakes[] = {
+      {"pattern --rig r --out o --solids",
+       "--solids requires --gray-code (see pencilscan pattern --help)"},
+      {"pattern --rig r --out o --no-inverses", "--no-inverses requires --gray-code"},
+      {"capture --rig r --out o --solids", "--solids requires --gray-code"},
+      {"capture --rig r --out o --gray-code --seconds 3",
+       "--seconds and --gray-code do not go together (see pencilscan capture --help)"},
+      {"capture --rig r --test l.json --frames 2", "--frames and --test do not go together"},
+      {"capture --rig r --list", "--rig and --list do not go together"},
+      {"show --seconds 1 --list", "--seconds and --list do not go together"},
+      {"show --rig r --assign n.json --what lines", "--assign needs --what identify"},
+      {"show --rig r --assign n.json --projector proj0", "--projector and --assign do not go"},
+      {simulate + "--color-captures", "--color-captures requires --gray-code"},
+      {simulate + "--jpeg 90 --bits 16", "--jpeg needs --bits 8"},
+      {simulate + "--light l --albedo 0.3", "--albedo does not go with --light: light is as it"},
+      {"rig check --rig r --put-back n.json", "--put-back requires --frames"},
+      {"rig check --rig r --frame-count 4", "--frame-count requires --frames"},
+      {"lab --out o --rig r --lab l --noise high", "--noise requires --virtual"},
+      {"lab --out o --virtual --lab l", "--lab and --virtual do not go together"},
+      {"lab --out o --virtual --port 8000", "--port needs --page where --virtual is"},
+      {"lab --out o --virtual --page --poses 3", "--page and --poses do not go together"},
+      {reconstruct + "--no-mesh --mesh-formats obj", "--no-mesh and --mesh-formats do not go"},
+      {reconstruct + "--no-mesh --depth-maps", "--no-mesh and --depth-maps do not go together"},
+      {reconstruct + "--no-depth --depth-maps", "--no-depth and --depth-maps do not go together"},
+      {reconstruct + "--method linear --depth-maps", "--depth-maps needs --method joint"},
+      {submit + "--no-mesh --mesh-formats obj", "--no-mesh and --mesh-formats do not go together"},
+      {submit + "--depth-maps --method multiview", "--depth-maps needs --method joint"}};
+  for (const auto& [arguments, complaint] : mistakes) expect_bad(arguments, complaint);
+  // What asks for no output is told, and what is wrong beside it stays the error.
+  const std::pair<std::string, const char*> told[] = {
+      {simulate + "--fit --scale 2", "--scale has no effect here: it does not change what --fit"},
+      {simulate + "--rotate-deg 5", "--rotate-deg has no effect here: it needs --frame-count 2"},
+      {simulate + "--translate-mm 1 0 0", "--translate-mm has no effect"},
+      {simulate + "--exposure-ms 5", "it needs --motion-mm-s or --spin-deg-s"},
+      {simulate + "--contrast 0.3", "--contrast has no effect here: it needs --texture checker"},
+      {simulate + "--texture none --texture-mm 3", "--texture-mm has no effect"},
+      {simulate + "--roughness 0.1", "--roughness has no effect here: it needs --specular above 0"},
+      {reconstruct + "--multiview-cost published", "it needs --method multiview"}};
+  for (const auto& [arguments, warning] : told) {
+    const Outcome outcome = run(arguments);
+    EXPECT_EQ(outcome.code, 2) << arguments;
+    EXPECT_THAT(outcome.error, ::testing::StartsWith("pencilscan: warning: ")) << arguments;
+    EXPECT_THAT(outcome.error, HasSubstr(warning)) << arguments;
+    EXPECT_EQ(std::count(outcome.error.begin(), outcome.error.end(), '\n'), 2) << outcome.error;
+  }
+}
+
+TEST_F(Newcomer, MayGiveOptionsInAnyOrder) {
+  // The method stands behind what needs it; "f" is then what is wrong.
+  ASSERT_EQ(run("rig ring --out r.json").code, 0);
+  expect_bad(
+      "reconstruct --multiview-cost published --rig r.json --frames f --out o "
+      "--method multiview",
+      "f: must be a folder that holds frame folders");
 }
 
 TEST_F(Newcomer, OverwritesNothingUnasked) {
@@ -99,6 +161,32 @@ TEST_F(Newcomer, OverwritesNothingUnasked) {
   expect_kept("report . --out page.html", "page.html");
 }
 
+TEST_F(Newcomer, ReplacesNoCaptureByAScene) {
+  const std::string simulate = small_scene() + "--out mine --overwrite";
+  fs::create_directories(folder_ / "mine/frames/000099");
+  write("mine/frames/000099/cam0.png", "taken");
+  fs::copy_file(folder_ / "r.json", folder_ / "mine/rig.json");
+  expect_bad(simulate, "must hold an earlier scene (rig.json and truth/) to be replaced");
+  EXPECT_EQ(slurp(folder_ / "mine/frames/000099/cam0.png"), "taken");
+  fs::remove_all(folder_ / "mine");
+  EXPECT_EQ(run(simulate).code, 0);
+  write("mine/frames/old", "of the scene before");
+  EXPECT_EQ(run(simulate).code, 0);
+  EXPECT_FALSE(fs::exists(folder_ / "mine/frames/old"));
+}
+
+TEST_F(Newcomer, ReplacesNoReportOfAnotherRig) {
+  write("calibration.json", R"({"rig": "other.json"})");
+  expect_bad("calibrate --captures c --devices d.json --out rig.json",
+             "must be in another folder: calibration.json is not of this rig");
+  write("calibration.json", R"({"rig": "rig.json"})");
+  expect_bad("calibrate --captures c --devices d.json --out rig.json", "d.json: ");
+  fs::remove(folder_ / "calibration.json");
+  write("calibration.html", "my notes");
+  expect_bad("calibrate --captures c --devices d.json --out rig.json",
+             "calibration.html is not of this rig");
+}
+
 TEST_F(Newcomer, FiguresReplaceFiguresOnly) {
   ASSERT_EQ(run("rig ring --out rig.json --json figures.json").code, 0);
   const std::string rig = slurp(folder_ / "rig.json");
@@ -111,6 +199,57 @@ TEST_F(Newcomer, FiguresReplaceFiguresOnly) {
 TEST_F(Newcomer, AFolderWithoutResultsHasNoReport) {
   fs::create_directories(folder_ / "empty" / "000000" / "pictures");
   expect_bad("report empty", "empty: there is nothing to report");
+  const Outcome view = run("view empty", "timeout 20");
+  EXPECT_EQ(view.code, 2);
+  EXPECT_THAT(view.error, ::testing::StartsWith("pencilscan: empty: there is nothing to view: "));
+}
+
+TEST_F(Newcomer, ExportsTheTwoDevicesOfAPair) {
+  ASSERT_EQ(run("rig ring --out r.json").code, 0);
+  const std::string pair = "rig export --rig r.json --opencv cv --stereo ";
+  expect_bad(pair + "cam0 cam0", "--stereo = cam0 cam0: must be two different devices");
+  EXPECT_THAT(run(pair + "cam0 proj0").output, HasSubstr("devices  2\n"));
+  EXPECT_TRUE(fs::exists(folder_ / "cv" / "cam0-proj0.yml"));
+}
+
+TEST_F(Newcomer, CountsAPoseOnce) {
+  ASSERT_EQ(run("rig ring --out r.json").code, 0);
+  fs::create_directories(folder_ / "pose1");
+  fs::create_directory_symlink("pose1", folder_ / "pose2");
+  for (const char* again : {"pose1", "./pose1/", "pose2"})
+    expect_bad(
+        std::string("calibrate --devices r.json --out rig.json --captures pose1 --captures ") +
+            again,
+        std::string(again) + ": must be another folder than pose1");
+}
+
+TEST_F(Newcomer, IsToldThatAFolderCameraTakesNewPicturesOnly) {
+  static_cast<void>(small_scene());
+  fs::create_directories(folder_ / "shots");
+  write("shots/cam0.png", "");
+  const Outcome outcome =
+      run("capture --rig r.json --camera cam0=folder:shots --camera cam1=folder:shots --seconds 1 "
+          "--out frames");
+  EXPECT_EQ(outcome.code, 1);
+  EXPECT_THAT(outcome.error,
+              HasSubstr("not a single frame came; cam0 is a folder: a picture counts "
+                        "that appears there after the start"));
+}
+
+TEST_F(Newcomer, MayUpdateTheLabFileThatIsTested) {
+  static_cast<void>(small_scene());
+  fs::create_directories(folder_ / "shots");
+  const std::string lab = R"({"format": "lab/1", "cameras": {"cam0": {"device": "folder:shots"},)"
+                          R"( "cam1": {"device": "folder:shots"}}})";
+  write("lab.json", lab);
+  write("other.json", lab);
+  const std::string test = "capture --rig r.json --lab lab.json --test ";
+  expect_bad(test + "other.json", "--test = other.json: is there already");
+  // It goes on to the projectors, of which there are none here, or none with an output.
+  const Outcome outcome = run(test + "./lab.json");
+  EXPECT_NE(outcome.code, 0);
+  EXPECT_THAT(outcome.error, Not(HasSubstr("is there already")));
+  EXPECT_EQ(slurp(folder_ / "lab.json"), lab);
 }
 
 TEST_F(Newcomer, IsToldWhichPicturesAreThereAndWhichAreMissing) {
@@ -165,6 +304,10 @@ TEST_F(Newcomer, IsToldOfObjectsInAnotherUnit) {
   const std::string simulate = "simulate --rig r.json --mesh metres.obj --samples 1";
   EXPECT_THAT(run(simulate + " --out small").error,
               HasSubstr("probably in metres instead of millimetres. --scale 1000 makes it right"));
+  EXPECT_THAT(
+      run(simulate + " --scale 10 --out wrong").error,
+      HasSubstr("mm large with --scale 10 and the rig's volume 340 mm: the mesh is probably "
+                "in metres instead of millimetres. --scale 1000 makes it right"));
   const Outcome scaled = run(simulate + " --scale 1000 --out right");
   EXPECT_EQ(scaled.code, 0);
   EXPECT_THAT(scaled.error, Not(HasSubstr("warning")));
@@ -173,9 +316,68 @@ TEST_F(Newcomer, IsToldOfObjectsInAnotherUnit) {
   EXPECT_THAT(fitted.error, Not(HasSubstr("warning")));
 }
 
+TEST_F(Newcomer, IsToldOfArtefactsOfAnotherSize) {
+  std::string plate =
+      "ply\nformat ascii 1.0\nelement vertex 4941\nproperty float x\n"
+      "property float y\nproperty float z\nend_header\n";
+  for (int x = 0; x <= 80; ++x)
+    for (int y = 0; y <= 60; ++y)
+      plate += std::to_string(2 * x) + " " + std::to_string(2 * y) + " 0." +
+               std::to_string((7 * x + 5 * y) % 10) + "\n";
+  write("plate.ply", plate);
+  const std::string measure = "artefact plate plate.ply --thickness 10 ";
+  const Outcome right = run(measure + "--length 160 --width 120 --border 5");
+  EXPECT_EQ(right.code, 0) << right.error;
+  EXPECT_EQ(right.error, "");
+  expect_bad(measure + "--length 16 --width 12",
+             "plate.ply: --length x --width = 16 x 12: must be the sides of the plate in mm");
+  EXPECT_THAT(run(measure + "--length 160 --width 80").error, HasSubstr("are they this plate's?"));
+  expect_bad(measure + "--border 70", "plate.ply: --border = 70: must leave some of the plate");
+  expect_bad("artefact plate plate.ply --border 5", "--border requires --thickness");
+  expect_bad("artefact plate plate.ply --region 0 0 900 50", "plate.ply: --region = 0 0 900 50: ");
+  const Outcome ball = run("artefact sphere plate.ply --diameter 80");
+  EXPECT_EQ(ball.code, 1);
+  EXPECT_THAT(ball.error, HasSubstr("plate.ply: no sphere fits 4941 points"));
+}
+
+TEST_F(Newcomer, MayJudgeAScanAndIsToldOfAWrongTruth) {
+  ASSERT_EQ(run("rig ring --out r.json --cameras 2 --projectors 2 --camera-width 192 "
+                "--camera-height 192 --camera-focal-px 345 --projector-width 192 "
+                "--projector-height 192")
+                .code,
+            0);
+  write_mesh();
+  ASSERT_EQ(run("simulate --rig r.json --mesh mesh.obj --samples 1 --gray-code --out s").code, 0);
+  const Outcome scan = run("scan --captures s/captures --rig r.json --out surface --no-mesh");
+  ASSERT_EQ(scan.code, 0) << scan.error;
+  // A calibrated rig knows no patterns.
+  std::string rig = slurp(folder_ / "r.json");
+  for (auto at = rig.find(",\n   \"pattern\""); at != std::string::npos;
+       at = rig.find(",\n   \"pattern\""))
+    rig.erase(at, rig.find('}', at) + 1 - at);
+  write("bare.json", rig);
+  for (const char* name : {"r.json", "bare.json"}) {
+    const Outcome judged = run(std::string("evaluate --result surface/points.ply --rig ") + name +
+                               " --truth s/truth/mesh.ply");
+    EXPECT_EQ(judged.code, 0) << judged.error;
+    EXPECT_THAT(judged.output, HasSubstr("distance_median_mm"));
+    EXPECT_THAT(judged.output, Not(HasSubstr("label_error")));
+    EXPECT_THAT(judged.error, Not(HasSubstr("warning")));
+  }
+  write("small.obj",
+        "v -0.6 -0.6 -0.5\nv 0.6 -0.6 -0.5\nv 0 0.7 -0.5\nv 0 0 0.8\n"
+        "f 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n");
+  for (const char* command : {"evaluate --result surface/points.ply", "report ./surface"}) {
+    const Outcome judged = run(std::string(command) + " --rig r.json --truth small.obj");
+    EXPECT_EQ(judged.code, 0) << judged.error;
+    EXPECT_THAT(judged.error, HasSubstr("small.obj: this is hardly the truth of the result"));
+    EXPECT_THAT(judged.error, HasSubstr("it is truth/mesh.ply in the scene's folder"));
+  }
+}
+
 TEST_F(Newcomer, MayBringLightOfAnotherRenderer) {
-  const std::string simulate = small_scene();
-  ASSERT_EQ(run(simulate + "--bits 16 --out own").code, 0);
+  ASSERT_EQ(run(small_scene() + "--bits 16 --out own").code, 0);
+  const std::string simulate = "simulate --rig r.json --mesh mesh.obj ";
   // Light without a sensor is the picture; the same sensor makes the same of the same light.
   const Outcome through = run(simulate + "--light own/frames --bits 16 --out through");
   ASSERT_EQ(through.code, 0) << through.error;

@@ -1,6 +1,6 @@
 // The page in a real browser: node --test web/test
 import assert from 'node:assert/strict';
-import {mkdirSync, mkdtempSync, rmSync} from 'node:fs';
+import {mkdirSync, mkdtempSync, rmSync, writeFileSync} from 'node:fs';
 import {tmpdir} from 'node:os';
 import {join} from 'node:path';
 import {after, before, test} from 'node:test';
@@ -301,16 +301,18 @@ test('headings, landmarks and names are those of a document', async () => {
   await page.context().close();
 });
 
-test('a folder without anything has no report, and its view says why', async () => {
+test('a folder without anything has neither report nor view; a view of failed frames names them', async () => {
   const empty = mkdtempSync(join(tmpdir(), 'pencilscan_empty_'));
   mkdirSync(join(empty, '000000', 'pictures'), {recursive: true});
   assert.throws(() => run('report', empty), (error) => error.status === 2);
+  await assert.rejects(startView(empty), /view ended with 2/);
+  writeFileSync(join(empty, 'inputs.json'), '{}');
   const {address, stop} = await startView(empty);
   const context = await browser.newContext();
   context.setDefaultTimeout(patience);
   const page = await context.newPage();
   await page.goto(address);
-  assert.match(await page.locator('#nothing').innerText(), /holds no result/);
+  assert.match(await page.locator('#nothing').innerText(), /holds no result.*Frames without a result: 000000/);
   await context.close();
   await stop();
   rmSync(empty, {recursive: true});

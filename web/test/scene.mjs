@@ -85,7 +85,8 @@ export function makeScene(frames) {
   writeFileSync(join(folder, 'rig.json'), JSON.stringify(smallRig()));
   writeFileSync(join(folder, 'ball.obj'), ball(90, 32));
   run('simulate', '--rig', join(folder, 'rig.json'), '--mesh', join(folder, 'ball.obj'), '--out',
-    join(folder, 'scene'), '--samples', '1', '--frame-count', String(frames), '--translate-mm', '0', '4', '0');
+    join(folder, 'scene'), '--samples', '1', '--frame-count', String(frames),
+    ...(frames > 1 ? ['--translate-mm', '0', '4', '0'] : []));
   const out = join(folder, 'out');
   run('reconstruct', '--rig', join(folder, 'scene', 'rig.json'), '--frames', join(folder, 'scene', 'frames'),
     '--out', out);

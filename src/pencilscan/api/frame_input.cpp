@@ -90,11 +90,7 @@ FrameOptions frame_options(const Rig& rig, const ReconstructionOptions& options)
     throw InputError("options", "multiview_cost", options.multiview_cost,
                      "must be normalized or published");
   }
-  for (std::size_t p = 0; p < rig.projectors.size(); ++p) {
-    if (rig.projectors[p].patterns.empty())
-      throw InputError("rig", "projectors[" + std::to_string(p) + "].pattern", "",
-                       "this key is missing: there is nothing to see of this projector");
-  }
+  require_patterns(rig, "rig", "there is nothing to see of this projector");
   const std::string_view rule = broken_rule(rig, points.method);
   if (!rule.empty()) throw InputError("rig", "projectors", "", std::string(rule));
   frame.shape.depth.enabled = options.depth && method->capabilities.allows_dense_depth;

@@ -17,9 +17,22 @@ namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
 constexpr const char* kFormat = "lab/1";
-constexpr const char* kFolder = "folder:";
 constexpr const char* kAravis = "aravis:";
 constexpr const char* kVideo = "v4l2:";
+
+/// The folder of a camera that is one.
+std::optional<fs::path> folder_of(const LabCamera& camera) {
+  if (!camera.device.starts_with(kFolderDevice)) return std::nullopt;
+  return camera.device.substr(std::string(kFolderDevice).size());
+}
+
+/// The same device as the lab.json at `path` names it.
+std::string device_in(const fs::path& path, const LabCamera& camera) {
+  const auto folder = folder_of(camera);
+  if (!folder || folder->is_absolute()) return camera.device;
+  return kFolderDevice +
+         fs::proximate(fs::absolute(*folder), fs::absolute(path).parent_path()).string();
+}
 
 LabCamera parse_camera(const JsonField& field, const fs::path& base) {
   field.check_keys({}, {"device", "command", "exposure_ms", "gain", "pixel_format"});
@@ -31,9 +44,10 @@ LabCamera parse_camera(const JsonField& field, const fs::path& base) {
       camera.command.push_back(word.text());
   } else {
     camera.device = field.at("device").text();
-    const std::string start = kFolder;
-    if (camera.device.starts_with(start))
-      camera.device = start + (base / camera.device.substr(start.size())).string();
+    if (const auto folder = folder_of(camera)) {
+      if (folder->empty()) field.at("device").fail("must name the folder: folder:PATH");
+      camera.device = kFolderDevice + (base / *folder).string();
+    }
   }
   if (field.has("exposure_ms")) camera.exposure_ms = field.at("exposure_ms").positive();
   if (field.has("gain")) camera.gain = field.at("gain").number();
@@ -86,7 +100,7 @@ void write_lab(const Lab& lab, const fs::path& path) {
   for (const auto& [name, camera] : lab.cameras) {
     Json& entry = json["cameras"][name];
     if (camera.command.empty())
-      entry["device"] = camera.device;
+      entry["device"] = device_in(path, camera);
     else
       entry["command"] = camera.command;
     if (camera.exposure_ms) entry["exposure_ms"] = *camera.exposure_ms;
@@ -119,7 +133,8 @@ std::unique_ptr<CameraDevice> open_camera(const LabCamera& camera) {
   const auto rest = [&](const std::string& start) { return camera.device.substr(start.size()); };
   if (camera.device.starts_with(kAravis)) return open_aravis_camera(rest(kAravis));
   if (camera.device.starts_with(kVideo)) return open_v4l2_camera(rest(kVideo));
-  if (camera.device.starts_with(kFolder)) return open_folder_camera(rest(kFolder));
+  const auto folder = folder_of(camera);
+  if (folder && !folder->empty()) return open_folder_camera(*folder);
   throw InputError("camera", "device", camera.device,
                    "must begin with aravis:, v4l2: or folder: (pencilscan capture --list)");
 }

@@ -12,6 +12,9 @@
 
 namespace pencilscan {
 
+/// How the address of a camera begins that is a folder which another program puts pictures into.
+inline constexpr const char* kFolderDevice = "folder:";
+
 /// How one camera of the rig is reached and set (lab.json).
 struct LabCamera {
   std::string device;                ///< "aravis:Basler-2345", "v4l2:/dev/video0", "folder:shots"
@@ -40,6 +43,7 @@ struct Lab {
 /// Reads lab.json; InputError names file, field, value and rule. Paths in it are relative to its
 /// folder.
 [[nodiscard]] Lab read_lab(const std::filesystem::path& path);
+/// The folders of cameras are written relative to it.
 void write_lab(const Lab& lab, const std::filesystem::path& path);
 
 /// Cameras of all back ends that can be found: those of the network, of USB and of the kernel.

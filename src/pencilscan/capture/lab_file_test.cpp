@@ -71,6 +71,19 @@ TEST_F(LabFile, FoldersAreRelativeToIt) {
             "folder:" + (folder_.path() / "shots").string());
 }
 
+TEST_F(LabFile, FoldersAreWrittenRelativeToIt) {
+  // As a command line names them, relative to where the program runs.
+  const std::filesystem::path here = std::filesystem::relative(folder_.path());
+  Lab lab;
+  lab.cameras["cam0"].device = "folder:" + (here / "shots").string();
+  lab.cameras["cam1"].device = "folder:/shots";
+  write_lab(lab, here / "lab.json");
+  const nlohmann::json written = read_json(here / "lab.json");
+  EXPECT_EQ(written["cameras"]["cam0"]["device"], "folder:shots");
+  EXPECT_EQ(written["cameras"]["cam1"]["device"], "folder:/shots");
+  EXPECT_EQ(read_lab(here / "lab.json"), lab);
+}
+
 TEST(Lab, EveryCameraOfTheRigNeedsADevice) {
   Rig rig;
   rig.cameras.resize(1);

@@ -4,8 +4,11 @@
 #include <charconv>
 #include <cmath>
 #include <filesystem>
+#include <functional>
 #include <limits>
 #include <map>
+#include <optional>
+#include <set>
 #include <string>
 #include <type_traits>
 #include <vector>
@@ -101,6 +104,23 @@ template <class Enum>
 }
 /// The words that an option's rule lists: nothing where its values are not words.
 [[nodiscard]] std::vector<std::string> listed_words(CLI::Option& option);
+
+// What an option without an effect says. One that asks for output is refused, since whoever gives
+// it would miss a file; one that only changes how something is done is told, since scripts give it
+// with every method. Where another option has to be there, or must not, the library's needs() and
+// excludes() do.
+
+/// For an option that has an effect only where `holds`. That may look at the values of options that
+/// were added before it: the library reads them in this order. `rule`: "needs --bits 8".
+[[nodiscard]] CLI::Validator only_where(std::function<bool()> holds, const std::string& rule);
+
+/// The same for an option that is told to have no effect, once, and let pass.
+[[nodiscard]] CLI::Validator told_where_not(const std::string& option, std::function<bool()> holds,
+                                            const std::string& rule);
+
+/// For an option that makes a command do something else: it excludes the others that were added
+/// before, but for those that it uses ("--out") and those of every command.
+void excludes_all_but(CLI::App& command, CLI::Option& option, const std::set<std::string>& used);
 
 /// InputError that names the file where `option` would replace one.
 void refuse_existing(const std::string& option, const std::filesystem::path& file, bool overwrite);

@@ -77,12 +77,39 @@ void check_new(const CalibrateCommand& command, const fs::path& file) {
                      "must be a new file (or give --overwrite)");
 }
 
+constexpr const char* kReportFile = "calibration.json";
+constexpr const char* kPageFile = "calibration.html";
+/// Key of the report: the rig file that it is of.
+constexpr const char* kReportedRig = "rig";
+
+/// The report lies beside the rig: that of another rig is not replaced unasked.
+void check_report(const CalibrateCommand& command) {
+  const fs::path out = command.out;
+  const fs::path report = out.parent_path() / kReportFile;
+  const fs::path page = out.parent_path() / kPageFile;
+  std::error_code ignored;
+  const bool is_there = fs::exists(report, ignored);
+  if (command.overwrite || (!is_there && !fs::exists(page, ignored))) return;
+  const auto earlier = is_there ? read_json(report) : nlohmann::json();
+  // An unusable calibration leaves its report without a rig: the next attempt replaces it. Earlier
+  // versions did not say which rig a report is of.
+  if (earlier.is_object()) {
+    const bool says = earlier.contains(kReportedRig);
+    if (says && earlier[kReportedRig] == out.filename().string()) return;
+    if (!says && earlier.value("verdict", nlohmann::json()) == "unusable") return;
+  }
+  throw InputError("command line", "--out", command.out,
+                   "must be in another folder: " + (is_there ? report : page).string() +
+                       " is not of this rig (or give --overwrite)");
+}
+
 void check_command(const CalibrateCommand& command) {
   std::error_code ignored;
   if (fs::equivalent(command.out, command.devices, ignored))
     throw InputError("command line", "--out", command.out, "must not be the devices file");
   check_new(command, command.out);
   if (command.keep_unusable) check_new(command, unusable_path(command));
+  check_report(command);
 }
 
 void print_remarks(const ColorCalibration& color) {
@@ -111,9 +138,10 @@ void run_calibrate(const CalibrateCommand& command) {
       devices, {command.captures.begin(), command.captures.end()}, options, stderr_progress());
   const Verdict& verdict = calibration.verdict;
   const fs::path folder = fs::path(command.out).parent_path();
-  const nlohmann::ordered_json report_json = calibration_json(calibration);
-  write_json(folder / "calibration.json", report_json);
-  write_text(folder / "calibration.html",
+  nlohmann::ordered_json report_json = calibration_json(calibration);
+  report_json[kReportedRig] = fs::path(command.out).filename().string();
+  write_json(folder / kReportFile, report_json);
+  write_text(folder / kPageFile,
              calibration_page(report_json, "Calibration", "pencilscan " PENCILSCAN_VERSION));
   write_result(command, calibration);
   print_verdict(verdict);
@@ -169,7 +197,7 @@ void add_calibrate_command(CLI::App& app) {
       ->capture_default_str();
   command->add_flag("--keep-unusable", options->keep_unusable,
                     "Write an unusable rig, too: rig.unusable.json for --out rig.json");
-  command->add_flag("--overwrite", options->overwrite, "Replace an earlier rig");
+  command->add_flag("--overwrite", options->overwrite, "Replace an earlier rig and its report");
   add_common_options(*command, options->common,
                      "pencilscan calibrate --captures pose1 --captures pose2 --devices "
                      "devices.json --known-distance cam0 cam1 850 --out rig.json");

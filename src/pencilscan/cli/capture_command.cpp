@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <filesystem>
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -109,6 +110,17 @@ Json describe(const RecordReport& report, const Rig& rig) {
   return figures;
 }
 
+/// What may be why no picture came.
+std::string why_nothing_came(const Lab& lab) {
+  for (const auto& [name, camera] : lab.cameras) {
+    if (camera.device.starts_with(kFolderDevice))
+      return "; " + name +
+             " is a folder: a picture counts that appears there after the start, and "
+             "one that was there before does not";
+  }
+  return "";
+}
+
 void record_frames(const CaptureCommand& command, Interruption& interruption) {
   Running running = start(command);
   std::unique_ptr<ProjectorScreen> screen;
@@ -134,7 +146,8 @@ void record_frames(const CaptureCommand& command, Interruption& interruption) {
     for (Fault& fault : screen->check()) report.faults.push_back(std::move(fault));
   print_figures(command.common, describe(report, running.rig));
   end_with(report.faults);
-  if (report.frames == 0) throw StageError("not a single frame came");
+  if (report.frames == 0)
+    throw StageError("not a single frame came" + why_nothing_came(running.lab));
 }
 
 void capture_gray(const CaptureCommand& command, Interruption& interruption) {
@@ -166,7 +179,9 @@ void capture_gray(const CaptureCommand& command, Interruption& interruption) {
 }
 
 void test_lab(const CaptureCommand& command, Interruption& interruption) {
-  refuse_existing("--test", command.test_to, command.overwrite);
+  std::error_code ignored;  // of files that do not exist
+  const bool updates = std::filesystem::equivalent(command.test_to, command.lab_path, ignored);
+  refuse_existing("--test", command.test_to, command.overwrite || updates);
   Running running = start(command);
   const auto screen = open_lab_screen(running.rig, running.lab, command.rig_path);
   const Progress progress = stderr_progress();
@@ -231,14 +246,23 @@ void add_capture_command(CLI::App& app) {
                     "The object does not move: pictures of a frame may be far apart");
   command->add_flag("--whole-only", options->whole_only, "Leave out frames with a picture missing");
   command->add_flag("--show", options->show, "Show the rig's lines meanwhile");
-  command->add_flag("--gray-code", options->gray_code,
-                    "Take Gray-code captures of every projector, for calibrate");
-  command->add_flag("--solids", options->solids, "With --gray-code: even colours as well");
-  command->add_option("--test", options->test_to,
-                      "Flash the projectors instead: who sees whom, delays, flicker; writes "
-                      "lab.json with them");
+  CLI::Option* gray_code =
+      command->add_flag("--gray-code", options->gray_code,
+                        "Take Gray-code captures of every projector, for calibrate");
+  command->add_flag("--solids", options->solids, "Even colours as well")->needs(gray_code);
+  CLI::Option* test =
+      command->add_option("--test", options->test_to,
+                          "Flash the projectors instead: who sees whom, delays, flicker; writes "
+                          "lab.json with them, also the one of --lab");
   add_overwrite(*command, options->overwrite, "With --test: replace a file that is there");
-  command->add_flag("--list", options->list, "List the cameras that answer instead");
+  CLI::Option* list =
+      command->add_flag("--list", options->list, "List the cameras that answer instead");
+  excludes_all_but(
+      *command, *gray_code,
+      {"--rig", "--lab", "--camera", "--trigger", "--rate", "--out", "--solids", "--overwrite"});
+  excludes_all_but(*command, *test,
+                   {"--rig", "--lab", "--camera", "--trigger", "--rate", "--overwrite"});
+  excludes_all_but(*command, *list, {});
   add_common_options(*command, options->common,
                      "pencilscan capture --rig rig.json --lab lab.json --seconds 60 --show "
                      "--out recording.zarr");

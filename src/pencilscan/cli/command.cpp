@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "pencilscan/core/error.h"
 #include "pencilscan/core/formatted.h"
 #include "pencilscan/io/file.h"
 #include "pencilscan/planning/conventions.h"
@@ -93,7 +94,12 @@ void print_figures(const CommonOptions& options, const nlohmann::ordered_json& f
 }
 
 void write_figures(const CommonOptions& options, const nlohmann::ordered_json& figures) {
-  if (!options.json_path.empty()) write_json(options.json_path, figures);
+  if (options.json_path.empty()) return;
+  // Once more: the command itself may have written there.
+  if (!may_hold_figures(options.json_path))
+    throw InputError("command line", "--json", options.json_path,
+                     "must not be another output of the command");
+  write_json(options.json_path, figures);
 }
 
 }  // namespace pencilscan::cli

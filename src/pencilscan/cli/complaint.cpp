@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <optional>
+#include <regex>
 #include <vector>
 
 #include "pencilscan/cli/help_format.h"
@@ -112,6 +113,8 @@ std::string in_words(const CLI::App& command, const CLI::ParseError& error) {
     return wrong_count(command, message);
   if (dynamic_cast<const CLI::ValidationError*>(&error) != nullptr)
     return message.substr(0, message.find(": ")) + " " + after_name(message);  // "= 7: must be"
+  if (dynamic_cast<const CLI::ExcludesError*>(&error) != nullptr)
+    return std::regex_replace(message, std::regex(" excludes "), " and ") + " do not go together";
   if (dynamic_cast<const CLI::RequiredError*>(&error) != nullptr && !commands_of(command).empty()) {
     return (command.get_parent() == nullptr ? "a command is missing: " : "what is to be done? ") +
            either(command_names(command));
@@ -130,6 +133,16 @@ std::string complaint(const CLI::App& program, const CLI::ParseError& error) {
 
 std::optional<std::string> missing_value(const CLI::App& program,
                                          const std::vector<std::string>& words) {
+  // An unset variable of a script, in quotes. No option means something by an empty value, and as a
+  // folder it would be the current one.
+  for (std::size_t i = 0; i < words.size(); ++i) {
+    const bool ends_so = words[i].starts_with("--") && words[i].find('=') == words[i].size() - 1;
+    if (!words[i].empty() && !ends_so) continue;
+    if (ends_so) return words[i] + " needs a value behind the =";
+    return i > 0 && words[i - 1].starts_with("-")
+               ? words[i - 1] + " needs a value, and the word behind it is empty"
+               : "word " + std::to_string(i + 1) + " is empty";
+  }
   const CLI::App* command = &program;
   for (std::size_t i = 0; i + 1 < words.size(); ++i) {
     for (const CLI::App* below : commands_of(*command))

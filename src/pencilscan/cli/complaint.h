@@ -12,7 +12,7 @@ namespace pencilscan::cli {
 [[nodiscard]] std::string complaint(const CLI::App& program, const CLI::ParseError& error);
 
 /// The complaint of an option that another option follows in the place of its value, which the
-/// library would take for the value.
+/// library would take for the value; and of a word that is empty.
 [[nodiscard]] std::optional<std::string> missing_value(const CLI::App& program,
                                                        const std::vector<std::string>& words);
 

@@ -1,7 +1,5 @@
 #include "pencilscan/cli/help_format.h"
 
-#include <regex>
-
 namespace pencilscan::cli {
 namespace {
 
@@ -17,9 +15,6 @@ Value value_of(const CLI::Option& option) {
   Value value{text.substr(0, colon), colon == std::string::npos ? "" : text.substr(colon + 1)};
   if (value.kind == "INT" || value.kind == "UINT" || value.kind == "FLOAT") value.kind = "NUMBER";
   if (value.kind == "ENUM") value.kind = "TEXT";
-  // The library's own rule of a range, "INT in [1 - 256]".
-  static const std::regex kRange(R"(\w+ in \[(.+) - (.+)\])");
-  value.rule = std::regex_replace(value.rule, kRange, "from $1 to $2");
   return value;
 }
 

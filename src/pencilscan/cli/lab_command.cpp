@@ -19,25 +19,15 @@ struct LabCommand {
   int port = 0;
 };
 
-/// What only one of the two kinds of laboratories has.
+/// What real devices need; what else is for one of the two kinds alone, the parser knows.
 void check_kind(const LabCommand& command) {
   const VirtualLabCommand& made = command.virtual_lab;
-  const auto require = [](bool holds, const char* option, const char* rule) {
-    if (!holds) throw InputError("command line", option, "", rule);
+  if (command.is_virtual) return;
+  const auto require = [](bool holds, const char* option) {
+    if (!holds) throw InputError("command line", option, "", "is required, but for --virtual");
   };
-  if (command.is_virtual) {
-    require(command.lab_path.empty(), "--lab", "is for real devices: not with --virtual");
-    require(command.known_distance.empty(), "--known-distance",
-            "is for real devices: not with --virtual");
-    return;
-  }
-  require(!made.rig_path.empty(), "--rig", "is required, but for --virtual");
-  require(!command.lab_path.empty(), "--lab", "is required, but for --virtual");
-  for (const auto& [given, option] : {std::pair{!made.mesh_path.empty(), "--mesh"},
-                                      {made.poses > 0, "--poses"},
-                                      {!made.fault.empty(), "--fault"},
-                                      {made.small, "--small"}})
-    require(!given, option, "needs --virtual");
+  require(!made.rig_path.empty(), "--rig");
+  require(!command.lab_path.empty(), "--lab");
 }
 
 void run_lab(const LabCommand& command) {
@@ -71,32 +61,44 @@ void add_lab_command(CLI::App& app) {
   command->add_option("--rig", made.rig_path,
                       "The devices (rig.json; K, distortion, R and t may be missing); with "
                       "--virtual the rig to build (default: a ring of 6 cameras and 6 projectors)");
-  command->add_option("--lab", options->lab_path,
-                      "Which device each camera is, and how it is set (lab.json)");
-  command
-      ->add_option("--known-distance", options->known_distance,
-                   "Two devices and the distance of their centres in mm: cam0 cam1 850")
-      ->expected(3);
+  CLI::Option* lab = command->add_option(
+      "--lab", options->lab_path, "Which device each camera is, and how it is set (lab.json)");
+  CLI::Option* distance =
+      command
+          ->add_option("--known-distance", options->known_distance,
+                       "Two devices and the distance of their centres in mm: cam0 cam1 850")
+          ->expected(3);
+  CLI::Option* is_virtual =
+      command
+          ->add_flag("--virtual", options->is_virtual,
+                     "An X server without hardware, cameras that are programs, simulated light")
+          ->excludes(lab)
+          ->excludes(distance);
+  CLI::Option* page = command->add_flag("--page", options->page, "The page, instead of all at once")
+                          ->needs(is_virtual);
   command->add_option("--port", options->port, "Of the page; 0: any free one")
       ->check(between(0, 65535))
+      ->check(only_where([options] { return options->page || !options->is_virtual; },
+                         "needs --page where --virtual is"))
       ->capture_default_str();
-  command->add_flag("--virtual", options->is_virtual,
-                    "An X server without hardware, cameras that are programs, simulated light");
-  command->add_flag("--page", options->page, "With --virtual: the page, instead of all at once");
-  command->add_option("--mesh", made.mesh_path,
-                      "With --virtual: the object (PLY, OBJ, STL or OFF), fitted into the volume");
   command
-      ->add_option("--poses", made.poses,
-                   "With --virtual: captures to calibrate with (default 3, small: 2)")
-      ->check(between(1, 20));
-  command->add_option("--noise", made.noise, "With --virtual: sensor preset, as of simulate")
+      ->add_option("--mesh", made.mesh_path,
+                   "The object (PLY, OBJ, STL or OFF), fitted into the volume")
+      ->needs(is_virtual);
+  command->add_option("--poses", made.poses, "Captures to calibrate with (default 3, small: 2)")
+      ->check(between(1, 20))
+      ->needs(is_virtual)
+      ->excludes(page);
+  command->add_option("--noise", made.noise, "Sensor preset, as of simulate")
       ->check(one_of({"none", "low", "medium", "high"}))
-      ->capture_default_str();
-  command
-      ->add_option("--fault", made.fault, "With --virtual: make this go wrong, to see what is said")
-      ->check(one_of(virtual_faults()));
-  command->add_flag("--small", made.small,
-                    "With --virtual: few devices with few pixels, half a minute");
+      ->capture_default_str()
+      ->needs(is_virtual);
+  command->add_option("--fault", made.fault, "Make this go wrong, to see what is said")
+      ->check(one_of(virtual_faults()))
+      ->needs(is_virtual)
+      ->excludes(page);
+  command->add_flag("--small", made.small, "Few devices with few pixels, half a minute")
+      ->needs(is_virtual);
   add_common_options(*command, made.common, "pencilscan lab --virtual --small --out trial");
   command->callback([options] { run_lab(*options); });
 }

@@ -1,4 +1,8 @@
+#include <fcntl.h>
+#include <unistd.h>
+
 #include <csignal>
+#include <cstdlib>
 #include <exception>
 #include <iostream>
 #include <memory>
@@ -44,11 +48,19 @@ int run(int argc, char** argv) {
   return kDone;
 }
 
+/// Where a standard file is closed, the next file that is opened would get its number, and what is
+/// said on stderr would be written into it.
+void open_standard_files() {
+  for (const int file : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO})
+    if (::fcntl(file, F_GETFD) < 0 && ::open("/dev/null", O_RDWR) < 0) std::abort();
+}
+
 }  // namespace
 }  // namespace pencilscan::cli
 
 int main(int argc, char** argv) {
   using namespace pencilscan;
+  cli::open_standard_files();
   keep_freed_memory();
   silence_solver_messages();
   // A write beyond the file size limit shall fail like a full disk instead of ending the program.

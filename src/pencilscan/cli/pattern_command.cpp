@@ -4,7 +4,6 @@
 #include <nlohmann/json.hpp>
 
 #include "pencilscan/cli/command.h"
-#include "pencilscan/core/error.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/io/file.h"
 #include "pencilscan/io/image.h"
@@ -91,12 +90,7 @@ void run_pattern(const PatternOptions& options) {
   const ThreadLimit threads(options.common.threads);
   if (options.gray_code) return write_gray_codes(options);
   const Rig rig = read_rig(options.rig_path);
-  for (std::size_t i = 0; i < rig.projectors.size(); ++i) {
-    if (rig.projectors[i].patterns.empty()) {
-      throw InputError(options.rig_path, "projectors[" + std::to_string(i) + "].pattern", "",
-                       "this key is missing: there is nothing to show");
-    }
-  }
+  require_patterns(rig, options.rig_path, "there is nothing to show");
   const std::filesystem::path out(options.out);
   for (const Projector& projector : rig.projectors)
     refuse_existing("--out", out / (projector.name + ".png"), options.overwrite);
@@ -121,11 +115,13 @@ void add_pattern_command(CLI::App& app) {
   command->add_option("--rig", options->rig_path, "The rig (rig.json)")->required();
   command->add_option("--out", options->out, "Folder for <projector>.png, 8 bit, linear light")
       ->required();
-  command->add_flag("--gray-code", options->gray_code,
-                    "Gray codes instead, <projector>/NNN.png with an index.json; sizes suffice");
-  command->add_flag("--no-inverses", options->no_inverses, "Gray codes without inverse images");
-  command->add_flag("--solids", options->solids,
-                    "With --gray-code: even colours as well, for crosstalk and gamma");
+  CLI::Option* gray_code = command->add_flag(
+      "--gray-code", options->gray_code,
+      "Gray codes instead, <projector>/NNN.png with an index.json; sizes suffice");
+  command->add_flag("--no-inverses", options->no_inverses, "Leave the inverse images out")
+      ->needs(gray_code);
+  command->add_flag("--solids", options->solids, "Even colours as well, for crosstalk and gamma")
+      ->needs(gray_code);
   add_overwrite(*command, options->overwrite, "Replace pictures that are there");
   add_common_options(*command, options->common, "pencilscan pattern --rig rig.json --out patterns");
   command->callback([options] { run_pattern(*options); });

@@ -197,7 +197,8 @@ struct ExportCommand {
   bool overwrite = false;
 };
 
-void export_opencv(const ExportCommand& command, const Rig& rig) {
+/// Returns the number of devices in the files.
+std::size_t export_opencv(const ExportCommand& command, const Rig& rig) {
   const OpencvSyntax syntax = command.is_xml ? OpencvSyntax::kXml : OpencvSyntax::kYaml;
   const char* ending = command.is_xml ? ".xml" : ".yml";
   const auto stereo_device = [&](std::size_t i) -> const Device& {
@@ -208,6 +209,9 @@ void export_opencv(const ExportCommand& command, const Rig& rig) {
     for (std::size_t d = 0; d < device_count(rig); ++d)
       files.emplace_back(device_at(rig, d).name + ending, opencv_text(device_at(rig, d), syntax));
   } else {
+    if (command.stereo[0] == command.stereo[1])
+      throw InputError("command line", "--stereo", command.stereo[0] + " " + command.stereo[1],
+                       "must be two different devices");
     files.emplace_back(command.stereo[0] + "-" + command.stereo[1] + ending,
                        opencv_stereo_text(stereo_device(0), stereo_device(1), syntax));
   }
@@ -215,14 +219,16 @@ void export_opencv(const ExportCommand& command, const Rig& rig) {
   for (const auto& [name, text] : files)
     refuse_existing("--opencv", folder / name, command.overwrite);
   for (const auto& [name, text] : files) write_text(folder / name, text);
+  return command.stereo.empty() ? device_count(rig) : command.stereo.size();
 }
 
 void run_export(const ExportCommand& command) {
   const Rig rig = read_rig(command.rig_path);
   if (command.opencv.empty() == command.colmap.empty())
     throw InputError("command line", "--opencv, --colmap", "", "exactly one of them is needed");
+  std::size_t devices = device_count(rig);
   if (!command.opencv.empty()) {
-    export_opencv(command, rig);
+    devices = export_opencv(command, rig);
   } else {
     for (const char* name : {"cameras.txt", "images.txt", "points3D.txt"})
       refuse_existing("--colmap", fs::path(command.colmap) / name, command.overwrite);
@@ -230,9 +236,9 @@ void run_export(const ExportCommand& command) {
     if (!command.points.empty()) points = read_points(command.points);
     write_colmap(rig, points, command.colmap);
   }
-  print_figures(command.common,
-                {{"folder", command.opencv.empty() ? command.colmap : command.opencv},
-                 {"devices", device_count(rig)}});
+  print_figures(
+      command.common,
+      {{"folder", command.opencv.empty() ? command.colmap : command.opencv}, {"devices", devices}});
 }
 
 void add_export(CLI::App& group) {

@@ -44,18 +44,25 @@ void print_devices(const RigFit& fit) {
 }  // namespace
 
 void add_rig_fit_options(CLI::App& command, RigFitCommand& options) {
-  command.add_option("--frames", options.frames,
-                     "Folder of frame folders, or a recording: does the rig still fit them?");
+  CLI::Option* frames =
+      command.add_option("--frames", options.frames,
+                         "Folder of frame folders, or a recording: does the rig still fit them?");
   command.add_option("--frame-count", options.frame_count, "Frames to look at, evenly picked")
       ->check(between(1, 1000))
-      ->capture_default_str();
-  command.add_option("--put-back", options.put_back,
-                     "Write the rig with the devices that moved put back (rig.json)");
+      ->capture_default_str()
+      ->needs(frames);
+  command
+      .add_option("--put-back", options.put_back,
+                  "Write the rig with the devices that moved put back (rig.json)")
+      ->needs(frames);
+  add_overwrite(command, options.overwrite, "With --put-back: replace a rig file that is there");
 }
 
 void run_rig_fit(const CommonOptions& common, const std::string& rig_path,
                  const RigFitCommand& options) {
+  if (!options.put_back.empty()) refuse_existing("--put-back", options.put_back, options.overwrite);
   const Rig rig = read_rig(rig_path);
+  require_patterns(rig, rig_path, "there is nothing to see of this projector");
   const FrameSource frames = FrameSource::open(rig, options.frames);
   const RigFit fit = check_rig_on_frames(rig, curves_of(rig, frames, options.frame_count));
   print_devices(fit);

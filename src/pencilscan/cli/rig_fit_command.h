@@ -11,6 +11,7 @@ struct RigFitCommand {
   std::string frames;
   std::size_t frame_count = 8;  ///< that are looked at, evenly picked
   std::string put_back;         ///< where the rig with what moved put back is written; or empty
+  bool overwrite = false;       ///< what is there under that name
 };
 
 void add_rig_fit_options(CLI::App& command, RigFitCommand& options);

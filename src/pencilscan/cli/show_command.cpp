@@ -190,21 +190,30 @@ void add_show_command(CLI::App& app) {
       "show", "Show every projector's picture on its output, pixel by pixel (Ctrl-C stops)");
   command->add_option("--rig", options->rig_path,
                       "The rig (rig.json); its projectors name their \"output\"");
-  command
-      ->add_option("--what", options->what,
-                   "lines, black, white, red, green, blue, grey25, grey50, grey75, gray:N (image N "
-                   "of the Gray codes), identify, columns, rows, focus")
-      ->capture_default_str();
+  CLI::Option* what =
+      command
+          ->add_option("--what", options->what,
+                       "lines, black, white, red, green, blue, grey25, grey50, grey75, gray:N "
+                       "(image N of the Gray codes), identify, columns, rows, focus")
+          ->capture_default_str();
   command->add_option("--output", options->outputs,
                       "PROJECTOR=OUTPUT instead of the rig's: proj0=HDMI-1");
   command->add_option("--projector", options->projectors,
                       "Only this projector shows it, the others are black; repeat for more");
   command->add_option("--seconds", options->seconds, "Stop after this time")->check(above_zero());
-  command->add_flag("--list", options->list, "List the outputs of this computer instead");
-  command->add_option("--assign", options->assign_to,
-                      "Ask which projector shows which number, and write the rig with its outputs "
-                      "to this file");
+  CLI::Option* list =
+      command->add_flag("--list", options->list, "List the outputs of this computer instead");
+  CLI::Option* assign =
+      command
+          ->add_option("--assign", options->assign_to,
+                       "Ask which projector shows which number, and write the rig with its outputs "
+                       "to this file")
+          ->check(only_where(
+              [options, what] { return what->count() == 0 || options->what == "identify"; },
+              "needs --what identify"));
   add_overwrite(*command, options->overwrite, "With --assign: replace a file that is there");
+  excludes_all_but(*command, *assign, {"--rig", "--what", "--overwrite"});
+  excludes_all_but(*command, *list, {});
   add_common_options(*command, options->common, "pencilscan show --rig rig.json --what identify");
   command->callback([options] { run_show(*options); });
 }

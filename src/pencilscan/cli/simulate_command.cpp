@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -71,7 +72,7 @@ TriangleMesh placed_mesh(const SimulateOptions& options, const Rig& rig) {
   if (options.fit) {
     mesh = fitted(std::move(mesh), working_volume(rig));
   } else {
-    warn_of(object_unit_warning(mesh, rig));
+    warn_of(object_unit_warning(mesh, rig, options.scale));
   }
   check_scene(rig, mesh, options.mesh_path, options.rig_path);
   return mesh;
@@ -79,6 +80,18 @@ TriangleMesh placed_mesh(const SimulateOptions& options, const Rig& rig) {
 
 /// Below --out: the scene until it is whole. What an interrupted run left there is no result.
 constexpr const char* kMakingFolder = ".making";
+
+/// What a scene consists of.
+constexpr const char* kTruthFolder = "truth";
+constexpr std::array kSceneFolders = {"frames", kTruthFolder, "captures", "povray", "blender"};
+constexpr const char* kSceneRig = "rig.json";
+
+/// True for a folder with a scene of an earlier run, or what was left of one that was killed.
+/// Frames and a rig without the truth are a capture.
+bool holds_a_scene(const fs::path& folder) {
+  return fs::exists(folder / kMakingFolder) ||
+         (fs::is_regular_file(folder / kSceneRig) && fs::is_directory(folder / kTruthFolder));
+}
 
 /// Refuses to replace anything but an earlier scene, and that without --overwrite.
 void check_output(const SimulateOptions& options) {
@@ -96,15 +109,20 @@ void check_output(const SimulateOptions& options) {
                      "must be new or empty: choose another folder, or give --overwrite to replace "
                      "the scene in it");
   }
+  if (holds_any && !holds_a_scene(out)) {
+    throw InputError("--out", "", options.out,
+                     "must hold an earlier scene (rig.json and truth/) to be replaced, and what is "
+                     "there is none");
+  }
 }
 
 /// Puts a whole scene where it belongs, instead of an earlier one; the rig last.
 void publish(const fs::path& made, const fs::path& out) {
-  for (const char* name : {"frames", "truth", "captures", "povray", "blender"}) {
+  for (const char* name : kSceneFolders) {
     fs::remove_all(out / name);
     if (fs::exists(made / name)) fs::rename(made / name, out / name);
   }
-  fs::rename(made / "rig.json", out / "rig.json");
+  fs::rename(made / kSceneRig, out / kSceneRig);
 }
 
 cv::Mat as_float(const cv::Mat& map) {
@@ -163,7 +181,8 @@ void write_frames(const SimulateOptions& options, const Rig& rig, const Triangle
     const std::vector<SimulatedObject> moments =
         through_exposure(mesh, options.surface, motion.at(frame), in_exposure, footprint(rig));
     const std::string name = six_digits(static_cast<std::size_t>(frame));
-    const fs::path truth = options.frame_count == 1 ? out / "truth" : out / "truth" / name;
+    const fs::path truth =
+        options.frame_count == 1 ? out / kTruthFolder : out / kTruthFolder / name;
     write_mesh(truth / "mesh.ply", object.mesh());
     for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
       const Camera& camera = rig.cameras[c];
@@ -263,6 +282,16 @@ void run_simulate(SimulateOptions options) {
   print_figures(options.common, figures);
 }
 
+/// For what shapes the light that we render: there is none of it in a scene of --light alone.
+CLI::Validator only_of_own_light(const SimulateOptions& options) {
+  return only_where(
+      [&options] {
+        return options.light.empty() || options.gray_code || options.export_povray ||
+               options.export_blender;
+      },
+      "does not go with --light: light is as it was made");
+}
+
 void add_scene_options(CLI::App& command, SimulateOptions& options) {
   const std::map<std::string, UpAxis> axes{{"x", UpAxis::kX}, {"y", UpAxis::kY}, {"z", UpAxis::kZ}};
   const std::map<std::string, TextureKind> textures{{"none", TextureKind::kNone},
@@ -274,6 +303,9 @@ void add_scene_options(CLI::App& command, SimulateOptions& options) {
       .add_option("--scale", options.scale,
                   "Multiply the mesh: 1000 for one in metres, 25.4 for one in inches")
       ->check(above_zero())
+      ->check(told_where_not(
+          "--scale", [&options] { return !options.fit; },
+          "does not change what --fit makes of the mesh"))
       ->capture_default_str();
   command.add_option("--up", options.up, "Axis of the mesh that points up")
       ->transform(choice(axes))
@@ -281,70 +313,102 @@ void add_scene_options(CLI::App& command, SimulateOptions& options) {
   command.add_option("--frame-count", options.frame_count, "Frames of a moving object")
       ->check(between(1, 999999))
       ->capture_default_str();
+  const auto moves = [&options](const char* option) {
+    return told_where_not(
+        option, [&options] { return options.frame_count > 1; }, "needs --frame-count 2 or more");
+  };
   command.add_option("--rotate-deg", options.rotate_deg, "Turn about the vertical per frame")
-      ->check(any_number<double>());
+      ->check(any_number<double>())
+      ->check(moves("--rotate-deg"));
   command.add_option("--translate-mm", options.translate_mm, "Shift x y z per frame")
       ->expected(3)
-      ->check(any_number<double>());
-  command
-      .add_option("--motion-mm-s", options.speed_mm_s,
-                  "Speed x y z within the exposure of every frame, whose truth is its middle; "
-                  "Gray-code captures stand still")
-      ->expected(3)
-      ->check(any_number<double>());
-  command
-      .add_option("--spin-deg-s", options.spin_deg_s,
-                  "Turning speed about x y z through the volume's centre, likewise")
-      ->expected(3)
-      ->check(any_number<double>());
+      ->check(any_number<double>())
+      ->check(moves("--translate-mm"));
+  CLI::Option* motion =
+      command
+          .add_option("--motion-mm-s", options.speed_mm_s,
+                      "Speed x y z within the exposure of every frame, whose truth is its middle; "
+                      "Gray-code captures stand still")
+          ->expected(3)
+          ->check(any_number<double>());
+  CLI::Option* spin = command
+                          .add_option("--spin-deg-s", options.spin_deg_s,
+                                      "Turning speed about x y z through the volume's centre, "
+                                      "likewise")
+                          ->expected(3)
+                          ->check(any_number<double>());
   command
       .add_option("--exposure-ms", options.exposure_ms,
                   "Of a frame, for --motion-mm-s and --spin-deg-s")
       ->check(above_zero())
+      ->check(told_where_not(
+          "--exposure-ms", [motion, spin] { return motion->count() + spin->count() > 0; },
+          "needs --motion-mm-s or --spin-deg-s"))
       ->capture_default_str();
+  const CLI::Validator renders = only_of_own_light(options);
+  const auto textured = [&options](const char* option) {
+    return told_where_not(
+        option, [&options] { return options.surface.texture.kind != TextureKind::kNone; },
+        "needs --texture checker, noise or stripes");
+  };
   command
       .add_option("--albedo", options.surface.albedo,
                   "Share of the light that the surface gives back")
       ->check(between(0.0, 1.0))
+      ->check(renders)
       ->capture_default_str();
   command.add_option("--texture", options.surface.texture.kind, "What varies the albedo")
       ->transform(choice(textures))
+      ->check(renders)
       ->default_str("none");
   command.add_option("--contrast", options.surface.texture.contrast, "Contrast of the texture")
       ->check(between(0.0, 1.0))
+      ->check(textured("--contrast"))
       ->capture_default_str();
   command
       .add_option("--texture-mm", options.surface.texture.period_mm, "Period of the texture, mm")
       ->check(above_zero())
+      ->check(textured("--texture-mm"))
       ->capture_default_str();
   command.add_option("--specular", options.surface.specular, "Weight of the Blinn-Phong lobe")
       ->check(zero_or_more())
+      ->check(renders)
       ->capture_default_str();
   command.add_option("--roughness", options.surface.roughness, "1 / exponent of that lobe")
       ->check(between(1e-4, 1.0))
+      ->check(told_where_not(
+          "--roughness", [&options] { return options.surface.specular > 0; },
+          "needs --specular above 0"))
       ->capture_default_str();
   command.add_flag("--flat", options.flat, "One normal per face (cubes); else smooth shading");
 }
 
 void add_device_options(CLI::App& command, SimulateOptions& options) {
+  const CLI::Validator renders = only_of_own_light(options);
   command.add_option("--samples", options.photo.render.samples, "Rays per pixel and axis")
       ->check(between(1, 16))
+      ->check(renders)
       ->capture_default_str();
   command
       .add_option("--exposure", options.photo.render.exposure,
                   "Image value of a white surface that faces a projector at the centre")
       ->check(above_zero())
+      ->check(renders)
       ->capture_default_str();
-  command.add_flag("--no-falloff", options.no_falloff, "Light does not weaken with distance");
-  command.add_flag("--pixelated", options.photo.film.pixelated,
-                   "Projector pixels, no continuous film");
+  command.add_flag("--no-falloff", options.no_falloff, "Light does not weaken with distance")
+      ->check(renders);
+  command
+      .add_flag("--pixelated", options.photo.film.pixelated, "Projector pixels, no continuous film")
+      ->check(renders);
   command
       .add_option("--projector-blur", options.photo.film.blur_px, "Standard deviation, panel px")
-      ->check(between(0.0, 50.0));
+      ->check(between(0.0, 50.0))
+      ->check(renders);
   command
       .add_option("--black-level", options.photo.black_level,
                   "Light of a black panel pixel (default 0; 0.004 in captures)")
-      ->check(between(0.0, 0.9));
+      ->check(between(0.0, 0.9))
+      ->check(renders);
   command
       .add_option("--noise", options.photo.noise,
                   "Sensor preset: crosstalk, ambient light, blur and noise together")
@@ -355,7 +419,8 @@ void add_device_options(CLI::App& command, SimulateOptions& options) {
   command
       .add_option("--ambient", options.photo.ambient,
                   "Even light on all surfaces, image value of a white one")
-      ->check(between(0.0, 1.0));
+      ->check(between(0.0, 1.0))
+      ->check(renders);
   command.add_option("--blur", options.photo.blur_px, "Camera blur, standard deviation, px")
       ->check(between(0.0, 50.0));
   command
@@ -376,7 +441,8 @@ void add_device_options(CLI::App& command, SimulateOptions& options) {
                   "Colours as a camera fills them in behind this mosaic, where the rig states none")
       ->check(one_of({"RGGB", "BGGR", "GRBG", "GBRG"}));
   command.add_option("--jpeg", options.jpeg, "Frames as JPEG of this quality; 8 bits")
-      ->check(between(1, 100));
+      ->check(between(1, 100))
+      ->check(only_where([&options] { return options.photo.bits == 8; }, "needs --bits 8"));
 }
 
 }  // namespace
@@ -391,9 +457,12 @@ void add_simulate_command(CLI::App& app) {
   command->add_option("--out", options->out, "New folder: rig.json, frames/, truth/, captures/")
       ->required();
   add_overwrite(*command, options->overwrite, "Replace an earlier result in --out");
-  command->add_flag("--gray-code", options->gray_code, "Also write Gray-code captures");
-  command->add_flag("--color-captures", options->color_captures,
-                    "Gray-code captures in colour, with solid colours");
+  CLI::Option* gray_code =
+      command->add_flag("--gray-code", options->gray_code, "Also write Gray-code captures");
+  command
+      ->add_flag("--color-captures", options->color_captures,
+                 "Gray-code captures in colour, with solid colours")
+      ->needs(gray_code);
   command->add_flag("--truth-maps", options->truth_maps,
                     "Also write depth, line coordinates, lit masks and cosines");
   command->add_flag("--export-povray", options->export_povray,

@@ -236,7 +236,7 @@ void VirtualRun::calibrate() {
     place_.arrange(i);
     if (i == 1 && !command_.small)
       step("test", {"capture", "--rig", at("devices.json"), "--lab", at("lab.json"), "--test",
-                    at("lab.json"), "--overwrite"});
+                    at("lab.json")});
     Words capture{"capture", "--rig", at("devices.json"), "--lab", at("lab.json"), "--gray-code",
                   "--out",   at(pose)};
     if (!command_.small) capture.emplace_back("--solids");

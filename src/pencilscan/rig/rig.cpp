@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "pencilscan/core/error.h"
 #include "pencilscan/core/median.h"
 #include "pencilscan/geometry/least_squares.h"
 
@@ -114,6 +115,14 @@ std::vector<int> adjacent_cameras(const Rig& rig, int camera, double min_cosine)
     if (rig.cameras[c].forward().dot(forward) > min_cosine) result.push_back(static_cast<int>(c));
   }
   return result;
+}
+
+void require_patterns(const Rig& rig, const std::string& source, const std::string& why) {
+  for (std::size_t p = 0; p < rig.projectors.size(); ++p) {
+    if (rig.projectors[p].patterns.empty())
+      throw InputError(source, "projectors[" + std::to_string(p) + "].pattern", "",
+                       "this key is missing: " + why);
+  }
 }
 
 std::string unit_name(const Rig& rig) { return rig.unit_known ? "mm" : "units"; }

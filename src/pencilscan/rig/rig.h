@@ -101,6 +101,9 @@ struct UncalibratedRig {
 /// Writes rig.json whole or not at all; read_rig() of it gives the same doubles.
 void write_rig(const Rig& rig, const std::filesystem::path& path);
 
+/// InputError of `source` where a projector has no pattern; `why`: what that means there.
+void require_patterns(const Rig& rig, const std::string& source, const std::string& why);
+
 /// The sphere that holds the object: the stated one, or else derived from the devices: the point
 /// nearest to all optical axes (least squares), with the radius that the median device sees whole.
 [[nodiscard]] Sphere working_volume(const Rig& rig);

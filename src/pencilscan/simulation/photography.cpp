@@ -96,12 +96,7 @@ cv::Mat photograph(const Rig& rig, std::size_t camera, const SimulatedObject& ob
 
 void check_scene(const Rig& rig, const TriangleMesh& mesh, const std::string& name,
                  const std::string& rig_name) {
-  for (std::size_t p = 0; p < rig.projectors.size(); ++p) {
-    if (rig.projectors[p].patterns.empty()) {
-      throw InputError(rig_name, "projectors[" + std::to_string(p) + "].pattern", "",
-                       "this key is missing: there is nothing to show");
-    }
-  }
+  require_patterns(rig, rig_name, "there is nothing to show");
   for (const Camera& camera : rig.cameras) {
     for (const Vec3& vertex : mesh.vertices) {
       const auto pixel = camera.project(vertex);
