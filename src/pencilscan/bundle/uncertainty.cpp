@@ -12,6 +12,7 @@
 #include "pencilscan/bundle/triangulation.h"
 #include "pencilscan/core/median.h"
 #include "pencilscan/core/random.h"
+#include "pencilscan/geometry/cross_matrix.h"
 #include "pencilscan/geometry/least_squares.h"
 
 namespace pencilscan {
@@ -226,6 +227,21 @@ void measure_volume(const BundleProblem& problem, const Covariance& covariance, 
   result.volume_p95 = lower_quantile(sigmas, 0.95);
 }
 
+/// Deviations of a device's centre along its axes. A turn by r and a shift of t by dt move the
+/// centre by -(t x r + dt) in the device's frame: both go into it, and how they go together.
+Vec3 center_deviation(const BundleDevice& device, std::size_t d, const Covariance& covariance) {
+  Eigen::Matrix<double, 3, ReducedEquations::kPose> by_pose;
+  by_pose << cross_matrix(-(rotation_of(device) * center_of(device))), Mat3::Identity();
+  Eigen::Matrix<double, 3, Eigen::Dynamic> by_free =
+      Eigen::Matrix<double, 3, Eigen::Dynamic>::Zero(3, covariance.matrix.rows());
+  for (std::size_t i = 0; i < covariance.at.size(); ++i) {
+    const auto kind = covariance.at[i] % kBlock;
+    if (static_cast<std::size_t>(covariance.at[i] / kBlock) == d && kind < kPose)
+      by_free.col(static_cast<Eigen::Index>(i)) = by_pose.col(kind);
+  }
+  return (by_free * covariance.matrix * by_free.transpose()).diagonal().cwiseMax(0).cwiseSqrt();
+}
+
 }  // namespace
 
 Uncertainty uncertainty(const BundleProblem& problem, const BundleOptions& adjusted,
@@ -259,10 +275,10 @@ Uncertainty uncertainty(const BundleProblem& problem, const BundleOptions& adjus
     const double sigma = std::sqrt(covariance.matrix(row, row));
     DeviceUncertainty& device = result.devices[d];
     if (kind < 3) device.rotation[kind] = sigma;
-    if (kind >= 3 && kind < kPose) device.position[kind - 3] = sigma;
     if (kind >= kPose) device.inner[static_cast<std::size_t>(kind - kPose)] = sigma;
   }
   for (std::size_t d = 0; d < result.devices.size(); ++d) {
+    result.devices[d].position = center_deviation(problem.devices[d], d, covariance);
     for (std::size_t i = 0; i < kIntrinsics; ++i) {
       double prior = problem.devices[d].prior_sigma[i];
       if (i == kFy) prior *= problem.devices[d].inner[kFx];

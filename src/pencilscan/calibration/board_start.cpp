@@ -75,10 +75,12 @@ double misses(const BundleProblem& problem, const Sighting& s) {
   return sum;
 }
 
-/// Numbers the corners from the other end.
+/// Numbers the corners from the other end: half a turn of the board, whose last corner is that of
+/// all views. A sighting may lack corners.
 void turn_round(const Sighting& s, std::vector<BoardView>& views) {
-  for (std::size_t i = 0, j = s.views.size() - 1; i < j; ++i, --j)
-    std::swap(views[s.views[i]].position_mm, views[s.views[j]].position_mm);
+  Vec2 last = Vec2::Zero();
+  for (const BoardView& view : views) last = last.cwiseMax(view.position_mm);
+  for (const std::size_t i : s.views) views[i].position_mm = last - views[i].position_mm;
 }
 
 /// Cameras may number the corners of one board from either end: the end that fits its pose counts.

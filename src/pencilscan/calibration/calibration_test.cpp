@@ -11,6 +11,7 @@
 #include "pencilscan/calibration/given_values.h"
 #include "pencilscan/calibration/mirrored.h"
 #include "pencilscan/calibration/pair_matches.h"
+#include "pencilscan/calibration/rig_frame.h"
 #include "pencilscan/calibration/sample_input.h"
 
 namespace pencilscan {
@@ -186,6 +187,18 @@ TEST(Uncertainty, CoversTheErrorsOfTheResult) {
   }
   EXPECT_GT(sigma.volume_median, 0);
   EXPECT_LT(sigma.volume_median, 0.2);  // mm: 0.05 px is 0.025 mm in this volume
+}
+
+TEST(Uncertainty, OfCentresHangsLittleOnWhereTheOriginIs) {
+  const Rig truth = ring(3, 3);
+  auto result = calibrate(input_of(truth, tracks_of(truth, {.count = 600}), true), kQuick);
+  const Uncertainty here = uncertainty(result.problem, result.adjustment);
+  move_solution(1, {Mat3::Identity(), Vec3(5000, -3000, 2000)}, result.problem);
+  const Uncertainty there = uncertainty(result.problem, result.adjustment);
+  // The turn of the whole rig that means nothing is chosen by turns and shifts as they are: 3.6
+  // times as much. The deviation of t alone, taken for that of the centre: 8 times.
+  for (std::size_t d = 0; d < 6; ++d)
+    EXPECT_LT(there.devices[d].position.cwiseQuotient(here.devices[d].position).maxCoeff(), 4) << d;
 }
 
 /// Six and six devices that look inwards, as found without error.

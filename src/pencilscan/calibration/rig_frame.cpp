@@ -65,7 +65,20 @@ void move_solution(double scale, const RigidTransform& new_from_old, BundleProbl
   }
 }
 
-bool fix_frame(const CalibrationInput& input, BundleProblem& problem) {
+namespace {
+
+/// Root mean square distance of points from their middle.
+double spread(const std::vector<Vec3>& points) {
+  Vec3 middle = Vec3::Zero();
+  for (const Vec3& point : points) middle += point / static_cast<double>(points.size());
+  double sum = 0;
+  for (const Vec3& point : points) sum += (point - middle).squaredNorm();
+  return std::sqrt(sum / static_cast<double>(points.size()));
+}
+
+}  // namespace
+
+FixedFrame fix_frame(const CalibrationInput& input, BundleProblem& problem) {
   std::vector<Vec3> from;
   std::vector<Vec3> to;
   for (std::size_t d = 0; d < problem.devices.size(); ++d) {
@@ -75,6 +88,7 @@ bool fix_frame(const CalibrationInput& input, BundleProblem& problem) {
   }
   bool scaled = !problem.board_views.empty();
   double scale = 1;
+  double of_given = 1;
   if (from.size() >= 3) {
     Eigen::Matrix3Xd a(3, from.size());
     Eigen::Matrix3Xd b(3, from.size());
@@ -85,6 +99,7 @@ bool fix_frame(const CalibrationInput& input, BundleProblem& problem) {
     const Eigen::Matrix4d similarity = fit_similarity(a, b, !scaled);
     const double s = similarity.block<3, 3>(0, 0).col(0).norm();
     move_solution(s, {similarity.block<3, 3>(0, 0) / s, similarity.block<3, 1>(0, 3)}, problem);
+    if (scaled) of_given = spread(from) / spread(to);  // a board's millimetres, not theirs
     scaled = scaled || input.rig.unit_known;
   } else {
     move_solution(1, own_frame(problem, input.rig.cameras.size()), problem);
@@ -110,7 +125,9 @@ bool fix_frame(const CalibrationInput& input, BundleProblem& problem) {
     }
   }
   move_solution(scale, {}, problem);
-  return scaled;
+  // Lengths that were given in millimetres stay what they are.
+  const bool goes_on = from.size() >= 3 && !input.rig.unit_known;
+  return {scaled, goes_on ? of_given * scale : 1};
 }
 
 }  // namespace pencilscan

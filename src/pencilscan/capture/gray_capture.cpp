@@ -64,10 +64,11 @@ std::vector<Shot> shots_of(const Projector& projector, const GrayCaptureOptions&
 class ProjectorRun {
  public:
   ProjectorRun(LiveCameras& cameras, ProjectorScreen& screen, const fs::path& folder,
-               std::size_t projector, const GrayCaptureOptions& options, WorkQueue& work,
-               GrayCaptureReport& report)
+               std::size_t projector, const Rig& rig, const GrayCaptureOptions& options,
+               WorkQueue& work, GrayCaptureReport& report)
       : cameras_(cameras),
         screen_(screen),
+        rig_(rig),
         folder_(folder),
         projector_(projector),
         options_(options),
@@ -107,6 +108,7 @@ class ProjectorRun {
 
   LiveCameras& cameras_;
   ProjectorScreen& screen_;
+  const Rig& rig_;
   const fs::path folder_;
   std::size_t projector_;
   const GrayCaptureOptions& options_;
@@ -144,7 +146,7 @@ void ProjectorRun::take(std::size_t i, int again) {
     missing_in_a_row_[c] = frames[c].frame ? 0 : missing_in_a_row_[c] + 1;
     if (!frames[c].frame) continue;
     work_.add([this, i, c, frame = frames[c].frame] {
-      const cv::Mat picture = picture_for_files(*frame);
+      const cv::Mat picture = picture_for_files(rig_.cameras[c], *frame);
       coarse_[i][c] = coarse_picture(picture);
       if (i < shots_.size()) write_image(folder_ / name_of(c) / shots_[i].file, picture);
     });
@@ -295,7 +297,11 @@ void ProjectorRun::drop_unseen() const {
 
 }  // namespace
 
-cv::Mat picture_for_files(const CameraFrame& frame) {
+cv::Mat picture_for_files(const Camera& camera, const CameraFrame& frame) {
+  return camera.mosaic ? frame.image : picture_to_see(frame);
+}
+
+cv::Mat picture_to_see(const CameraFrame& frame) {
   if (frame.mosaic.empty()) return frame.image;
   const int code = frame.mosaic == "RGGB"   ? cv::COLOR_BayerRGGB2RGB
                    : frame.mosaic == "BGGR" ? cv::COLOR_BayerBGGR2RGB
@@ -325,7 +331,7 @@ GrayCaptureReport capture_gray_codes(LiveCameras& cameras, ProjectorScreen& scre
     const fs::path part = out / ("." + name + ".part");
     fs::remove_all(part);
     fs::create_directories(part);
-    ProjectorRun run(cameras, screen, part, p, options, work, report);
+    ProjectorRun run(cameras, screen, part, p, rig, options, work, report);
     const bool whole = run.run([&](double share) {
       return !watch ||
              watch(name, (static_cast<double>(p) + share) / static_cast<double>(projectors));

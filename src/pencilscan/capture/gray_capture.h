@@ -67,7 +67,9 @@ using ProjectorDone = std::function<void(std::size_t projector)>;
                                                    const GrayCaptureWatch& watch = {},
                                                    const ProjectorDone& done = {});
 
-/// The picture of a camera as files hold it: its mosaic made colour unless the rig expects it.
-[[nodiscard]] cv::Mat picture_for_files(const CameraFrame& frame);
+/// A picture to look at: its mosaic made colour.
+[[nodiscard]] cv::Mat picture_to_see(const CameraFrame& frame);
+/// A picture as `camera` expects it in files: its mosaic made colour, unless it has one.
+[[nodiscard]] cv::Mat picture_for_files(const Camera& camera, const CameraFrame& frame);
 
 }  // namespace pencilscan

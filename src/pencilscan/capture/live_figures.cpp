@@ -135,7 +135,7 @@ std::vector<std::string> advice_for(const LiveFigures& figures, bool lines) {
 }
 
 cv::Mat preview_of(const CameraFrame& frame, int width) {
-  cv::Mat picture = picture_for_files(frame);
+  cv::Mat picture = picture_to_see(frame);
   if (picture.depth() == CV_16U) picture.convertTo(picture, CV_8U, 1.0 / 257);
   if (picture.cols <= width) return picture;
   cv::Mat small;

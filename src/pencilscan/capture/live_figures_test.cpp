@@ -5,6 +5,8 @@
 
 #include <opencv2/imgproc.hpp>
 
+#include "pencilscan/capture/gray_capture.h"
+
 namespace pencilscan {
 namespace {
 
@@ -58,6 +60,16 @@ TEST(LiveFigures, MosaicsAreLookedAtInCells) {
   EXPECT_NEAR(live_figures(frame).edge_px, 4, 1);
   EXPECT_EQ(preview_of(frame, 80).size(), cv::Size(80, 50));
   EXPECT_EQ(preview_of(frame, 80).type(), CV_8UC3);
+}
+
+TEST(PicturesForFiles, KeepTheMosaicThatTheRigStates) {
+  CameraFrame frame;
+  frame.image = cv::Mat(60, 80, CV_8UC1, cv::Scalar(200));
+  frame.mosaic = "RGGB";
+  Camera camera;
+  EXPECT_EQ(picture_for_files(camera, frame).channels(), 3);
+  camera.mosaic = Mosaic::from_name("RGGB");
+  EXPECT_EQ(picture_for_files(camera, frame).channels(), 1);
 }
 
 TEST(LiveFigures, PreviewsLeaveThePictureAlone) {

@@ -59,6 +59,7 @@ Rig small_ring() {
 /// What an owner of this rig knows before its calibration.
 UncalibratedRig devices_of(const Rig& rig, std::uint64_t seed) {
   UncalibratedRig devices{rig, {}};
+  devices.rig.floor.reset();  // of a frame that nobody knows yet
   Random random(seed, 0x6b);
   for (Camera& camera : devices.rig.cameras) {
     const double focal = 1 + kFocalError * random.normal();

@@ -177,6 +177,8 @@ std::optional<ColorResponse> color_response(const cv::Mat& white, const cv::Mat&
         shares[static_cast<std::size_t>(c)][k].push_back(static_cast<double>(light[k][c] / sum));
     }
   }
+  for (const auto& of_channel : shares)
+    if (of_channel[0].size() < kLeastPixels) return std::nullopt;  // blind to all three
   ColorResponse response;
   for (Eigen::Index c = 0; c < 3; ++c) {
     for (Eigen::Index k = 0; k < 3; ++k) {
@@ -187,6 +189,10 @@ std::optional<ColorResponse> color_response(const cv::Mat& white, const cv::Mat&
     }
     response.matrix.row(c) /= response.matrix.row(c).sum();
   }
+  // Of a grey camera whose pictures are stored as colours all rows are one. Channels that share
+  // nothing have a determinant of 1; with each half of the others' light it is .125.
+  constexpr double kLeastDeterminant = 0.05;
+  if (!(std::abs(response.matrix.determinant()) >= kLeastDeterminant)) return std::nullopt;
   response.projector_gamma = projector_gamma(white, black, solids, places);
   return response;
 }

@@ -358,8 +358,10 @@ TEST_F(Exchange, KnownDistanceGivesTheScale) {
   options.unit_known = false;
   UncalibratedRig rig = joined(read_colmap(folder_), options);
   EXPECT_FALSE(rig.rig.unit_known);
+  rig.rig.floor = Floor{2 * rig.rig.cameras[0].center()};
   scale_rig("cam0", "proj1", 321, rig);
   EXPECT_TRUE(rig.rig.unit_known);
+  EXPECT_LT((rig.rig.floor->point - 2 * rig.rig.cameras[0].center()).norm(), 1e-9);
   EXPECT_NEAR((rig.rig.cameras[0].center() - rig.rig.projectors[1].center()).norm(), 321, 1e-9);
   expect_bad([&] { scale_rig("cam0", "nobody", 1, rig); }, "nobody");
 }

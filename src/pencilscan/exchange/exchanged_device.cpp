@@ -183,6 +183,7 @@ void scale_rig(const std::string& first, const std::string& second, double mm,
     rig.rig.volume->center *= mm / now;
     rig.rig.volume->radius *= mm / now;
   }
+  if (rig.rig.floor) rig.rig.floor->point *= mm / now;
   rig.rig.unit_known = true;
 }
 

@@ -24,6 +24,10 @@ struct Meeting {
   double angle;      ///< between the rays
 };
 
+/// Of the depth: a step along a ray, to see how fast its picture moves. Far smaller than what bends
+/// it, far larger than what rounding leaves of a difference.
+constexpr double kStepShare = 1e-4;
+
 std::optional<Meeting> meet(const Device& camera, const Device& projector, const Vec2& pixel,
                             const Vec2& panel) {
   const Ray a = camera.ray(pixel);
@@ -37,10 +41,11 @@ std::optional<Meeting> meet(const Device& camera, const Device& projector, const
   Meeting result;
   result.point = a.origin + depth * a.direction;
   const auto projected = projector.project(result.point);
-  const auto farther = projector.project(result.point + a.direction);
+  const double step = kStepShare * depth;
+  const auto farther = projector.project(result.point + step * a.direction);
   if (!projected || !farther) return std::nullopt;
   result.miss_px = (*projected - panel).norm();
-  result.mm_per_px = 1 / std::max((*farther - *projected).norm(), 1e-9);
+  result.mm_per_px = step / std::max((*farther - *projected).norm(), 1e-9);
   result.angle = std::asin(std::sqrt(std::min(sine2, 1.0)));
   return result;
 }

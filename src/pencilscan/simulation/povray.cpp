@@ -13,8 +13,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Distance of the slits from the projector's centre, mm: no object comes that near.
-constexpr double kSlitDistance = 10;
+/// Distance of the slits from the projector's centre, of that of the devices: no object comes that
+/// near.
+constexpr double kSlitShare = 0.01;
 /// Segments along a slit of a projector with lens distortion.
 constexpr int kBentSegments = 64;
 
@@ -67,7 +68,7 @@ void write_object(std::ostream& out, const SimulatedObject& object) {
 
 /// The slits of all lines of one colour, as a mesh in front of the projector.
 void write_slits(std::ostream& out, const Projector& projector, const LinePattern& pattern,
-                 const PatternColor& color) {
+                 const PatternColor& color, double slit_distance) {
   const RigidTransform world_from_device = projector.device_from_world.inverse();
   const bool columns = pattern.axis == Axis::kColumn;
   const double across_end = projector.size_across(pattern) - 0.5;
@@ -76,7 +77,7 @@ void write_slits(std::ostream& out, const Projector& projector, const LinePatter
   const auto corner = [&](double across, double along) {
     const Vec2 pixel = columns ? Vec2(across, along) : Vec2(along, across);
     return Vector{world_from_device *
-                  (kSlitDistance * projector.normalized_from_pixel(pixel).homogeneous())};
+                  (slit_distance * projector.normalized_from_pixel(pixel).homogeneous())};
   };
   out << "mesh {\n";
   for (int line = 0; line < projector.line_count(pattern); ++line) {
@@ -118,7 +119,7 @@ void write_lights(std::ostream& out, const Rig& rig, const RenderOptions& option
           out << "  fade_distance " << reference / kFade << " fade_power 2\n";
         }
         out << "  projected_through { ";
-        write_slits(out, projector, pattern, color);
+        write_slits(out, projector, pattern, color, kSlitShare * reference);
         out << " }\n}\n";
       }
     }
