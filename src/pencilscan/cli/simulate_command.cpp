@@ -8,6 +8,7 @@
 
 #include "pencilscan/cli/command.h"
 #include "pencilscan/cli/rendered_light.h"
+#include "pencilscan/cli/simulate_options.h"
 #include "pencilscan/core/counted_progress.h"
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/parallel.h"
@@ -27,38 +28,6 @@ namespace pencilscan::cli {
 namespace {
 
 namespace fs = std::filesystem;
-
-struct SimulateOptions {
-  CommonOptions common;
-  std::string rig_path;
-  std::string mesh_path;
-  std::string out;
-  bool overwrite = false;
-
-  bool fit = false;
-  double scale = 1;
-  UpAxis up = UpAxis::kZ;
-  int frame_count = 1;
-  double rotate_deg = 0;
-  std::vector<double> translate_mm = {0, 0, 0};
-  std::vector<double> speed_mm_s = {0, 0, 0};
-  std::vector<double> spin_deg_s = {0, 0, 0};
-  double exposure_ms = 1;
-
-  bool gray_code = false;
-  bool color_captures = false;
-  bool truth_maps = false;
-  bool export_povray = false;
-  bool export_blender = false;
-  std::string light;         ///< folder of another renderer's pictures; empty: our own
-  std::string interpolated;  ///< name of a mosaic; empty: three channels
-  std::optional<int> jpeg;   ///< quality
-
-  Reflectance surface;
-  bool flat = false;
-  bool no_falloff = false;
-  PhotographyOptions photo;
-};
 
 /// Light that a projector shows where its panel is black, in Gray-code captures.
 constexpr double kCaptureBlackLevel = 0.004;
@@ -280,169 +249,6 @@ void run_simulate(SimulateOptions options) {
   publish(making.path(), out);
   figures["seconds"] = watch.seconds();
   print_figures(options.common, figures);
-}
-
-/// For what shapes the light that we render: there is none of it in a scene of --light alone.
-CLI::Validator only_of_own_light(const SimulateOptions& options) {
-  return only_where(
-      [&options] {
-        return options.light.empty() || options.gray_code || options.export_povray ||
-               options.export_blender;
-      },
-      "does not go with --light: light is as it was made");
-}
-
-void add_scene_options(CLI::App& command, SimulateOptions& options) {
-  const std::map<std::string, UpAxis> axes{{"x", UpAxis::kX}, {"y", UpAxis::kY}, {"z", UpAxis::kZ}};
-  const std::map<std::string, TextureKind> textures{{"none", TextureKind::kNone},
-                                                    {"noise", TextureKind::kNoise},
-                                                    {"stripes", TextureKind::kStripes},
-                                                    {"checker", TextureKind::kChecker}};
-  command.add_flag("--fit", options.fit, "Centre and scale the mesh into the rig's volume");
-  command
-      .add_option("--scale", options.scale,
-                  "Multiply the mesh: 1000 for one in metres, 25.4 for one in inches")
-      ->check(above_zero())
-      ->check(told_where_not(
-          "--scale", [&options] { return !options.fit; },
-          "does not change what --fit makes of the mesh"))
-      ->capture_default_str();
-  command.add_option("--up", options.up, "Axis of the mesh that points up")
-      ->transform(choice(axes))
-      ->default_str("z");
-  command.add_option("--frame-count", options.frame_count, "Frames of a moving object")
-      ->check(between(1, 999999))
-      ->capture_default_str();
-  const auto moves = [&options](const char* option) {
-    return told_where_not(
-        option, [&options] { return options.frame_count > 1; }, "needs --frame-count 2 or more");
-  };
-  command.add_option("--rotate-deg", options.rotate_deg, "Turn about the vertical per frame")
-      ->check(any_number<double>())
-      ->check(moves("--rotate-deg"));
-  command.add_option("--translate-mm", options.translate_mm, "Shift x y z per frame")
-      ->expected(3)
-      ->check(any_number<double>())
-      ->check(moves("--translate-mm"));
-  CLI::Option* motion =
-      command
-          .add_option("--motion-mm-s", options.speed_mm_s,
-                      "Speed x y z within the exposure of every frame, whose truth is its middle; "
-                      "Gray-code captures stand still")
-          ->expected(3)
-          ->check(any_number<double>());
-  CLI::Option* spin = command
-                          .add_option("--spin-deg-s", options.spin_deg_s,
-                                      "Turning speed about x y z through the volume's centre, "
-                                      "likewise")
-                          ->expected(3)
-                          ->check(any_number<double>());
-  command
-      .add_option("--exposure-ms", options.exposure_ms,
-                  "Of a frame, for --motion-mm-s and --spin-deg-s")
-      ->check(above_zero())
-      ->check(told_where_not(
-          "--exposure-ms", [motion, spin] { return motion->count() + spin->count() > 0; },
-          "needs --motion-mm-s or --spin-deg-s"))
-      ->capture_default_str();
-  const CLI::Validator renders = only_of_own_light(options);
-  const auto textured = [&options](const char* option) {
-    return told_where_not(
-        option, [&options] { return options.surface.texture.kind != TextureKind::kNone; },
-        "needs --texture checker, noise or stripes");
-  };
-  command
-      .add_option("--albedo", options.surface.albedo,
-                  "Share of the light that the surface gives back")
-      ->check(between(0.0, 1.0))
-      ->check(renders)
-      ->capture_default_str();
-  command.add_option("--texture", options.surface.texture.kind, "What varies the albedo")
-      ->transform(choice(textures))
-      ->check(renders)
-      ->default_str("none");
-  command.add_option("--contrast", options.surface.texture.contrast, "Contrast of the texture")
-      ->check(between(0.0, 1.0))
-      ->check(textured("--contrast"))
-      ->capture_default_str();
-  command
-      .add_option("--texture-mm", options.surface.texture.period_mm, "Period of the texture, mm")
-      ->check(above_zero())
-      ->check(textured("--texture-mm"))
-      ->capture_default_str();
-  command.add_option("--specular", options.surface.specular, "Weight of the Blinn-Phong lobe")
-      ->check(zero_or_more())
-      ->check(renders)
-      ->capture_default_str();
-  command.add_option("--roughness", options.surface.roughness, "1 / exponent of that lobe")
-      ->check(between(1e-4, 1.0))
-      ->check(told_where_not(
-          "--roughness", [&options] { return options.surface.specular > 0; },
-          "needs --specular above 0"))
-      ->capture_default_str();
-  command.add_flag("--flat", options.flat, "One normal per face (cubes); else smooth shading");
-}
-
-void add_device_options(CLI::App& command, SimulateOptions& options) {
-  const CLI::Validator renders = only_of_own_light(options);
-  command.add_option("--samples", options.photo.render.samples, "Rays per pixel and axis")
-      ->check(between(1, 16))
-      ->check(renders)
-      ->capture_default_str();
-  command
-      .add_option("--exposure", options.photo.render.exposure,
-                  "Image value of a white surface that faces a projector at the centre")
-      ->check(above_zero())
-      ->check(renders)
-      ->capture_default_str();
-  command.add_flag("--no-falloff", options.no_falloff, "Light does not weaken with distance")
-      ->check(renders);
-  command
-      .add_flag("--pixelated", options.photo.film.pixelated, "Projector pixels, no continuous film")
-      ->check(renders);
-  command
-      .add_option("--projector-blur", options.photo.film.blur_px, "Standard deviation, panel px")
-      ->check(between(0.0, 50.0))
-      ->check(renders);
-  command
-      .add_option("--black-level", options.photo.black_level,
-                  "Light of a black panel pixel (default 0; 0.004 in captures)")
-      ->check(between(0.0, 0.9))
-      ->check(renders);
-  command
-      .add_option("--noise", options.photo.noise,
-                  "Sensor preset: crosstalk, ambient light, blur and noise together")
-      ->check(one_of({"none", "low", "medium", "high"}))
-      ->capture_default_str();
-  command.add_option("--crosstalk", options.photo.crosstalk, "Share that colour filters leak")
-      ->check(between(0.0, 0.5));
-  command
-      .add_option("--ambient", options.photo.ambient,
-                  "Even light on all surfaces, image value of a white one")
-      ->check(between(0.0, 1.0))
-      ->check(renders);
-  command.add_option("--blur", options.photo.blur_px, "Camera blur, standard deviation, px")
-      ->check(between(0.0, 50.0));
-  command
-      .add_option("--full-well", options.photo.full_well, "Electrons at value 1; 0: no shot noise")
-      ->check(zero_or_more());
-  command
-      .add_option("--read-noise", options.photo.read_noise,
-                  "Standard deviation, 1/255 of the range")
-      ->check(zero_or_more());
-  command.add_option("--gain", options.photo.gain, "Of the sensor, after its noise")
-      ->check(above_zero())
-      ->capture_default_str();
-  command.add_option("--bits", options.photo.bits, "Of the images, per channel")
-      ->check(one_of({"8", "16"}))
-      ->capture_default_str();
-  command
-      .add_option("--interpolated", options.interpolated,
-                  "Colours as a camera fills them in behind this mosaic, where the rig states none")
-      ->check(one_of({"RGGB", "BGGR", "GRBG", "GBRG"}));
-  command.add_option("--jpeg", options.jpeg, "Frames as JPEG of this quality; 8 bits")
-      ->check(between(1, 100))
-      ->check(only_where([&options] { return options.photo.bits == 8; }, "needs --bits 8"));
 }
 
 }  // namespace
