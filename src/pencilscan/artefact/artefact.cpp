@@ -19,16 +19,26 @@ namespace {
 
 constexpr std::size_t kWorstShown = 10;
 
+struct Box {
+  Vec3 low = Vec3::Constant(std::numeric_limits<double>::infinity());
+  Vec3 high = -low;
+};
+
+Box box_of(std::span<const Vec3> points) {
+  Box box;
+  for (const Vec3& x : points) {
+    box.low = box.low.cwiseMin(x);
+    box.high = box.high.cwiseMax(x);
+  }
+  return box;
+}
+
 [[noreturn]] void no_fit(const ArtefactPoints& points, const char* shape,
                          const std::string& why = {}) {
-  Vec3 low = Vec3::Constant(std::numeric_limits<double>::infinity()), high = -low;
-  for (const Vec3& x : points.points) {
-    low = low.cwiseMin(x);
-    high = high.cwiseMax(x);
-  }
+  const Box box = box_of(points.points);
   throw StageError(
       points.source + ": no " + shape + " fits " + std::to_string(points.points.size()) +
-      " points, which reach over " + formatted((high - low).maxCoeff(), "%.3g") +
+      " points, which reach over " + formatted((box.high - box.low).maxCoeff(), "%.3g") +
       " mm (lengths are taken as millimetres)" + why +
       (points.outside_region > 0 ? "; --region left out " + std::to_string(points.outside_region)
                                  : std::string()));
@@ -106,15 +116,11 @@ std::optional<SphereFits> fit_both(std::span<const Vec3> points, const Sphere& s
 ArtefactPoints of_region(const ArtefactPoints& points, const ArtefactOptions& options) {
   if (!options.region || points.points.empty()) return points;
   ArtefactPoints part = within(points, *options.region);
-  Vec3 low = points.points.front(), high = low;
-  for (const Vec3& x : points.points) {
-    low = low.cwiseMin(x);
-    high = high.cwiseMax(x);
-  }
+  const Box box = box_of(points.points);
   require_some(part, "--region",
                mm_text(options.region->center) + " " + formatted(options.region->radius, "%.6g"),
-               std::to_string(points.points.size()) + " points, which lie from " + mm_text(low) +
-                   " to " + mm_text(high));
+               std::to_string(points.points.size()) + " points, which lie from " +
+                   mm_text(box.low) + " to " + mm_text(box.high));
   return part;
 }
 

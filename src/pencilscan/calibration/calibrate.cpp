@@ -292,12 +292,8 @@ class Calibration {
     if (!solved) return std::move(result_);
     rescale_to_boards(result_.problem);
     const FixedFrame frame = fix_frame(input_, result_.problem);
+    result_.rig = scaled(std::move(result_.rig), frame.of_given);
     result_.rig.unit_known = frame.is_scaled;
-    if (result_.rig.volume) {
-      result_.rig.volume->center *= frame.of_given;
-      result_.rig.volume->radius *= frame.of_given;
-    }
-    if (result_.rig.floor) result_.rig.floor->point *= frame.of_given;
     for (std::size_t d = 0; d < result_.placed.size(); ++d) {
       result_.placed[d] = result_.problem.devices[d].present ? 1 : 0;
       if (result_.placed[d] != 0) set_device(result_.problem.devices[d], device_at(result_.rig, d));

@@ -65,19 +65,6 @@ void move_solution(double scale, const RigidTransform& new_from_old, BundleProbl
   }
 }
 
-namespace {
-
-/// Root mean square distance of points from their middle.
-double spread(const std::vector<Vec3>& points) {
-  Vec3 middle = Vec3::Zero();
-  for (const Vec3& point : points) middle += point / static_cast<double>(points.size());
-  double sum = 0;
-  for (const Vec3& point : points) sum += (point - middle).squaredNorm();
-  return std::sqrt(sum / static_cast<double>(points.size()));
-}
-
-}  // namespace
-
 FixedFrame fix_frame(const CalibrationInput& input, BundleProblem& problem) {
   std::vector<Vec3> from;
   std::vector<Vec3> to;
@@ -96,10 +83,13 @@ FixedFrame fix_frame(const CalibrationInput& input, BundleProblem& problem) {
       a.col(static_cast<Eigen::Index>(i)) = from[i];
       b.col(static_cast<Eigen::Index>(i)) = to[i];
     }
+    const auto scale_of = [](const Eigen::Matrix4d& similarity) {
+      return similarity.block<3, 3>(0, 0).col(0).norm();
+    };
     const Eigen::Matrix4d similarity = fit_similarity(a, b, !scaled);
-    const double s = similarity.block<3, 3>(0, 0).col(0).norm();
+    const double s = scale_of(similarity);
     move_solution(s, {similarity.block<3, 3>(0, 0) / s, similarity.block<3, 1>(0, 3)}, problem);
-    if (scaled) of_given = spread(from) / spread(to);  // a board's millimetres, not theirs
+    if (scaled) of_given = 1 / scale_of(fit_similarity(a, b, true));  // in a board's millimetres
     scaled = scaled || input.rig.unit_known;
   } else {
     move_solution(1, own_frame(problem, input.rig.cameras.size()), problem);

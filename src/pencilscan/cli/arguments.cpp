@@ -1,9 +1,9 @@
 #include "pencilscan/cli/arguments.h"
 
-#include <iostream>
 #include <memory>
 #include <utility>
 
+#include "pencilscan/cli/command.h"
 #include "pencilscan/core/error.h"
 
 namespace pencilscan::cli {
@@ -25,8 +25,7 @@ CLI::Validator told_where_not(const std::string& option, std::function<bool()> h
   const auto told = std::make_shared<bool>(false);
   return {[=](std::string&) {
             if (!holds() && !std::exchange(*told, true))
-              std::cerr << "pencilscan: warning: " << option << " has no effect here: it " << rule
-                        << "\n";
+              warn_of(option + " has no effect here: it " + rule);
             return std::string();
           },
           ""};

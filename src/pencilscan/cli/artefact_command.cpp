@@ -41,8 +41,7 @@ std::optional<Rig> rig_of(const ArtefactCommand& command, const fs::path& file) 
 }
 
 void tell_warnings(const fs::path& file, const std::vector<std::string>& warnings) {
-  for (const std::string& warning : warnings)
-    std::cerr << "pencilscan: warning: " << file.string() << ": " << warning << "\n";
+  for (const std::string& warning : warnings) warn_of(file.string() + ": " + warning);
 }
 
 void measure(const ArtefactCommand& command, const fs::path& file, ArtefactTest& test) {

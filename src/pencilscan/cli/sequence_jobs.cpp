@@ -154,11 +154,12 @@ std::size_t task_count(const SubmitCommand& submit, std::size_t frames) {
   return std::min(chunk_count(frames), most);
 }
 
+/// InputError for what every task would refuse, before it takes the place of a job that can go on.
 Job make_job(const SubmitCommand& submit, const CLI::App& command) {
-  const Rig rig = read_rig(submit.reconstruct.rig);
-  const FrameSource frames = FrameSource::open(rig, submit.reconstruct.frames);
-  if (const auto warning = open_recording_warning(frames))
-    std::cerr << "pencilscan: warning: " << *warning << "\n";
+  const FrameSource frames =
+      check_sequence(submit.reconstruct.rig, submit.reconstruct.frames, submit.reconstruct.out,
+                     sequence_options(submit.reconstruct));
+  warn_of(open_recording_warning(frames));
   Job job;
   job.kind = submit.slurm           ? JobKind::kSlurm
              : submit.hosts.empty() ? JobKind::kLocal
@@ -186,9 +187,6 @@ void run_submit(const SubmitCommand& submit, const CLI::App& command) {
     throw InputError("command line", "--local, --ssh, --slurm", "", "exactly one must be given");
   Interruption interruption;
   const Job job = make_job(submit, command);
-  // Before the job of what is there is replaced by one that every task would refuse.
-  check_sequence(submit.reconstruct.rig, submit.reconstruct.frames, job.out,
-                 sequence_options(submit.reconstruct));
   write_job(job);
   std::vector<std::size_t> tasks(job.tasks);
   for (std::size_t i = 0; i < tasks.size(); ++i) tasks[i] = i;

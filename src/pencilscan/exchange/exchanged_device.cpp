@@ -177,13 +177,7 @@ void scale_rig(const std::string& first, const std::string& second, double mm,
   const double now = (center_of_device(first) - center_of_device(second)).norm();
   if (!(now > 0))
     throw InputError("command line", "--known-distance", second, "must not stand at " + first);
-  for (std::size_t d = 0; d < device_count(rig.rig); ++d)
-    device_at(rig.rig, d).device_from_world.translation *= mm / now;
-  if (rig.rig.volume) {
-    rig.rig.volume->center *= mm / now;
-    rig.rig.volume->radius *= mm / now;
-  }
-  if (rig.rig.floor) rig.rig.floor->point *= mm / now;
+  rig.rig = scaled(std::move(rig.rig), mm / now);
   rig.rig.unit_known = true;
 }
 

@@ -287,10 +287,11 @@ std::size_t frames_at_once(const Rig& rig) {
   return static_cast<std::size_t>(std::max(1.0, std::min(useful, std::floor(most))));
 }
 
-void check_sequence(const fs::path& rig_path, const fs::path& frames, const fs::path& out,
-                    const SequenceOptions& options) {
-  const SequenceInput input = open_input(rig_path, frames, out, options);
+FrameSource check_sequence(const fs::path& rig_path, const fs::path& frames, const fs::path& out,
+                           const SequenceOptions& options) {
+  SequenceInput input = open_input(rig_path, frames, out, options);
   refuse_other_settings(out, describe_inputs(rig_path, input.frames, options), options);
+  return std::move(input.frames);
 }
 
 SequenceOutcome reconstruct_sequence(const fs::path& rig_path, const fs::path& frames_path,

@@ -7,6 +7,7 @@
 
 #include "pencilscan/core/progress.h"
 #include "pencilscan/pipeline/frame.h"
+#include "pencilscan/pipeline/frame_source.h"
 #include "pencilscan/pipeline/refinement_output.h"
 #include "pencilscan/pipeline/shard.h"
 
@@ -51,10 +52,13 @@ struct SequenceOutcome {
 /// so as many again as the threads alone would fill, and no more than memory holds.
 [[nodiscard]] std::size_t frames_at_once(const Rig& rig);
 
-/// InputError where reconstruct_sequence would refuse rig, frames, options or what `out` holds.
-/// Looks at no picture and writes nothing: for those who hand the frames to several programs.
-void check_sequence(const std::filesystem::path& rig_path, const std::filesystem::path& frames,
-                    const std::filesystem::path& out, const SequenceOptions& options);
+/// The frames that reconstruct_sequence would take; InputError where it would refuse rig, frames,
+/// options or what `out` holds. Looks at no picture and writes nothing: for those who hand the
+/// frames to several programs.
+[[nodiscard]] FrameSource check_sequence(const std::filesystem::path& rig_path,
+                                         const std::filesystem::path& frames,
+                                         const std::filesystem::path& out,
+                                         const SequenceOptions& options);
 
 /// Reconstructs every frame of `frames` (image folders or a recording) into `out`/<frame>:
 /// points.ply, mesh.ply, mesh_measured.ply, pictures/, timing.json, report.json; or failure.json

@@ -14,6 +14,7 @@
 #include <utility>
 
 #include "pencilscan/core/error.h"
+#include "pencilscan/core/error_of.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/io/file.h"
 #include "pencilscan/io/image.h"
@@ -32,15 +33,6 @@ namespace fs = std::filesystem;
 using ::testing::ElementsAre;
 using ::testing::EndsWith;
 using ::testing::HasSubstr;
-
-std::string error_of(const std::function<void()>& call) {
-  try {
-    call();
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "";
-}
 
 // ---- shards
 // ---------------------------------------------------------------------------------------

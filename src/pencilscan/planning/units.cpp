@@ -15,14 +15,6 @@
 namespace pencilscan {
 namespace {
 
-/// Units of meshes before a rig in millimetres.
-constexpr std::array kMeshUnits = std::to_array<UnitFactor>({
-    {1000, "metres instead of millimetres"},
-    {304.8, "feet instead of millimetres"},
-    {25.4, "inches instead of millimetres"},
-    {10, "centimetres instead of millimetres"},
-    {0.001, "micrometres instead of millimetres"},
-});
 /// Seldom enough to be thought of only where no other unit explains the size.
 constexpr std::array kSeldomMeshUnits =
     std::to_array<UnitFactor>({{100, "decimetres instead of millimetres"}});
@@ -92,7 +84,7 @@ const UnitFactor* unit_behind(double share, std::span<const UnitFactor> units) {
 const UnitFactor* unit_of_mesh(double share, const Rig& rig) {
   if (const UnitFactor* unit = unit_behind(share, kUnitOfRig)) return unit;
   if (!rig.unit_known) return unit_behind(share, kUnitFactors);
-  const UnitFactor* unit = unit_behind(share, kMeshUnits);
+  const UnitFactor* unit = unit_behind(share, kInsteadOfMillimetres);
   return unit != nullptr ? unit : unit_behind(share, kSeldomMeshUnits);
 }
 

@@ -6,6 +6,7 @@
 #include <fstream>
 
 #include "pencilscan/core/error.h"
+#include "pencilscan/core/error_of.h"
 #include "pencilscan/io/file.h"
 #include "pencilscan/io/image.h"
 #include "pencilscan/io/temporary_folder.h"
@@ -29,16 +30,6 @@ class Pack : public ::testing::Test {
 
   TemporaryFolder temporary_{::testing::UnitTest::GetInstance()->current_test_info()->name()};
 };
-
-template <class Call>
-std::string refusal(const Call& call) {
-  try {
-    call();
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "";
-}
 
 bool equal_pixels(const cv::Mat& a, const cv::Mat& b) {
   return a.size() == b.size() && a.type() == b.type() && cv::norm(a, b, cv::NORM_INF) == 0;
@@ -91,10 +82,10 @@ TEST_F(Pack, AnEarlierRecordingStaysUntilTheNewOneIsWhole) {
   put("000000/cam0.png", CV_8UC1, 5);
   fs::resize_file(frames() / "000001" / "cam0.png", 60);
   PackOptions options;
-  EXPECT_THAT(refusal([&] { pack_recording(frames(), packed(), options); }),
+  EXPECT_THAT(error_of([&] { pack_recording(frames(), packed(), options); }),
               HasSubstr("must be new"));
   options.overwrite = true;
-  EXPECT_THAT(refusal([&] { pack_recording(frames(), packed() / "", options); }),
+  EXPECT_THAT(error_of([&] { pack_recording(frames(), packed() / "", options); }),
               HasSubstr("000001/cam0.png"));
   ASSERT_TRUE(Recording::is_one(packed()));
   EXPECT_EQ(Recording::open(packed()).read(0, 0).at<std::uint8_t>(0, 0), 3);
@@ -117,7 +108,7 @@ TEST_F(Pack, AFilmIsNoEarlierRecording) {
   write_text(packed() / ".zattrs", "{\"format\": \"pencilscan-film/1\"}");
   PackOptions options;
   options.overwrite = true;
-  EXPECT_THAT(refusal([&] { pack_recording(frames(), packed(), options); }),
+  EXPECT_THAT(error_of([&] { pack_recording(frames(), packed(), options); }),
               HasSubstr("must be new or an empty folder"));
   EXPECT_TRUE(fs::exists(packed() / ".zattrs"));
 }
@@ -129,7 +120,7 @@ TEST_F(Pack, TheFramesThemselvesAreNoOutput) {
   PackOptions options;
   options.overwrite = true;
   for (const fs::path& out : {frames(), frames() / "", temporary_.path()})
-    EXPECT_THAT(refusal([&] { pack_recording(frames(), out, options); }),
+    EXPECT_THAT(error_of([&] { pack_recording(frames(), out, options); }),
                 HasSubstr("must not be the folder of --frames"));
   EXPECT_TRUE(fs::exists(frames() / "000000" / "cam0.png"));
 }
@@ -161,16 +152,16 @@ TEST_F(Pack, PicturesThatWouldStayAmongUnpackedOnesAreNamed) {
   for (const char* file : {"000002/cam0.png", "000001/cam1.png", "000001/cam0.tiff"}) {
     const cv::Mat picture(12, 16, CV_8UC1, cv::Scalar(9));
     write_image(out / file, picture);
-    EXPECT_NE(refusal([&] { unpack_recording(recording, sets, out); }), "") << file;
+    EXPECT_NE(error_of([&] { unpack_recording(recording, sets, out); }), "") << file;
     EXPECT_TRUE(fs::exists(out / file));
     fs::remove(out / file);
   }
   write_image(out / "000002" / "cam0.png", cv::Mat(12, 16, CV_8UC1, cv::Scalar(9)));
-  EXPECT_THAT(refusal([&] { unpack_recording(recording, sets, out); }),
+  EXPECT_THAT(error_of([&] { unpack_recording(recording, sets, out); }),
               HasSubstr("000002/cam0.png: must not stay"));
   fs::remove(out / "000002" / "cam0.png");
   write_text(out / "timestamps.csv", "frame,cam0\n000000,1\n");
-  EXPECT_THAT(refusal([&] { unpack_recording(recording, sets, out); }),
+  EXPECT_THAT(error_of([&] { unpack_recording(recording, sets, out); }),
               HasSubstr("timestamps.csv: must not stay"));
 }
 
@@ -179,7 +170,7 @@ TEST_F(Pack, ATimeStampThatIsNoWholeNumberIsRefused) {
   const auto with = [&](const std::string& time) {
     fs::remove_all(packed());
     write_text(frames() / "timestamps.csv", "frame,cam0\n000000," + time + "\n");
-    return refusal([&] { pack_recording(frames(), packed()); });
+    return error_of([&] { pack_recording(frames(), packed()); });
   };
   EXPECT_THAT(with("9223372036854775808"),
               AllOf(HasSubstr("timestamps.csv"), HasSubstr("line 2, cam0"),

@@ -12,6 +12,7 @@
 #include <thread>
 
 #include "pencilscan/core/error.h"
+#include "pencilscan/core/error_of.h"
 #include "pencilscan/core/random.h"
 #include "pencilscan/io/file.h"
 #include "pencilscan/io/temporary_folder.h"
@@ -44,16 +45,6 @@ cv::Mat picture(const RecordedCamera& camera, std::size_t row, std::size_t seed 
 bool same(const cv::Mat& a, const cv::Mat& b) {
   return a.size() == b.size() && a.type() == b.type() &&
          std::equal(a.data, a.data + a.total() * a.elemSize(), b.data);
-}
-
-template <class Call>
-std::string error_of(const Call& call) {
-  try {
-    call();
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "";
 }
 
 /// Runs a program text of python3 with zarr; the exit code, or nothing where there is none.
