@@ -80,7 +80,7 @@ class ProblemBuilder {
       BundleDevice& device = from_.devices[seen.view.device];
       if (!device.present) continue;
       auto* cost = new Cost(
-          new BoardCost{{seen.view.pixel, sigma(seen.view), device.denominator}, seen.position_mm});
+          new BoardCost{{seen.view.pixel, sigma(seen.view), device.held}, seen.position_mm});
       add(cost, loss_.get(), seen.view.device, from_.board_poses[seen.board].data());
       ordering_->AddElementToGroup(from_.board_poses[seen.board].data(), 1);
     }
@@ -169,7 +169,7 @@ class ProblemBuilder {
       const bool is_hub = &view == from_.tracks[t].views.data();
       const double deviation = is_hub ? view.sigma_px : sigma(view);
       // The hub's pixel is no measurement but the place where the others were taken.
-      add(new Cost(new ReprojectionCost{view.pixel, deviation, device.denominator}),
+      add(new Cost(new ReprojectionCost{view.pixel, deviation, device.held}),
           is_hub ? nullptr : track_loss_.get(), view.device, from_.points[t].data());
     }
     ordering_->AddElementToGroup(from_.points[t].data(), 0);
@@ -214,7 +214,7 @@ std::size_t present_devices(const BundleProblem& problem) {
 std::optional<Vec2> view_error(const BundleDevice& device, const Vec3& point,
                                const TrackView& view) {
   Vec2 pixel;
-  if (!project_point(device.pose.data(), device.inner.data(), device.denominator, point.data(),
+  if (!project_point(device.pose.data(), device.inner.data(), device.held, point.data(),
                      pixel.data()))
     return std::nullopt;
   return pixel - view.pixel;
@@ -223,8 +223,7 @@ std::optional<Vec2> view_error(const BundleDevice& device, const Vec3& point,
 ViewLinearization linearize(const BundleDevice& device, const Vec3& point, const TrackView& view,
                             double extra_sigma_px) {
   const ceres::AutoDiffCostFunction<ReprojectionCost, 2, 6, kIntrinsics, 3> cost(
-      new ReprojectionCost{view.pixel, std::hypot(view.sigma_px, extra_sigma_px),
-                           device.denominator});
+      new ReprojectionCost{view.pixel, std::hypot(view.sigma_px, extra_sigma_px), device.held});
   ViewLinearization result;
   const std::array<const double*, 3> parameters{device.pose.data(), device.inner.data(),
                                                 point.data()};

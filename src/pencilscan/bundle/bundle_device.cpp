@@ -8,6 +8,8 @@ namespace pencilscan {
 
 BundleDevice bundle_device(const Device& device) {
   BundleDevice result;
+  result.width = device.width;
+  result.height = device.height;
   const Mat3& R = device.device_from_world.rotation;
   ceres::RotationMatrixToAngleAxis(R.data(), result.pose.data());  // Eigen is column major, too
   for (Eigen::Index i = 0; i < 3; ++i)
@@ -15,7 +17,7 @@ BundleDevice bundle_device(const Device& device) {
   const auto& k = device.distortion;
   result.inner = {
       device.K(0, 0), device.K(1, 1), device.K(0, 2), device.K(1, 2), k[0], k[1], k[2], k[3], k[4]};
-  result.denominator = {k[5], k[6], k[7]};
+  result.held = {{k[5], k[6], k[7]}, device.K(0, 1)};
   result.prior = result.inner;
   result.prior[kFy] = result.inner[kFy] / result.inner[kFx];
   return result;
@@ -27,13 +29,16 @@ void set_pose(BundleDevice& device, const Mat3& rotation, const Vec3& translatio
     device.pose[static_cast<std::size_t>(3 + i)] = translation[i];
 }
 
+Mat3 K_of(const BundleDevice& device) {
+  const auto& inner = device.inner;
+  Mat3 K;
+  K << inner[kFx], device.held.skew, inner[kCx], 0, inner[kFy], inner[kCy], 0, 0, 1;
+  return K;
+}
+
 void set_device(const BundleDevice& from, Device& device) {
-  device.K = Mat3::Identity();
-  device.K(0, 0) = from.inner[kFx];
-  device.K(1, 1) = from.inner[kFy];
-  device.K(0, 2) = from.inner[kCx];
-  device.K(1, 2) = from.inner[kCy];
-  device.distortion = {lens_coefficients(from.inner.data(), from.denominator)};
+  device.K = K_of(from);
+  device.distortion = {lens_coefficients(from.inner.data(), from.held.denominator)};
   ceres::AngleAxisToRotationMatrix(from.pose.data(), device.device_from_world.rotation.data());
   device.device_from_world.translation = Vec3(from.pose[3], from.pose[4], from.pose[5]);
 }
@@ -59,10 +64,10 @@ Vec3 center_of(const BundleDevice& device) {
 }
 
 Vec3 device_ray(const BundleDevice& device, const Vec2& pixel) {
-  const Vec2 bent((pixel.x() - device.inner[kCx]) / device.inner[kFx],
-                  (pixel.y() - device.inner[kCy]) / device.inner[kFy]);
+  const double y = (pixel.y() - device.inner[kCy]) / device.inner[kFy];
+  const Vec2 bent((pixel.x() - device.inner[kCx] - device.held.skew * y) / device.inner[kFx], y);
   const Vec2 straight =
-      undistort({lens_coefficients(device.inner.data(), device.denominator)}, bent);
+      undistort({lens_coefficients(device.inner.data(), device.held.denominator)}, bent);
   return straight.allFinite() && straight.norm() < 10 ? straight.homogeneous() : bent.homogeneous();
 }
 

@@ -11,16 +11,23 @@ enum Intrinsic { kFx, kFy, kCx, kCy, kK1, kK2, kP1, kP2, kK3, kIntrinsics };
 inline constexpr std::array<const char*, kIntrinsics> kIntrinsicNames{"fx", "fy", "cx", "cy", "k1",
                                                                       "k2", "p1", "p2", "k3"};
 
+/// What K and the lens have beyond the inner parameters: held as given, never adjusted.
+struct HeldInner {
+  std::array<double, 3> denominator{};  ///< k4, k5, k6 (geometry/distortion.h)
+  double skew = 0;                      ///< K(0, 1), px
+};
+
 /// A device as the adjustment sees it.
 struct BundleDevice {
+  int width = 0;                 ///< px, >= 1
+  int height = 0;                ///< px, >= 1
   std::array<double, 6> pose{};  ///< device_from_world: angle-axis, then translation
   std::array<double, kIntrinsics> inner{};
   /// What is known beforehand: value and one standard deviation (0: held exactly at the value;
   /// infinity: nothing known). fy's is on fy / fx.
   std::array<double, kIntrinsics> prior{};
   std::array<double, kIntrinsics> prior_sigma{};
-  /// k4, k5, k6 of the lens (geometry/distortion.h): held as given, never adjusted.
-  std::array<double, 3> denominator{};
+  HeldInner held;
   bool present = false;  ///< has a pose and takes part
 };
 
@@ -38,6 +45,8 @@ template <typename T>
   return {inner[kK1], inner[kK2],        inner[kP1],        inner[kP2],
           inner[kK3], T(denominator[0]), T(denominator[1]), T(denominator[2])};
 }
+
+[[nodiscard]] Mat3 K_of(const BundleDevice& device);
 
 /// Direction (z = 1) of a pixel in the device's frame.
 [[nodiscard]] Vec3 device_ray(const BundleDevice& device, const Vec2& pixel);

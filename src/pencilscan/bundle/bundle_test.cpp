@@ -7,6 +7,7 @@
 
 #include "pencilscan/bundle/sample_tracks.h"
 #include "pencilscan/bundle/triangulation.h"
+#include "pencilscan/bundle/uncertainty.h"
 
 namespace pencilscan {
 namespace {
@@ -51,6 +52,50 @@ TEST(Reprojection, AgreesWithTheDeviceModel) {
                                 {0, *rig.projectors[0].project(point), 1});
   ASSERT_TRUE(error.has_value());
   EXPECT_LT(error->norm(), 1e-9);
+}
+
+TEST(BundleDevice, KeepsSkewAndDenominatorOfAGivenDevice) {
+  Device given = ring(1, 1).cameras[0];
+  given.K(0, 1) = 20;
+  given.distortion[Distortion::kK4] = 0.02;
+  const BundleDevice device = bundle_device(given);
+  Device back = given;
+  set_device(device, back);
+  EXPECT_EQ(back.K, given.K);
+  const Vec3 point(40, -160, 90);
+  const Vec2 pixel = *given.project(point);
+  constexpr double kRoundingPx = 1e-9;
+  EXPECT_LT(view_error(device, point, {0, pixel, 1})->norm(), kRoundingPx);
+  const ViewLinearization at = linearize(device, point, {0, pixel, 1});
+  EXPECT_LT(at.residual.norm(), kRoundingPx);
+  constexpr double kOfUndistorting = 1e-7;
+  EXPECT_LT((device_ray(device, pixel).head<2>() - given.normalized_from_pixel(pixel)).norm(),
+            kOfUndistorting);
+}
+
+/// Devices that see parts of a sensor have it far from the middle.
+TEST(Uncertainty, WhereThePrincipalPointLiesSaysNothingOfTheImagesSize) {
+  const Rig truth = ring(2, 2);
+  const auto judged = [&](double off_px) {
+    BundleProblem problem;
+    for (std::size_t d = 0; d < device_count(truth); ++d) {
+      problem.devices.push_back(bundle_device(device_at(truth, d)));
+      BundleDevice& device = problem.devices.back();
+      device.present = true;
+      device.prior_sigma.fill(0);  // its values are held: priors do not count
+      device.prior[kCx] += off_px;
+    }
+    problem.tracks = tracks_of(truth, {.count = 400});
+    for (Track& track : problem.tracks)  // neighbours share an error
+      for (TrackView& view : track.views) view.pixel.y() += view.pixel.x() < 500 ? 0.2 : -0.2;
+    triangulate_all(problem, 0.01);
+    return uncertainty(problem, {});
+  };
+  const Uncertainty in_the_middle = judged(0);
+  const Uncertainty at_the_edge = judged(600);
+  EXPECT_GT(in_the_middle.shared_px, 0.05);
+  EXPECT_EQ(at_the_edge.shared_px, in_the_middle.shared_px);
+  EXPECT_EQ(at_the_edge.volume_median, in_the_middle.volume_median);
 }
 
 /// A start that cannot be adjusted must not look like the best one.

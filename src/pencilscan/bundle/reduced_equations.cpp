@@ -131,8 +131,8 @@ ReducedEquations::ViewRow ReducedEquations::row_of(const ViewLinearization& view
   row.by_px = std::sqrt(weight) / std::hypot(seen.sigma_px, is_hub ? 0 : adjusted_.extra_sigma_px);
   row.patch = -1;
   if (is_hub) return row;
-  // Priors are centred on the image: it gives its size. Rows beyond count with the last ones.
-  const double patch_px = (2 * problem_.devices[seen.device].prior[kCx] + 1) / kPatches;
+  // Patches are square: rows beyond the last patch count with it.
+  const double patch_px = static_cast<double>(problem_.devices[seen.device].width) / kPatches;
   const auto place = [&](double x) {
     return std::clamp<Eigen::Index>(static_cast<Eigen::Index>(x / patch_px), 0, kPatches - 1);
   };

@@ -56,7 +56,7 @@ double visible_shared_error(const BundleProblem& problem) {
   };
   std::map<std::tuple<std::size_t, int, int>, Cell> cells;
   for_each_residual(problem, [&](std::size_t, const TrackView& view, const Vec2& error) {
-    const double size = (2 * problem.devices[view.device].prior[kCx] + 1) / kCells;
+    const double size = static_cast<double>(problem.devices[view.device].width) / kCells;
     Cell& cell = cells[{view.device, static_cast<int>(view.pixel.x() / size),
                         static_cast<int>(view.pixel.y() / size)}];
     cell.sum += error;

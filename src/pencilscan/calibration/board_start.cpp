@@ -15,85 +15,17 @@
 
 #include "pencilscan/bundle/board_corners.h"
 #include "pencilscan/bundle/bundle_device.h"
-#include "pencilscan/bundle/priors.h"
+#include "pencilscan/calibration/board_sightings.h"
 #include "pencilscan/calibration/rig_frame.h"
 #include "pencilscan/core/median.h"
 
 namespace pencilscan {
 namespace {
 
-/// One camera's view of one placing: places in problem.board_views.
-struct Sighting {
-  std::size_t board = 0;
-  std::size_t device = 0;
-  std::vector<std::size_t> views;
-};
-
-std::vector<Sighting> sightings_of(const std::vector<BoardView>& views) {
-  std::map<std::pair<std::size_t, std::size_t>, Sighting> by_key;
-  for (std::size_t i = 0; i < views.size(); ++i) {
-    Sighting& s = by_key[{views[i].board, views[i].view.device}];
-    s.board = views[i].board;
-    s.device = views[i].view.device;
-    s.views.push_back(i);
-  }
-  std::vector<Sighting> sightings;
-  for (auto& [key, sighting] : by_key) sightings.push_back(std::move(sighting));
-  return sightings;
-}
-
-std::optional<RigidTransform> camera_from_board(const BundleProblem& problem, const Sighting& s) {
-  std::vector<cv::Point3d> points;
-  std::vector<cv::Point2d> rays;
-  for (const std::size_t i : s.views) {
-    const BoardView& v = problem.board_views[i];
-    points.emplace_back(v.position_mm.x(), v.position_mm.y(), 0);
-    const Vec3 ray = device_ray(problem.devices[s.device], v.view.pixel);
-    rays.emplace_back(ray.x(), ray.y());
-  }
-  cv::Mat rotation_vector;
-  cv::Mat translation;
-  const cv::Mat identity = cv::Mat::eye(3, 3, CV_64F);
-  if (!cv::solvePnP(points, rays, identity, cv::noArray(), rotation_vector, translation, false,
-                    cv::SOLVEPNP_IPPE))
-    return std::nullopt;
-  cv::solvePnPRefineLM(points, rays, identity, cv::noArray(), rotation_vector, translation);
-  cv::Mat R;
-  cv::Rodrigues(rotation_vector, R);
-  RigidTransform pose;
-  cv::cv2eigen(R, pose.rotation);
-  cv::cv2eigen(translation, pose.translation);
-  if (!pose.rotation.allFinite() || !(pose.translation.z() > 0)) return std::nullopt;
-  return pose;
-}
-
-/// Sum of the squared errors of a sighting's corners.
-double misses(const BundleProblem& problem, const Sighting& s) {
-  double sum = 0;
-  for (const std::size_t i : s.views)
-    sum += corner_error(problem, problem.board_views[i]).squaredNorm();
-  return sum;
-}
-
-/// Numbers the corners from the other end: half a turn of the board, whose last corner is that of
-/// all views. A sighting may lack corners.
-void turn_round(const Sighting& s, std::vector<BoardView>& views) {
-  Vec2 last = Vec2::Zero();
-  for (const BoardView& view : views) last = last.cwiseMax(view.position_mm);
-  for (const std::size_t i : s.views) views[i].position_mm = last - views[i].position_mm;
-}
-
-/// Cameras may number the corners of one board from either end: the end that fits its pose counts.
-void agree_on_end(const Sighting& s, BundleProblem& problem) {
-  const double as_is = misses(problem, s);
-  turn_round(s, problem.board_views);
-  if (misses(problem, s) >= as_is) turn_round(s, problem.board_views);
-}
-
 /// Whether a pixel lies on the board as a sighting shows it.
 class BoardOutline {
  public:
-  BoardOutline(const std::vector<BoardView>& views, const Sighting& s) {
+  BoardOutline(const std::vector<BoardView>& views, const BoardSighting& s) {
     std::vector<cv::Point2f> corners;
     for (const std::size_t i : s.views)
       corners.emplace_back(static_cast<float>(views[i].view.pixel.x()),
@@ -127,10 +59,10 @@ struct PlanePoints {
 };
 
 std::map<std::size_t, PlanePoints> plane_points(const BundleProblem& problem,
-                                                const std::vector<Sighting>& sightings,
+                                                const std::vector<BoardSighting>& sightings,
                                                 std::size_t device) {
   std::map<std::size_t, PlanePoints> by_board;
-  for (const Sighting& s : sightings) {
+  for (const BoardSighting& s : sightings) {
     if (!problem.devices[s.device].present) continue;
     const BoardOutline outline(problem.board_views, s);
     const RigidTransform world_from_board = transform_from(problem.board_poses[s.board]);
@@ -162,10 +94,11 @@ double homography_cost(const Mat3& H, double focal, const Vec2& center) {
 }
 
 /// Focal length and lens shift that make the homographies those of planes, on a grid.
-void choose_inner(const std::vector<Mat3>& homographies, double height, BundleDevice& device) {
+void choose_inner(const std::vector<Mat3>& homographies, BundleDevice& device) {
   constexpr int kSteps = 80;
   double best = std::numeric_limits<double>::infinity();
-  const double width = 2 * device.prior[kCx] + 1;
+  const double width = device.width;
+  const double height = device.height;
   for (int i = 0; i <= kSteps; ++i) {
     const double focal = width * 0.5 * std::pow(10.0, static_cast<double>(i) / kSteps);
     for (int j = 0; j <= kSteps; ++j) {
@@ -186,12 +119,7 @@ void choose_inner(const std::vector<Mat3>& homographies, double height, BundleDe
 
 /// device_from_board.
 RigidTransform pose_from_homography(const Mat3& H, const BundleDevice& device) {
-  Mat3 K = Mat3::Identity();
-  K(0, 0) = device.inner[kFx];
-  K(1, 1) = device.inner[kFy];
-  K(0, 2) = device.inner[kCx];
-  K(1, 2) = device.inner[kCy];
-  Mat3 columns = K.inverse() * H;
+  Mat3 columns = K_of(device).inverse() * H;
   columns /= std::sqrt(columns.col(0).norm() * columns.col(1).norm());
   if (columns(2, 2) < 0) columns = -columns;
   Mat3 R;
@@ -202,7 +130,7 @@ RigidTransform pose_from_homography(const Mat3& H, const BundleDevice& device) {
   return {rotation, columns.col(2)};
 }
 
-void place_from_plane(const CalibrationInput& input, const std::vector<Sighting>& sightings,
+void place_from_plane(const CalibrationInput& input, const std::vector<BoardSighting>& sightings,
                       std::size_t d, bool is_known, BundleProblem& problem) {
   constexpr std::size_t kFewest = 12;
   std::vector<Mat3> homographies;
@@ -225,7 +153,7 @@ void place_from_plane(const CalibrationInput& input, const std::vector<Sighting>
   if (most == 0) return;
   BundleDevice& device = problem.devices[d];
   if (!is_known) {
-    choose_inner(homographies, device_at(input.rig, d).height, device);
+    choose_inner(homographies, device);
     device.prior_sigma[kFx] *= device.inner[kFx] / device.prior[kFx];
     device.prior[kFx] = device.inner[kFx];
   }
@@ -281,31 +209,9 @@ void place_by_boards(const CalibrationInput& input, const std::vector<char>& kno
                      BundleProblem& problem) {
   problem.board_views = input.board_views;
   problem.board_poses.assign(input.boards, {});
-  const std::vector<Sighting> sightings = sightings_of(problem.board_views);
-  std::vector<char> has_pose(input.boards, 0);
-  if (sightings.empty()) return;
-  has_pose[sightings.front().board] = 1;  // the world
-  for (bool is_growing = true; is_growing;) {
-    is_growing = false;
-    for (const Sighting& s : sightings) {
-      BundleDevice& device = problem.devices[s.device];
-      if (device.present == (has_pose[s.board] != 0)) continue;
-      const auto pose = camera_from_board(problem, s);
-      if (!pose) continue;
-      if (device.present) {
-        const RigidTransform camera_from_world = transform_from(device.pose);
-        problem.board_poses[s.board] = pose_from(camera_from_world.inverse() * *pose);
-        has_pose[s.board] = 1;
-      } else {
-        const RigidTransform p = *pose * transform_from(problem.board_poses[s.board]).inverse();
-        set_pose(device, p.rotation, p.translation);
-        device.present = true;
-      }
-      is_growing = true;
-    }
-  }
+  const std::vector<char> has_pose = grow_from_boards(problem);
   std::erase_if(problem.board_views, [&](const BoardView& v) { return has_pose[v.board] == 0; });
-  const std::vector<Sighting> placed = sightings_of(problem.board_views);
+  const std::vector<BoardSighting> placed = sightings_of(problem.board_views);
   for (std::size_t d = input.rig.cameras.size(); d < problem.devices.size(); ++d)
     place_from_plane(input, placed, d, known[d] != 0, problem);
 }
@@ -315,13 +221,13 @@ void attach_boards(const CalibrationInput& input, BundleProblem& problem) {
   problem.board_views = input.board_views;
   problem.board_poses.assign(input.boards, {});
   struct Seen {
-    Sighting sighting;
+    BoardSighting sighting;
     RigidTransform pose;
     std::size_t tracks = 0;
   };
   std::vector<Seen> seen;
   std::vector<double> scales;  // mm per unit of the structure
-  for (const Sighting& s : sightings_of(problem.board_views)) {
+  for (const BoardSighting& s : sightings_of(problem.board_views)) {
     const BundleDevice& device = problem.devices[s.device];
     if (!device.present) continue;
     const auto pose = camera_from_board(problem, s);
@@ -369,7 +275,7 @@ void add_projected_corners(const CalibrationInput& input, BundleProblem& problem
   for (const BoardView& v : input.projected_corners)
     if (placed.contains(v.board) && problem.devices[v.view.device].present)
       problem.board_views.push_back(v);
-  for (const Sighting& s : sightings_of(problem.board_views))
+  for (const BoardSighting& s : sightings_of(problem.board_views))
     if (s.device >= input.rig.cameras.size()) agree_on_end(s, problem);
 }
 
@@ -378,7 +284,7 @@ void rescale_to_boards(BundleProblem& problem) {
   if (problem.board_views.empty() || boards_join_devices(problem.board_views)) return;
   std::map<std::size_t, std::pair<std::size_t, RigidTransform>> in_camera;  // of boards, as found
   std::vector<double> scales;
-  for (const Sighting& s : sightings_of(problem.board_views)) {
+  for (const BoardSighting& s : sightings_of(problem.board_views)) {
     const BundleDevice& device = problem.devices[s.device];
     if (!device.present) continue;
     const RigidTransform camera_from_world = transform_from(device.pose);

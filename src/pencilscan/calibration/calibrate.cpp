@@ -291,15 +291,26 @@ class Calibration {
     result_.residuals.resize(device_count(input_.rig));
     if (!solved) return std::move(result_);
     rescale_to_boards(result_.problem);
-    const FixedFrame frame = fix_frame(input_, result_.problem);
-    result_.rig = scaled(std::move(result_.rig), frame.of_given);
-    result_.rig.unit_known = frame.is_scaled;
+    take_frame(fix_frame(input_, result_.problem));
     for (std::size_t d = 0; d < result_.placed.size(); ++d) {
       result_.placed[d] = result_.problem.devices[d].present ? 1 : 0;
       if (result_.placed[d] != 0) set_device(result_.problem.devices[d], device_at(result_.rig, d));
     }
     measure();
     return std::move(result_);
+  }
+
+  /// Volume and floor stay where the devices file has them, if its frame is that of the solution.
+  void take_frame(const FixedFrame& frame) {
+    Rig& rig = result_.rig;
+    rig = scaled(std::move(rig), frame.of_given);
+    rig.unit_known = frame.is_scaled;
+    if (frame.contradicts_given) result_.given_times = frame.of_given;
+    if (frame.is_given) return;
+    result_.has_lost_volume = rig.volume.has_value();
+    result_.has_lost_floor = rig.floor.has_value();
+    rig.volume.reset();
+    rig.floor.reset();
   }
 
   void measure() {

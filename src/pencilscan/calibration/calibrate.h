@@ -65,10 +65,15 @@ struct CalibrationResult {
   std::vector<Track> held_out;
   std::vector<PairGeometry> pairs;
   std::vector<GivenUse> given;  ///< per device: what became of its given inner parameters
-  GivenTolerance tolerance;     ///< of them
-  BundleOptions adjustment;     ///< of the last stage
-  double board_rms_px = 0;      ///< of the corners of boards; 0 without
-  double rms_px = 0;            ///< over all views of used tracks but the hubs, which are exact
+  /// What the known distance or the board makes of millimetres that given poses contradict; the
+  /// rig's volume and floor were multiplied by it.
+  std::optional<double> given_times;
+  bool has_lost_volume = false;  ///< the stated one was of a frame that too few given poses tell
+  bool has_lost_floor = false;
+  GivenTolerance tolerance;  ///< of them
+  BundleOptions adjustment;  ///< of the last stage
+  double board_rms_px = 0;   ///< of the corners of boards; 0 without
+  double rms_px = 0;         ///< over all views of used tracks but the hubs, which are exact
   double held_out_rms_px = 0;
   std::size_t views = 0;
   std::size_t views_dropped = 0;

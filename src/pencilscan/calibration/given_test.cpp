@@ -148,5 +148,16 @@ TEST_F(BeforeAWall, AToleranceOfZeroHoldsExactly) {
     EXPECT_EQ(result.rig.cameras[d].K, given.rig.cameras[d].K) << d;
 }
 
+TEST_F(BeforeAWall, TheSkewOfAGivenKIsKept) {
+  truth_.cameras[0].K(0, 1) = 15;  // seven pixels at the upper and the lower edge
+  const CalibrationInput given = input(tracks(600, 0.5, 0), true, 0);
+  const auto result = calibrate(given, {.hypotheses = 2, .tolerance = {0, 0}});
+  ASSERT_TRUE(result.solved);
+  EXPECT_EQ(result.rig.cameras[0].K, given.rig.cameras[0].K);
+  EXPECT_EQ(result.given[0], GivenUse::kExact);
+  EXPECT_LT(result.rms_px, 0.2);  // 0.1 px in each coordinate
+  EXPECT_LT(sample::projection_error(truth_, result.problem), 0.3);
+}
+
 }  // namespace
 }  // namespace pencilscan

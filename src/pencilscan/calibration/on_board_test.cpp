@@ -192,6 +192,23 @@ TEST_F(OnBoard, ABoardInASceneWithDepthGivesItsScaleFromEitherEnd) {
   EXPECT_NEAR(distance(result.rig) / distance(truth_), 1, 0.02);  // hangs on the focal lengths
 }
 
+TEST_F(OnBoard, ACameraThatJoinsLaterMayNumberAllBoardsFromTheOtherEnd) {
+  truth_.cameras.push_back(sample::device_at<Camera>({850, 80, 350}, "cam1", 1280, 960, 1600));
+  for (const auto& [y, z] : {std::pair(0.5, 0.3), std::pair(-0.4, 0.4), std::pair(0.2, -0.6)})
+    add_capture(placing(y, z));
+  input_.rig = truth_;
+  BundleProblem problem;
+  for (std::size_t d = 0; d < device_count(truth_); ++d)
+    problem.devices.push_back(bundle_device(device_at(truth_, d)));
+  problem.tracks = input_.tracks;
+  place_by_boards(input_, std::vector<char>(device_count(truth_), 1), problem);
+  ASSERT_TRUE(problem.devices[0].present && problem.devices[1].present);
+  // In the first camera's frame; a board that is half a turn off puts it hundreds of mm away.
+  const Vec3 found = transform_from(problem.devices[0].pose) * center_of(problem.devices[1]);
+  const Vec3 truth = truth_.cameras[0].device_from_world * truth_.cameras[1].center();
+  EXPECT_LT((found - truth).norm(), 10);
+}
+
 /// What one pose of a board and a wall leave nearly free moves with errors far below the noise.
 TEST_F(OnBoard, ErrorsThatNeighboursShareStayWithinTheDeviations) {
   constexpr double kSharedPx = 0.05;

@@ -3,7 +3,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <optional>
 
 #include "pencilscan/bundle/bundle_device.h"
 #include "pencilscan/core/median.h"
@@ -46,6 +46,94 @@ RigidTransform own_frame(const BundleProblem& problem, std::size_t cameras) {
   return {rotation, -(rotation * origin)};
 }
 
+/// Centres of the devices that have a pose and were given one: as found and as given.
+struct GivenCenters {
+  Eigen::Matrix3Xd found;
+  Eigen::Matrix3Xd given;
+};
+
+GivenCenters given_centers(const CalibrationInput& input, const BundleProblem& problem) {
+  GivenCenters centers;
+  for (std::size_t d = 0; d < problem.devices.size(); ++d) {
+    if (!problem.devices[d].present || !input.known[d].pose) continue;
+    const Eigen::Index at = centers.found.cols();
+    centers.found.conservativeResize(Eigen::NoChange, at + 1);
+    centers.given.conservativeResize(Eigen::NoChange, at + 1);
+    centers.found.col(at) = center_of(problem.devices[d]);
+    centers.given.col(at) = device_at(input.rig, d).center();
+  }
+  return centers;
+}
+
+struct Similarity {
+  double scale = 1;
+  RigidTransform motion;
+};
+
+Similarity similarity_of(const GivenCenters& centers) {
+  const Eigen::Matrix4d S = fit_similarity(centers.found, centers.given, true);
+  const double scale = S.block<3, 3>(0, 0).col(0).norm();
+  return {scale, {S.block<3, 3>(0, 0) / scale, S.block<3, 1>(0, 3)}};
+}
+
+/// By how much, as a logarithm, a measured scale and given poses may differ that are both right. A
+/// tape between lenses is good to some 2.5 %: nobody sees their pupils, which are centimetres deep.
+/// Poses that were measured alike err by as much. Rough ones miss the solution: the scale of n
+/// poses has the deviation of a coordinate, which 3 n - 7 surplus numbers show, over the poses'
+/// spread.
+double scale_tolerance(const GivenCenters& centers, const Similarity& given_from_found) {
+  constexpr double kMeasured = 0.05;
+  constexpr double kDeviations = 3;
+  const auto& [scale, motion] = given_from_found;
+  const Eigen::Matrix3Xd moved =
+      (scale * motion.rotation * centers.found).colwise() + motion.translation;
+  const Vec3 middle = centers.given.rowwise().mean();
+  const double misses = (moved - centers.given).norm();
+  const double spread = (centers.given.colwise() - middle).norm();
+  const double freedom = 3 * static_cast<double>(centers.given.cols()) - 7;
+  return kMeasured + kDeviations * misses / (std::sqrt(freedom) * spread);
+}
+
+/// What the known distance makes of the solution's lengths; nothing without one.
+std::optional<double> scale_by_distance(const CalibrationInput& input,
+                                        const BundleProblem& problem) {
+  if (!input.distance) return std::nullopt;
+  const BundleDevice& a = problem.devices[input.distance->a];
+  const BundleDevice& b = problem.devices[input.distance->b];
+  const double now = (center_of(a) - center_of(b)).norm();
+  if (!a.present || !b.present || !(now > 0)) return std::nullopt;
+  return input.distance->mm / now;
+}
+
+/// What makes the mean distance of the devices from the origin 1000.
+double usual_scale(const BundleProblem& problem) {
+  double sum = 0;
+  for (const BundleDevice& device : problem.devices)
+    if (device.present) sum += center_of(device).norm();
+  return sum > 0 ? 1000 * static_cast<double>(present_devices(problem)) / sum : 1;
+}
+
+/// Moves the solution to the given poses. `measured`: what the distance or the board makes of its
+/// lengths.
+FixedFrame fix_given_frame(const GivenCenters& centers, bool is_unit_known,
+                           std::optional<double> measured, BundleProblem& problem) {
+  FixedFrame frame;
+  frame.is_given = true;
+  frame.is_scaled = is_unit_known || measured;
+  const auto [scale, motion] = similarity_of(centers);
+  const double factor = measured ? *measured / scale : 1;
+  const double tolerance = scale_tolerance(centers, {scale, motion});
+  const bool goes_on = is_unit_known && !(std::abs(std::log(factor)) > tolerance);
+  // Lengths that were given in millimetres stay what they are, and the middle of the poses stays
+  // where it is. Others are in another unit, about the same origin.
+  const Vec3 fixed = goes_on ? Vec3(centers.given.rowwise().mean()) : Vec3(Vec3::Zero());
+  move_solution(factor * scale,
+                {motion.rotation, factor * motion.translation + (1 - factor) * fixed}, problem);
+  if (!goes_on) frame.of_given = factor;
+  frame.contradicts_given = is_unit_known && !goes_on;
+  return frame;
+}
+
 }  // namespace
 
 void move_solution(double scale, const RigidTransform& new_from_old, BundleProblem& problem) {
@@ -66,58 +154,16 @@ void move_solution(double scale, const RigidTransform& new_from_old, BundleProbl
 }
 
 FixedFrame fix_frame(const CalibrationInput& input, BundleProblem& problem) {
-  std::vector<Vec3> from;
-  std::vector<Vec3> to;
-  for (std::size_t d = 0; d < problem.devices.size(); ++d) {
-    if (!problem.devices[d].present || !input.known[d].pose) continue;
-    from.push_back(center_of(problem.devices[d]));
-    to.push_back(device_at(input.rig, d).center());
-  }
-  bool scaled = !problem.board_views.empty();
-  double scale = 1;
-  double of_given = 1;
-  if (from.size() >= 3) {
-    Eigen::Matrix3Xd a(3, from.size());
-    Eigen::Matrix3Xd b(3, from.size());
-    for (std::size_t i = 0; i < from.size(); ++i) {
-      a.col(static_cast<Eigen::Index>(i)) = from[i];
-      b.col(static_cast<Eigen::Index>(i)) = to[i];
-    }
-    const auto scale_of = [](const Eigen::Matrix4d& similarity) {
-      return similarity.block<3, 3>(0, 0).col(0).norm();
-    };
-    const Eigen::Matrix4d similarity = fit_similarity(a, b, !scaled);
-    const double s = scale_of(similarity);
-    move_solution(s, {similarity.block<3, 3>(0, 0) / s, similarity.block<3, 1>(0, 3)}, problem);
-    if (scaled) of_given = 1 / scale_of(fit_similarity(a, b, true));  // in a board's millimetres
-    scaled = scaled || input.rig.unit_known;
-  } else {
-    move_solution(1, own_frame(problem, input.rig.cameras.size()), problem);
-    if (!scaled) {
-      double sum = 0;
-      std::size_t count = 0;
-      for (const BundleDevice& device : problem.devices) {
-        if (!device.present) continue;
-        sum += center_of(device).norm();
-        ++count;
-      }
-      if (sum > 0) scale = 1000 * static_cast<double>(count) / sum;
-    }
-  }
-  if (input.distance) {
-    const double now = (center_of(problem.devices[input.distance->a]) -
-                        center_of(problem.devices[input.distance->b]))
-                           .norm();
-    if (now > 0 && problem.devices[input.distance->a].present &&
-        problem.devices[input.distance->b].present) {
-      scale = input.distance->mm / now;
-      scaled = true;
-    }
-  }
-  move_solution(scale, {}, problem);
-  // Lengths that were given in millimetres stay what they are.
-  const bool goes_on = from.size() >= 3 && !input.rig.unit_known;
-  return {scaled, goes_on ? of_given * scale : 1};
+  std::optional<double> measured = scale_by_distance(input, problem);
+  if (!measured && !problem.board_views.empty()) measured = 1;
+  const GivenCenters centers = given_centers(input, problem);
+  if (centers.found.cols() >= 3)
+    return fix_given_frame(centers, input.rig.unit_known, measured, problem);
+  move_solution(1, own_frame(problem, input.rig.cameras.size()), problem);
+  move_solution(measured.value_or(usual_scale(problem)), {}, problem);
+  FixedFrame frame;
+  frame.is_scaled = measured.has_value();
+  return frame;
 }
 
 }  // namespace pencilscan

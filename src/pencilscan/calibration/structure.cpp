@@ -140,7 +140,7 @@ PointViews point_views_of(const BundleProblem& problem, std::size_t d,
 bool pose_device(const PointViews& seen, const StructureOptions& options, int tries,
                  BundleDevice& device) {
   const auto rays = normalized(device, seen.pixels);
-  const double width = 2 * device.prior[kCx] + 1;
+  const double width = device.width;
   const auto tolerance = static_cast<float>(options.pose_tolerance * width / device.inner[kFx]);
   cv::Mat rotation_vector;
   cv::Mat translation;
@@ -180,8 +180,8 @@ bool resect_device(const PointViews& seen, const StructureOptions& options, Bund
   constexpr int kTries = 60;
   constexpr std::array<double, 9> kScales{0.6, 0.8, 1.0, 1.3, 1.6, 2.0, 2.5, 3.2, 4.0};
   constexpr std::array<double, 5> kShifts{0, 0.3, 0.6, -0.3, -0.6};
-  const double width = 2 * device.prior[kCx] + 1;
-  const double height = 2 * device.prior[kCy] + 1;
+  const double width = device.width;
+  const double height = device.height;
   const bool may_shift = device.prior_sigma[kCy] > 0.2 * height;
   BundleDevice best = device;
   double least = std::numeric_limits<double>::infinity();

@@ -7,6 +7,7 @@
 #include "pencilscan/calibration/given_values.h"
 #include "pencilscan/calibration/suspects.h"
 #include "pencilscan/core/formatted.h"
+#include "pencilscan/core/length_units.h"
 
 namespace pencilscan {
 namespace {
@@ -224,6 +225,33 @@ class Judge {
     if (!result_.rig.unit_known)
       add(Grade::kGood, "the scale is not known: the rig's unit is \"unknown\"",
           "give --known-distance, or a --board");
+    if (result_.given_times) judge_given_lengths(*result_.given_times);
+    judge_given_places();
+  }
+
+  /// A distance or a board against given poses, all in millimetres.
+  void judge_given_lengths(double factor) {
+    const std::string measured = input_.distance ? "known distance" : "board";
+    std::string what = "the " + measured + " and the given poses contradict each other: by the " +
+                       measured + ", lengths are " + formatted(factor, "%.3g") +
+                       " times those of t. Poses, volume and floor were multiplied by it";
+    constexpr double kUnitTolerance = 0.1;
+    // What is too short is in the larger unit.
+    const std::string too_short = factor > 1 ? "t" : "the " + measured;
+    if (const UnitFactor* unit = unit_behind_factor(std::max(factor, 1 / factor), kUnitTolerance))
+      what += "; " + too_short + " is probably in " + unit->words;
+    add(Grade::kDoubtful, what, "give the " + measured + " and t in mm");
+  }
+
+  void judge_given_places() {
+    std::string lost = result_.has_lost_volume ? "volume" : "";
+    if (result_.has_lost_floor) lost += lost.empty() ? "floor" : " and floor";
+    if (lost.empty()) return;
+    add(Grade::kGood,
+        lost +
+            " of the devices file were left out: fewer than three of its poses are known, so "
+            "the rig has a frame of its own",
+        "state them in the rig's frame, or give three poses");
   }
 
   /// A given K within its tolerance.
