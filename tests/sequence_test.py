@@ -154,6 +154,12 @@ class Sequence(unittest.TestCase):
         out = self.at("bad")
         done = run("sequence", "submit", *self.input, "--out", out, code=2)
         self.assertIn("exactly one must be given", done.stderr)
+        done = run("sequence", "submit", "--limit", "3", "--sbatch=--partition=long", *self.input,
+                   "--out", out, code=2)
+        self.assertIn("--limit has no effect here: it needs --slurm", done.stderr)
+        self.assertIn("--sbatch has no effect here: it needs --slurm", done.stderr)
+        done = run("sequence", "finish", "--out", self.at("scene"), "--rounds", "2", code=2)
+        self.assertIn("--rounds has no effect here: it needs --resubmit", done.stderr)
         run("sequence", "finish", "--out", self.at("scene"), code=2)
         run("sequence", "finish", "--out", self.at("one"), "--resubmit", code=2)
         os.makedirs(out)

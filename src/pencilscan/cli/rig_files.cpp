@@ -5,12 +5,14 @@
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <sstream>
 
 #include "pencilscan/cli/device_arguments.h"
 #include "pencilscan/core/error.h"
 #include "pencilscan/exchange/colmap_model.h"
 #include "pencilscan/exchange/opencv_file.h"
+#include "pencilscan/exchange/unheld.h"
 #include "pencilscan/io/file.h"
 #include "pencilscan/io/image.h"
 #include "pencilscan/labeling/point_file.h"
@@ -56,6 +58,7 @@ void read_opencv_argument(const std::string& text, ExchangedRig& rig) {
 
 /// NAME=WIDTHxHEIGHT for devices whose file lacks it.
 void set_sizes(const std::vector<std::string>& sizes, ExchangedRig& rig) {
+  std::set<std::string> names;
   for (const std::string& text : sizes) {
     const auto equals = text.rfind('=');
     int width = 0;
@@ -65,16 +68,10 @@ void set_sizes(const std::vector<std::string>& sizes, ExchangedRig& rig) {
     if (std::sscanf(value.c_str(), "%dx%d%n", &width, &height, &used) != 2 ||
         static_cast<std::size_t>(used) != value.size() || width < 1 || height < 1)
       throw InputError("command line", "--size", text, "must be NAME=WIDTHxHEIGHT in px");
-    bool is_there = false;
-    for (ExchangedDevice& d : rig.devices) {
-      if (d.device.name != text.substr(0, equals)) continue;
-      is_there = true;
-      if (d.device.width > 0) continue;
-      d.device.width = width;
-      d.device.height = height;
-    }
-    if (!is_there)
-      throw InputError("command line", "--size", text, "there is no device of this name");
+    const std::string name = text.substr(0, equals);
+    if (!names.insert(name).second)
+      throw InputError("command line", "--size", text, "must be given once for a device");
+    state_size(name, width, height, rig);
   }
 }
 
@@ -89,6 +86,14 @@ void mark_projectors(const std::vector<std::string>& names, ExchangedRig& rig) {
                      std::find(names.begin(), names.end(), d.device.name) != names.end();
 }
 
+std::optional<StatedDistance> stated_distance(const std::vector<std::string>& words) {
+  if (words.empty()) return std::nullopt;
+  const auto mm = positive_number(words[2]);
+  if (!mm)
+    throw InputError("command line", "--known-distance", words[2], "must be a distance > 0 in mm");
+  return StatedDistance{words[0], words[1], *mm};
+}
+
 ExchangeOptions exchange_options(const ImportCommand& command) {
   ExchangeOptions options;
   // Reconstructions from pictures have no scale of their own.
@@ -97,16 +102,25 @@ ExchangeOptions exchange_options(const ImportCommand& command) {
   options.unit_known = unit != "unknown";
   if (unit == "cm") options.mm_per_unit = 10;
   if (unit == "m") options.mm_per_unit = 1000;
+  options.known_distance = stated_distance(command.known_distance);
   return options;
 }
 
-void apply_known_distance(const std::vector<std::string>& words, UncalibratedRig& rig) {
-  if (words.empty()) return;
-  const auto mm = positive_number(words[2]);
-  if (!mm)
-    throw InputError("command line", "--known-distance", words[2], "must be a distance > 0 in mm");
-  scale_rig(words[0], words[1], *mm, rig);
+std::set<std::string> names_of(const ExchangedRig& files) {
+  std::set<std::string> names;
+  for (const ExchangedDevice& d : files.devices) names.insert(d.device.name);
+  return names;
 }
+
+/// The rig without the devices that other files describe.
+Rig only_these(const std::set<std::string>& names, Rig rig) {
+  const auto is_other = [&](const Device& d) { return !names.contains(d.name); };
+  std::erase_if(rig.cameras, is_other);
+  std::erase_if(rig.projectors, is_other);
+  return rig;
+}
+
+void note(const std::string& text) { std::cerr << "note: " << text << "\n"; }
 
 /// What is still missing, for people.
 std::string missing_values(const UncalibratedRig& rig) {
@@ -134,17 +148,19 @@ void run_import(const ImportCommand& command) {
   mark_projectors(command.projectors, files);
   UncalibratedRig base;
   if (!command.base.empty()) base = read_devices(command.base);
-  UncalibratedRig rig = join_rig(std::move(files), base, exchange_options(command));
+  const std::set<std::string> names = names_of(files);
+  const JoinedRig rig = join_rig(std::move(files), base, exchange_options(command));
   if (rig.rig.cameras.empty() || rig.rig.projectors.empty())
     throw InputError("command line", "--projector", rig.rig.cameras.empty() ? "no camera" : "none",
                      "a rig has a camera and a projector: name the projectors among the files, or "
                      "give the other devices with --base");
-  apply_known_distance(command.known_distance, rig);
   write_devices(rig, command.out);
+  for (const std::string& text : rig.notes) note(text);
+  for (const std::string& text : rig.warnings) warn_of(text);
   const std::string missing = missing_values(rig);
   if (!missing.empty())
-    std::cerr << "note: " << missing << ": the file is for calibrate --devices, no rig yet\n";
-  else if (const auto warning = pose_unit_warning(rig.rig))
+    note(missing + ": the file is for calibrate --devices, no rig yet");
+  else if (const auto warning = pose_unit_warning(only_these(names, rig.rig)))
     warn_of(*warning + ": --unit says what the files are in");
   print_figures(command.common, {{"rig", command.out},
                                  {"cameras", rig.rig.cameras.size()},
@@ -176,7 +192,8 @@ void add_import(CLI::App& group) {
       ->check(one_of({"mm", "cm", "m", "unknown"}));
   command
       ->add_option("--known-distance", options->known_distance,
-                   "Two devices and the distance of their centres in mm: cam0 cam1 850")
+                   "Two devices of the files and the distance of their centres in mm: cam0 cam1 "
+                   "850")
       ->expected(3);
   add_common_options(*command, options->common,
                      "pencilscan rig import --opencv cam0,proj0=stereo.yml --size cam0=1280x960 "
@@ -222,11 +239,35 @@ std::size_t export_opencv(const ExportCommand& command, const Rig& rig) {
   return command.stereo.empty() ? device_count(rig) : command.stereo.size();
 }
 
+/// What the files cannot hold, and what an import of them has to be told.
+void tell_what_is_lost(const ExportCommand& command, const Rig& rig) {
+  const bool is_stereo = !command.stereo.empty();
+  std::string lost;
+  for (const std::string& key : unheld_values(rig)) lost += (lost.empty() ? "" : ", ") + key;
+  if (is_stereo) lost += std::string(lost.empty() ? "" : ", ") + "R and t in the rig's world";
+  const std::string format = command.opencv.empty() ? "COLMAP" : "OpenCV";
+  if (!lost.empty())
+    note(format + " files do not hold " + lost + ": rig import --base " + command.rig_path +
+         " puts them back");
+  if (!command.opencv.empty() && !rig.unit_known)
+    warn_of(
+        "the rig's unit is unknown, and T of OpenCV files is read as mm: give rig import "
+        "--unit unknown");
+  if (!command.colmap.empty() && rig.unit_known)
+    note("COLMAP files do not hold the unit: give rig import --unit mm");
+  for (const Projector& p : rig.projectors)
+    if (!p.name.starts_with("proj") &&
+        (!is_stereo || std::count(command.stereo.begin(), command.stereo.end(), p.name) > 0))
+      note("the files do not say that " + p.name + " is a projector: give rig import --projector " +
+           p.name);
+}
+
 void run_export(const ExportCommand& command) {
   const Rig rig = read_rig(command.rig_path);
   if (command.opencv.empty() == command.colmap.empty())
     throw InputError("command line", "--opencv, --colmap", "", "exactly one of them is needed");
   std::size_t devices = device_count(rig);
+  require_distinct_names(rig);
   if (!command.opencv.empty()) {
     devices = export_opencv(command, rig);
   } else {
@@ -235,7 +276,11 @@ void run_export(const ExportCommand& command) {
     std::vector<MeasuredPoint> points;
     if (!command.points.empty()) points = read_points(command.points);
     write_colmap(rig, points, command.colmap);
+    if (points.size() > kMostColmapPoints)
+      note("points3D.txt holds " + std::to_string(kMostColmapPoints) + " of " +
+           std::to_string(points.size()) + " points, evenly picked");
   }
+  tell_what_is_lost(command, rig);
   print_figures(
       command.common,
       {{"folder", command.opencv.empty() ? command.colmap : command.opencv}, {"devices", devices}});

@@ -210,7 +210,12 @@ void add_submit(CLI::App& group) {
                    "Machines that see the same folders, with commas; one task each at a time")
       ->delimiter(',');
   command->add_flag("--slurm", options->slurm, "An array of jobs and one that finishes");
+  const auto of_slurm = [options](const char* option) {
+    return told_where_not(
+        option, [options] { return options->slurm; }, "needs --slurm");
+  };
   command->add_option("--limit", options->limit, "Tasks of Slurm at once; 0: as many as it likes")
+      ->check(of_slurm("--limit"))
       ->capture_default_str();
   command
       ->add_option("--max-tasks", options->max_tasks,
@@ -223,8 +228,10 @@ void add_submit(CLI::App& group) {
                    "How often a task that was killed is started again")
       ->check(between(0, 100))
       ->capture_default_str();
-  command->add_option("--sbatch", options->sbatch,
-                      "A further option for sbatch, such as --sbatch=--partition=long");
+  command
+      ->add_option("--sbatch", options->sbatch,
+                   "A further option for sbatch, such as --sbatch=--partition=long")
+      ->check(of_slurm("--sbatch"));
   add_reconstruct_options(*command, options->reconstruct);
   add_common_options(*command, options->reconstruct.common,
                      "pencilscan sequence submit --local 2 --rig rig.json --frames "
@@ -268,6 +275,8 @@ void run_finish(const FinishCommand& command) {
       tasks_with_holes(summarize_sequence(command.out), job.tasks);
   if (tasks.empty()) return report_sequence(command.common, command.out);
   if (job.kind == JobKind::kSlurm) return hand_to_slurm(command.common, job, tasks, command.rounds);
+  if (command.rounds > 0)
+    warn_of("--rounds has no effect here: it needs a job that was submitted with --slurm");
   run_here(job, tasks, interruption);
   report_sequence(command.common, command.out);
 }
@@ -283,6 +292,8 @@ void add_finish(CLI::App& group) {
       ->add_option("--rounds", options->rounds,
                    "Slurm: how often the job that finishes may itself resubmit")
       ->check(between(0, 100))
+      ->check(told_where_not(
+          "--rounds", [options] { return options->resubmit; }, "needs --resubmit"))
       ->capture_default_str();
   add_common_options(*command, options->common, "pencilscan sequence finish --out result");
   command->callback([options] { run_finish(*options); });

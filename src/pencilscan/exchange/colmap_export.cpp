@@ -5,6 +5,7 @@
 
 #include "pencilscan/core/error.h"
 #include "pencilscan/exchange/colmap_model.h"
+#include "pencilscan/exchange/unheld.h"
 #include "pencilscan/io/file.h"
 
 namespace pencilscan {
@@ -56,6 +57,7 @@ std::vector<MeasuredPoint> evenly_picked(std::span<const MeasuredPoint> points, 
 
 void write_colmap(const Rig& rig, std::span<const MeasuredPoint> points,
                   const std::filesystem::path& folder, std::size_t most_points) {
+  require_distinct_names(rig);
   std::vector<const Device*> devices;
   for (const Camera& camera : rig.cameras) devices.push_back(&camera);
   for (const Projector& projector : rig.projectors) devices.push_back(&projector);

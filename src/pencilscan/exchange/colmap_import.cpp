@@ -137,9 +137,12 @@ ExchangedRig read_colmap(const std::filesystem::path& folder) {
                      "must be a text model: colmap model_converter --output_type TXT");
   std::map<int, ExchangedDevice> cameras;
   ModelFile camera_file(folder / "cameras.txt");
-  while (camera_file.next())
-    cameras[camera_file.whole(0, 0, kMostIds)] = parse_camera_line(camera_file);
+  while (camera_file.next()) {
+    if (!cameras.emplace(camera_file.whole(0, 0, kMostIds), parse_camera_line(camera_file)).second)
+      camera_file.fail(camera_file.words().front(), "cameras must differ in their CAMERA_ID");
+  }
   ExchangedRig rig;
+  rig.world_is_arbitrary = true;
   std::set<std::string> names;
   const std::filesystem::path images = folder / "images.txt";
   ModelFile file(images);

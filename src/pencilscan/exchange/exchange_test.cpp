@@ -344,26 +344,14 @@ TEST_F(Exchange, OtherColmapModelsAndBadLines) {
   expect_bad(read, "must be a camera of cameras.txt");
   write("cameras.txt", "7 PINHOLE 100 80 90 90 50 nan\n");
   expect_bad(read, "must be a number");
+  write("cameras.txt", "7 PINHOLE 100 80 90 90 50 40\n7 PINHOLE 100 80 91 91 50 40\n");
+  expect_bad(read, "line 2 = 7: cameras must differ in their CAMERA_ID");
   rig_.cameras[0].name = "front camera";
   expect_bad([&] { write_colmap(rig_, {}, folder_); }, "front camera");
   rig_.cameras[0].name = "cam0";
   rig_.cameras[0].K(0, 1) = 2;
   expect_bad([&] { write_colmap(rig_, {}, folder_); }, "skew");
   expect_bad([&] { (void)opencv_text(rig_.cameras[0], OpencvSyntax::kXml); }, "skew");
-}
-
-TEST_F(Exchange, KnownDistanceGivesTheScale) {
-  write_colmap(rig_, {}, folder_);
-  ExchangeOptions options;
-  options.unit_known = false;
-  UncalibratedRig rig = joined(read_colmap(folder_), options);
-  EXPECT_FALSE(rig.rig.unit_known);
-  rig.rig.floor = Floor{2 * rig.rig.cameras[0].center()};
-  scale_rig("cam0", "proj1", 321, rig);
-  EXPECT_TRUE(rig.rig.unit_known);
-  EXPECT_LT((rig.rig.floor->point - 2 * rig.rig.cameras[0].center()).norm(), 1e-9);
-  EXPECT_NEAR((rig.rig.cameras[0].center() - rig.rig.projectors[1].center()).norm(), 321, 1e-9);
-  expect_bad([&] { scale_rig("cam0", "nobody", 1, rig); }, "nobody");
 }
 
 }  // namespace

@@ -4,82 +4,11 @@
 #include <cstdio>
 
 #include "pencilscan/core/error.h"
-#include "pencilscan/rig/device_list.h"
+#include "pencilscan/exchange/base_world.h"
+#include "pencilscan/exchange/merged_files.h"
 
 namespace pencilscan {
 namespace {
-
-ExchangedDevice* find_device(std::vector<ExchangedDevice>& devices, const std::string& name) {
-  const auto at = std::find_if(devices.begin(), devices.end(),
-                               [&](const ExchangedDevice& d) { return d.device.name == name; });
-  return at == devices.end() ? nullptr : &*at;
-}
-
-/// Several descriptions of one device become one.
-std::vector<ExchangedDevice> merged(std::vector<ExchangedDevice> described) {
-  std::vector<ExchangedDevice> devices;
-  for (ExchangedDevice& next : described) {
-    ExchangedDevice* known = find_device(devices, next.device.name);
-    if (known == nullptr) {
-      devices.push_back(std::move(next));
-      continue;
-    }
-    if (known->device.width == 0) {
-      known->device.width = next.device.width;
-      known->device.height = next.device.height;
-    }
-    // A lens belongs to its K.
-    if (!known->given.K && next.given.K) {
-      known->device.K = next.device.K;
-      known->device.distortion = next.device.distortion;
-      known->given.K = true;
-      known->given.distortion = next.given.distortion;
-      known->lens = next.lens;
-    }
-    if (!known->given.pose && next.given.pose) {
-      known->device.device_from_world = next.device.device_from_world;
-      known->given.pose = true;
-    }
-    known->is_projector = known->is_projector || next.is_projector;
-  }
-  return devices;
-}
-
-/// Devices of pairs whose pose only the base knows.
-void adopt_poses(const UncalibratedRig& base, double mm_per_unit,
-                 std::vector<ExchangedDevice>& devices) {
-  for (std::size_t d = 0; d < device_count(base.rig); ++d) {
-    const Device& from = device_at(base.rig, d);
-    ExchangedDevice* known = find_device(devices, from.name);
-    if (known == nullptr || known->given.pose || !base.given[d].pose) continue;
-    known->device.device_from_world = from.device_from_world;
-    known->device.device_from_world.translation /= mm_per_unit;
-    known->given.pose = true;
-  }
-}
-
-/// Poses follow from each other along the pairs.
-void place(const std::vector<RelativePose>& relative, std::vector<ExchangedDevice>& devices) {
-  if (relative.empty()) return;
-  const bool is_any_placed = std::any_of(devices.begin(), devices.end(),
-                                         [](const ExchangedDevice& d) { return d.given.pose; });
-  if (!is_any_placed) find_device(devices, relative.front().first)->given.pose = true;
-  for (bool is_growing = true; is_growing;) {
-    is_growing = false;
-    for (const RelativePose& pair : relative) {
-      ExchangedDevice* first = find_device(devices, pair.first);
-      ExchangedDevice* second = find_device(devices, pair.second);
-      if (first->given.pose == second->given.pose) continue;
-      const RigidTransform& step = pair.second_from_first;
-      if (first->given.pose)
-        second->device.device_from_world = step * first->device.device_from_world;
-      else
-        first->device.device_from_world = step.inverse() * second->device.device_from_world;
-      first->given.pose = second->given.pose = true;
-      is_growing = true;
-    }
-  }
-}
 
 void adopt_lens(const ExchangeOptions& options, ExchangedDevice& d) {
   if (!d.lens) return;
@@ -96,8 +25,7 @@ void adopt_lens(const ExchangeOptions& options, ExchangedDevice& d) {
 }
 
 /// Calibration only: a name, patterns and colours stay.
-void take_over(const ExchangedDevice& from, const ExchangeOptions& options, Device& device,
-               GivenCalibration& given) {
+void take_over(const ExchangedDevice& from, Device& device, GivenCalibration& given) {
   if (from.given.K) {
     device.K = from.device.K;
     device.distortion = from.device.distortion;
@@ -106,22 +34,57 @@ void take_over(const ExchangedDevice& from, const ExchangeOptions& options, Devi
   }
   if (from.given.pose) {
     device.device_from_world = from.device.device_from_world;
-    device.device_from_world.translation *= options.mm_per_unit;
     given.pose = true;
+  }
+}
+
+/// What files contradict each other in, after their lengths have a unit.
+void tell_conflicts(const MergedFiles& merged, const BasePlacement& placement,
+                    std::vector<std::string>& warnings) {
+  const std::string unit = placement.unit_known ? "mm" : "units";
+  for (PoseConflict conflict : merged.conflicts) {
+    conflict.difference.shift *= placement.mm_per_unit;
+    warnings.push_back(
+        conflict.source + " has " + conflict.device + ", seen from " + conflict.seen_from + ", " +
+        difference_text(conflict.difference, unit) + " from where " + conflict.used +
+        (conflict.used == "the other files" ? " have" : " has") + " it, which is used");
   }
 }
 
 }  // namespace
 
-UncalibratedRig join_rig(ExchangedRig files, const UncalibratedRig& base,
-                         const ExchangeOptions& options) {
-  std::vector<ExchangedDevice> devices = merged(std::move(files.devices));
-  const bool is_any_placed =
-      !files.relative.empty() || std::any_of(devices.begin(), devices.end(),
-                                             [](const ExchangedDevice& d) { return d.given.pose; });
-  adopt_poses(base, options.mm_per_unit, devices);
-  place(files.relative, devices);
-  UncalibratedRig result = base;
+void state_size(const std::string& name, int width, int height, ExchangedRig& rig) {
+  const std::string text = name + "=" + std::to_string(width) + "x" + std::to_string(height);
+  bool is_there = false;
+  for (const ExchangedDevice& d : rig.devices) {
+    if (d.device.name != name) continue;
+    is_there = true;
+    if (d.device.width > 0 && (d.device.width != width || d.device.height != height))
+      throw InputError("command line", "--size", text,
+                       "must be that of " + d.source + ", " + std::to_string(d.device.width) + "x" +
+                           std::to_string(d.device.height));
+  }
+  if (!is_there)
+    throw InputError("command line", "--size", text, "there is no device of this name");
+  for (ExchangedDevice& d : rig.devices) {
+    if (d.device.name != name) continue;
+    d.device.width = width;
+    d.device.height = height;
+  }
+}
+
+JoinedRig join_rig(ExchangedRig files, const UncalibratedRig& base,
+                   const ExchangeOptions& options) {
+  const bool world_is_arbitrary = files.world_is_arbitrary;
+  MergedFiles merged = merge_files(std::move(files), options);
+  JoinedRig result;
+  static_cast<UncalibratedRig&>(result) = base;
+  BasePlacement placement = lay_into_base(world_is_arbitrary, options, merged, result);
+  result.notes = std::move(placement.notes);
+  result.warnings = std::move(merged.warnings);
+  tell_conflicts(merged, placement, result.warnings);
+  result.warnings.insert(result.warnings.end(), placement.warnings.begin(),
+                         placement.warnings.end());
   const auto cameras_of_base = static_cast<std::ptrdiff_t>(base.rig.cameras.size());
   std::vector<GivenCalibration> cameras(base.given.begin(), base.given.begin() + cameras_of_base);
   std::vector<GivenCalibration> projectors(base.given.begin() + cameras_of_base, base.given.end());
@@ -149,9 +112,9 @@ UncalibratedRig join_rig(ExchangedRig files, const UncalibratedRig& base,
                        "must be that of --base, " + std::to_string(at->width) + " x " +
                            std::to_string(at->height));
     adopt_lens(options, d);
-    take_over(d, options, *at, given[static_cast<std::size_t>(at - list.begin())]);
+    take_over(d, *at, given[static_cast<std::size_t>(at - list.begin())]);
   };
-  for (ExchangedDevice& d : devices) {
+  for (ExchangedDevice& d : merged.devices) {
     const auto& old = base.rig.projectors;
     const bool is_old_projector = std::any_of(
         old.begin(), old.end(), [&](const Projector& p) { return p.name == d.device.name; });
@@ -162,23 +125,8 @@ UncalibratedRig join_rig(ExchangedRig files, const UncalibratedRig& base,
   }
   result.given = cameras;
   result.given.insert(result.given.end(), projectors.begin(), projectors.end());
-  if (is_any_placed) result.rig.unit_known = options.unit_known;
+  if (placement.is_any_placed) result.rig.unit_known = placement.unit_known;
   return result;
-}
-
-void scale_rig(const std::string& first, const std::string& second, double mm,
-               UncalibratedRig& rig) {
-  const auto center_of_device = [&](const std::string& name) {
-    for (std::size_t d = 0; d < device_count(rig.rig); ++d)
-      if (device_at(rig.rig, d).name == name && rig.given[d].pose)
-        return device_at(rig.rig, d).center();
-    throw InputError("command line", "--known-distance", name, "must be a device with a pose");
-  };
-  const double now = (center_of_device(first) - center_of_device(second)).norm();
-  if (!(now > 0))
-    throw InputError("command line", "--known-distance", second, "must not stand at " + first);
-  rig.rig = scaled(std::move(rig.rig), mm / now);
-  rig.rig.unit_known = true;
 }
 
 }  // namespace pencilscan

@@ -1,3 +1,4 @@
+#include <Eigen/Core>
 #include <opencv2/core.hpp>
 #include <opencv2/core/eigen.hpp>
 

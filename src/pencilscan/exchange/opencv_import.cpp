@@ -1,3 +1,4 @@
+#include <Eigen/Core>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -249,7 +250,8 @@ bool read_stereo(const OpencvReader& file, ExchangedRig& rig) {
       file.read_size({keys.is_projector ? "proj_width" : "image_width"},
                      {keys.is_projector ? "proj_height" : "image_height"}, sizes, d.device);
     }
-    if (const auto step = read_step(file)) rig.relative.push_back({names[0], names[1], *step});
+    if (const auto step = read_step(file))
+      rig.relative.push_back({names[0], names[1], *step, file.path()});
     return true;
   }
   return false;
@@ -303,7 +305,7 @@ bool read_extrinsics(const OpencvReader& file, const std::vector<std::string>& n
     d.source = file.path();
     d.device.name = name;
   }
-  rig.relative.push_back({names[0], names[1], *step});
+  rig.relative.push_back({names[0], names[1], *step, file.path()});
   return true;
 }
 
