@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <span>
 
 #include "pencilscan/core/lanes.h"
 #include "pencilscan/core/median.h"
@@ -184,22 +185,41 @@ Eigen::Vector3f color_vector(const PatternColor& color) {
   return {static_cast<float>(rgb[0]), static_cast<float>(rgb[1]), static_cast<float>(rgb[2])};
 }
 
-/// Median over points of channel / presence amplitude, among points where it exceeds half of what
-/// the colour says: how bright each channel is on this object in this camera.
+/// The colour of a family whose direction a measured one has most.
+std::size_t nearest_color(const Eigen::Vector3f& rgb, std::span<const Eigen::Vector3f> colors) {
+  const auto likeness = [&](std::size_t j) { return rgb.dot(colors[j]) / colors[j].norm(); };
+  std::size_t best = 0;
+  for (std::size_t j = 1; j < colors.size(); ++j)
+    if (likeness(j) > likeness(best)) best = j;
+  return best;
+}
+
+/// How bright each channel is on this object in this camera, of what the colours say: medians over
+/// the points of those colours that have the channel. Which colour a point has follows from the
+/// gains, and the gains from the colours, in turns.
 Eigen::Vector3f channel_gains(const std::vector<std::vector<ColorAmplitude>>& amplitudes,
-                              const std::vector<const Curve*>& curves, const Vec3& presence) {
+                              const Vec3& presence, std::span<const Eigen::Vector3f> colors) {
+  constexpr int kTurns = 3;
+  constexpr std::size_t kEnough = 100;
+  const Eigen::Vector3f detects = presence.cast<float>();
   Eigen::Vector3f gains(1, 1, 1);
-  for (int c = 0; c < 3; ++c) {
-    std::vector<float> ratios;
-    for (std::size_t k = 0; k < curves.size(); ++k) {
-      for (std::size_t i = 0; i < amplitudes[k].size(); ++i) {
-        const Eigen::Vector3f& rgb = amplitudes[k][i].rgb;
-        const float own = static_cast<float>(presence.dot(rgb.cast<double>()));
-        if (own > 0 && rgb[c] > 0.5F * own && rgb[c] < 3 * own) ratios.push_back(rgb[c] / own);
+  for (int turn = 0; turn < kTurns; ++turn) {
+    std::array<std::vector<float>, 3> ratios;
+    for (const auto& of_curve : amplitudes) {
+      for (const ColorAmplitude& a : of_curve) {
+        const float own = detects.dot(a.rgb);
+        if (!(own > 0)) continue;
+        const Eigen::Vector3f& color = colors[nearest_color(a.rgb.cwiseQuotient(gains), colors)];
+        for (Eigen::Index c = 0; c < 3; ++c) {
+          const float ratio = a.rgb[c] * detects.dot(color) / (own * color[c]);
+          if (color[c] > 0 && ratio > 0) ratios[static_cast<std::size_t>(c)].push_back(ratio);
+        }
       }
     }
-    if (ratios.size() < 100) continue;
-    gains[c] = upper_median(std::move(ratios));
+    for (std::size_t c = 0; c < 3; ++c) {
+      if (ratios[c].size() >= kEnough)
+        gains[static_cast<Eigen::Index>(c)] = upper_median(std::move(ratios[c]));
+    }
   }
   return gains;
 }
@@ -231,16 +251,14 @@ void measure_code(const cv::Mat& unmixed_image, const std::vector<ColorFamily>& 
     for (std::size_t g = 0; g < families.size(); ++g) {
       if (g != f) others += models[g];
     }
-    std::vector<const Curve*> own;
     std::vector<std::vector<ColorAmplitude>> amplitudes;
     for (const Curve& c : curves) {
       if (c.family != static_cast<int>(f)) continue;
-      own.push_back(&c);
       amplitudes.push_back(color_amplitudes({unmixed_image, others}, c, options.half_arc));
     }
-    const Eigen::Vector3f gains = channel_gains(amplitudes, own, family.presence);
     std::vector<Eigen::Vector3f> colors;
     for (const PatternColor& color : family.colors) colors.push_back(color_vector(color));
+    const Eigen::Vector3f gains = channel_gains(amplitudes, family.presence, colors);
     std::size_t k = 0;
     for (Curve& curve : curves) {
       if (curve.family != static_cast<int>(f)) continue;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 #include <opencv2/imgproc.hpp>
+#include <span>
 #include <vector>
 
 #include "pencilscan/core/random.h"
@@ -303,6 +304,38 @@ TEST(DetectCurves, CodeTellsBlueFromCyanUnderCrossingLines) {
   }
   ASSERT_GT(all, 700U);
   EXPECT_GT(static_cast<double>(right), 0.97 * static_cast<double>(all));
+}
+
+TEST(DetectCurves, ShadesAreToldApartThoughTheCameraSeesOneChannelBrighter) {
+  const std::vector<PatternColor> shades = {"blue", PatternColor(Rgb{0, 0.5, 1}), "cyan"};
+  const int shade_of[] = {0, 1, 2, 1, 1, 2, 0, 1};  // the middle one most often
+  for (const float green : {0.75F, 1.0F, 1.15F, 1.3F}) {
+    Rig rig = two_color_rig(150, 125);
+    rig.projectors.pop_back();
+    rig.projectors[0].patterns[0].colors = shades;
+    std::vector<TestLine> lines;
+    for (int i = 0; i < 8; ++i) {
+      const float level = green * 0.5F * static_cast<float>(shade_of[i]);
+      lines.push_back({16.0 + 16 * i, 0, 1.5708, 4, 1e9, {0, level, 1}});
+    }
+    const CameraDetection found =
+        detect_curves(rig.cameras[0], rig, color_families(rig), draw(lines, 150, 125, 0.01));
+    std::size_t right = 0;
+    std::size_t all = 0;
+    for (const Curve& curve : found.curves) {
+      for (std::size_t i = 0; i < curve.points.size(); ++i) {
+        const auto line = static_cast<int>(std::lround((curve.points[i].position.x() - 16) / 16));
+        const auto code = std::span(curve.code).subspan(3 * i, 3);
+        const auto best = std::max_element(code.begin(), code.end()) - code.begin();
+        const auto& families = color_families(rig);
+        const PatternColor& said = families[0].colors[static_cast<std::size_t>(best)];
+        ++all;
+        right += line >= 0 && line < 8 && said == shades[static_cast<std::size_t>(shade_of[line])];
+      }
+    }
+    ASSERT_GT(all, 700U);
+    EXPECT_GT(static_cast<double>(right), 0.97 * static_cast<double>(all)) << green;
+  }
 }
 
 TEST(EstimateUnmixing, FindsTheCrosstalkThatTheRigDoesNotState) {

@@ -27,8 +27,10 @@ CurveDirection direction(const Camera& camera, std::span<const CurvePoint> point
 
 }  // namespace
 
-PieceGraph cut_into_pieces(const Camera& camera, const GridGraph& graph, int length) {
+PieceGraph cut_into_pieces(const Camera& camera, const GridGraph& graph, int length,
+                           double spacing_px) {
   PieceGraph result;
+  result.spacing_px = spacing_px;
   const auto pixel_size = static_cast<float>(1 / camera.focal_px());
   std::vector<int> first_piece;
   for (std::size_t c = 0; c < graph.curves.size(); ++c) {

@@ -37,10 +37,13 @@ struct PieceGraph {
   std::vector<CurvePiece> pieces;
   std::vector<PieceCrossing> crossings;
   std::vector<std::pair<int, int>> continuations;  ///< consecutive pieces of one curve
+  double spacing_px = 0;                           ///< of the lines in this camera, > 0
 };
 
-/// Cuts the curves of one camera into pieces of at most `length` points.
-[[nodiscard]] PieceGraph cut_into_pieces(const Camera& camera, const GridGraph& graph, int length);
+/// Cuts the curves of one camera into pieces of at most `length` points. `spacing_px`: of the lines
+/// there.
+[[nodiscard]] PieceGraph cut_into_pieces(const Camera& camera, const GridGraph& graph, int length,
+                                         double spacing_px);
 
 /// Per piece, 1 where it crosses another.
 [[nodiscard]] std::vector<char> crossed_pieces(const PieceGraph& graph);

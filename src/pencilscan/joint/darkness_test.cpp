@@ -45,7 +45,7 @@ struct LitSquare {
     }
     graph.lit = lit_cells(rig, c, graph.curves, {&presence, 1});
     LabelledPieces& own = pieces.emplace_back();
-    own.graph = cut_into_pieces(camera, graph, 12);
+    own.graph = cut_into_pieces(camera, graph, 12, 10);
     for (std::size_t p = 0; p < own.graph.pieces.size(); ++p) {
       own.labels.push_back({label_at(camera, 0), label_at(camera, kInFront)});
       own.scores.push_back({0, 9});

@@ -51,8 +51,12 @@ LineSheets::LineSheets(const Rig& rig, const Camera& camera, PatternRef ref) {
   extent_px_ =
       static_cast<float>(pattern.axis == Axis::kColumn ? projector.height : projector.width);
   constexpr float kPartPx = 64;
-  if (projector.has_distortion())
+  along_axis_ = pattern.axis == Axis::kColumn ? 1 : 0;
+  if (projector.has_distortion()) {
+    bent_ = projector;
+    bent_->device_from_world = projector.device_from_world * camera.device_from_world.inverse();
     parts_ = std::max(1, static_cast<int>(std::lround(extent_px_ / kPartPx)));
+  }
   part_size_px_ = extent_px_ / static_cast<float>(parts_);
   const RigidTransform projector_from_camera =
       projector.device_from_world * camera.device_from_world.inverse();
@@ -85,7 +89,7 @@ LineSheets::LineSheets(const Rig& rig, const Camera& camera, PatternRef ref) {
   Eigen::Matrix<double, 3, 4> P;
   P.leftCols<3>() = projector.K * projector_from_camera.rotation;
   P.col(3) = projector.K * t;
-  along_ = P.row(pattern.axis == Axis::kColumn ? 1 : 0).transpose().cast<float>();
+  along_ = P.row(along_axis_).transpose().cast<float>();
   along_scale_ = P.row(2).transpose().cast<float>();
 }
 
@@ -101,24 +105,29 @@ void LineSheets::candidates(const Eigen::Vector2f& normalized, float w_low, floa
   while (!lines.empty() && lines.back() >= line_count_) lines.pop_back();
 }
 
+float LineSheets::along(const Eigen::Vector3f& ray, float w) const {
+  if (!bent_) {
+    const Eigen::Vector4f x(ray.x(), ray.y(), ray.z(), w);
+    return along_.dot(x) / along_scale_.dot(x);
+  }
+  const auto pixel = bent_->project((ray / w).cast<double>());
+  return pixel ? static_cast<float>((*pixel)[along_axis_]) : -1.F;
+}
+
 bool LineSheets::find(int line, const Eigen::Vector2f& normalized, float w_low, float w_high,
                       Sheet& sheet) const {
   const Eigen::Vector3f ray(normalized.x(), normalized.y(), 1);
   std::size_t at = index(line, parts_ / 2);
   float w = q_[at].dot(ray);
-  const auto position = [&] {
-    const Eigen::Vector4f x(ray.x(), ray.y(), 1, w);
-    return along_.dot(x) / along_scale_.dot(x);
-  };
   if (parts_ > 1) {
     const auto part = static_cast<int>(
-        std::clamp(position() / part_size_px_, 0.F, static_cast<float>(parts_ - 1)));
+        std::clamp(along(ray, w) / part_size_px_, 0.F, static_cast<float>(parts_ - 1)));
     at = index(line, part);
     w = q_[at].dot(ray);
   }
   if (!(w >= w_low && w <= w_high)) return false;
-  const float along = position();
-  if (!(along > -0.5F && along < extent_px_ - 0.5F)) return false;
+  const float at_px = along(ray, w);
+  if (!(at_px > -0.5F && at_px < extent_px_ - 0.5F)) return false;
   sheet.q = q_[at];
   sheet.inverse_depth_per_px = std::abs(q_slope_[at].dot(ray));
   return true;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <vector>
 
 #include "pencilscan/rig/rig.h"
@@ -45,10 +46,16 @@ class LineSheets {
   /// The middle parts' q by component, eight lines together.
   std::vector<std::array<std::array<float, 8>, 3>> middle_;
   std::vector<Eigen::Vector3f> q_slope_;  ///< d q / d(projector px across)
+  /// Position along its line, panel px, of the point at (x, y, 1) / w.
+  [[nodiscard]] float along(const Eigen::Vector3f& ray, float w) const;
+
   /// Rows of the pinhole matrix that give the position along a line: numerator and denominator on
   /// (x, y, 1) + w (0, 0, 0, 1).
   Eigen::Vector4f along_ = Eigen::Vector4f::Zero();
   Eigen::Vector4f along_scale_ = Eigen::Vector4f::Zero();
+  /// A distorting projector, in the camera's frame.
+  std::optional<Device> bent_;
+  Eigen::Index along_axis_ = 0;
 };
 
 }  // namespace pencilscan

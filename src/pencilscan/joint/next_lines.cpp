@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <set>
 
 #include "pencilscan/rig/object_space.h"
@@ -28,7 +29,11 @@ constexpr float kWrongOrder = 3;
 }  // namespace
 
 bool lacks_crossings(const PieceGraph& graph) {
-  return 10 * graph.crossings.size() < graph.pieces.size();
+  constexpr double kShare = 0.1;
+  const double length =
+      std::accumulate(graph.pieces.begin(), graph.pieces.end(), 0.0,
+                      [](double sum, const CurvePiece& p) { return sum + p.end - p.begin; });
+  return static_cast<double>(graph.crossings.size()) < kShare * length / (2 * graph.spacing_px);
 }
 
 float next_line_reach_px(const Rig& rig, const Camera& camera) {

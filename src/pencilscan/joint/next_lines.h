@@ -17,7 +17,9 @@ struct NextPiece {
 };
 
 /// True where so few curves cross that crossings cannot decide the lines, as with one projector
-/// alone. The lines then follow from their order and their code (Zhang, Curless and Seitz 2002).
+/// alone: less than a tenth of those of two patterns that overlap everywhere, where each curve
+/// crosses one of the other pattern per line spacing. The lines then follow from their order and
+/// their code (Zhang, Curless and Seitz 2002).
 [[nodiscard]] bool lacks_crossings(const PieceGraph& graph);
 
 /// The neighbours of all pieces that no curve crosses: on each side, the next piece of the same

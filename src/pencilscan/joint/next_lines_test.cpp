@@ -58,7 +58,7 @@ TEST(NextPieces, AreThoseOfAPlainLoopOverAllPoints) {
   for (int scene = 0; scene < 4; ++scene) {
     const float reach = scene < 2 ? 48 : 20;
     const GridGraph graph = random_curves(camera, 30, random);
-    PieceGraph pieces = cut_into_pieces(camera, graph, 14);
+    PieceGraph pieces = cut_into_pieces(camera, graph, 14, 10);
     add_random_crossings(6, pieces, random);
     std::set<int> crossed;
     for (const PieceCrossing& x : pieces.crossings) crossed.insert({x.a, x.b});
@@ -166,13 +166,22 @@ TEST(NextPieces, LieWithinFourLineSpacings) {
   }
 }
 
-TEST(NextPieces, CountWhereLessThanOneInTenPiecesIsCrossed) {
-  PieceGraph graph;
-  graph.crossings.resize(9);
-  graph.pieces.resize(91);
-  EXPECT_TRUE(lacks_crossings(graph));
-  graph.pieces.resize(90);
-  EXPECT_FALSE(lacks_crossings(graph));
+TEST(NextPieces, CountWhereLessThanATenthOfTheCurvesIsCrossed) {
+  for (const int finer : {1, 4}) {  // the same picture with more pixels
+    PieceGraph graph;
+    graph.spacing_px = 10 * finer;
+    // Twenty curves, in pieces of 20 points: two patterns would cross 20 * 200 / (2 * 10) times.
+    for (int k = 0; k < 200 * finer; ++k) {
+      CurvePiece piece;
+      piece.begin = 20 * (k % 10);
+      piece.end = piece.begin + 20;
+      graph.pieces.push_back(piece);
+    }
+    graph.crossings.resize(19);
+    EXPECT_TRUE(lacks_crossings(graph));
+    graph.crossings.resize(21);
+    EXPECT_FALSE(lacks_crossings(graph));
+  }
 }
 
 }  // namespace

@@ -72,7 +72,8 @@ OtherViews::Voices OtherViews::voices_of(std::size_t g) const {
     std::vector<std::size_t> result;
     for (const int c : cameras) {
       for (std::size_t k = 0; k < graphs_.size(); ++k) {
-        if (graphs_[k].camera == c) result.push_back(k);
+        // Without a picture, or left out, it saw no line of any name.
+        if (graphs_[k].camera == c && !graphs_[k].curves.empty()) result.push_back(k);
       }
     }
     return result;

@@ -48,7 +48,7 @@ struct SeenPlane {
     }
     for (std::size_t c = 0; c < 4; ++c) {
       LabelledPieces of_camera;
-      of_camera.graph = cut_into_pieces(rig.cameras[c], graphs[c], 12);
+      of_camera.graph = cut_into_pieces(rig.cameras[c], graphs[c], 12, 10);
       for (const CurvePiece& piece : of_camera.graph.pieces) {
         const int line = lines[c][static_cast<std::size_t>(piece.curve)];
         const int family = curve_of(graphs[c], piece).family;
@@ -208,6 +208,19 @@ TEST(OtherViews, WhereNoneStandsNearTwoCamerasWideApartCountLessAndOneNothing) {
        OtherViews(scene.rig, scene.graphs, scene.pieces).costs(0, std::vector<PieceBeliefs>(2))) {
     for (const float cost : of_piece) EXPECT_EQ(cost, 0);
   }
+}
+
+TEST(OtherViews, ACameraWithoutCurvesHasNoSay) {
+  SeenPlane scene(6);
+  scene.graphs[1].curves.clear();
+  scene.pieces[1] = {};
+  const SeenPlane all(6);
+  const std::vector<PieceBeliefs> no_beliefs(4);
+  const OtherViews views(scene.rig, scene.graphs, scene.pieces);
+  std::vector<GridGraph> graphs = {all.graphs[0], all.graphs[2], all.graphs[3]};
+  std::vector<LabelledPieces> pieces = {all.pieces[0], all.pieces[2], all.pieces[3]};
+  EXPECT_EQ(views.costs(0, no_beliefs),
+            OtherViews(all.rig, graphs, pieces).costs(0, std::vector<PieceBeliefs>(3)));
 }
 
 TEST(OtherViews, LabelsThatStayCostTheSameOnceOthersAreForgotten) {

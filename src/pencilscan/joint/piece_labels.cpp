@@ -308,7 +308,8 @@ LabelledPieces possible_labels(const Rig& rig, const std::vector<ColorFamily>& f
   const Camera& camera = rig.camera(graph.camera);
   const Sphere volume = working_volume(rig);
   LabelledPieces result;
-  result.graph = cut_into_pieces(camera, graph, options.piece_length);
+  result.graph = cut_into_pieces(camera, graph, options.piece_length,
+                                 pixels_at_center(rig, camera, line_spacing(rig)));
   std::vector<std::vector<VisiblePattern>> visible(families.size());
   for (std::size_t f = 0; f < families.size(); ++f) {
     const std::vector<float> costs = phase_costs(rig, camera, families[f]);

@@ -89,7 +89,7 @@ TEST(Surroundings, CostIsThatOfAPlainLoopOverAllPieces) {
   for (int scene = 0; scene < 3; ++scene) {
     const GridGraph graph = random_curves(camera, 40, random);
     LabelledPieces pieces;
-    pieces.graph = cut_into_pieces(camera, graph, 12);
+    pieces.graph = cut_into_pieces(camera, graph, 12, 10);
     add_random_crossings(200, pieces.graph, random);
     pieces.inverse_depth_range = 5e-4F;
     for (std::size_t p = 0; p < pieces.graph.pieces.size(); ++p) {
