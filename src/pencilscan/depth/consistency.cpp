@@ -165,9 +165,10 @@ class Comparison {
   /// Nodes that stand in the light of others.
   void compare_with_projector(std::size_t p, Links& links) const {
     const Projector& projector = rig_.projectors[p];
-    constexpr int kCell = 3;  // projector px
-    const int columns = projector.width / kCell + 1;
-    const int rows = projector.height / kCell + 1;
+    // As wide as the margin: what slants by less than two in one does not stand in its own light.
+    const double cell = std::max(1.0, pixels_at_center(rig_, projector, margin_));
+    const int columns = static_cast<int>(projector.width / cell) + 1;
+    const int rows = static_cast<int>(projector.height / cell) + 1;
     LitPatterns own;
     for (std::size_t k = 0; k < pattern_projector_.size(); ++k) {
       if (pattern_projector_[k] == static_cast<int>(p)) own.set(k);
@@ -186,8 +187,8 @@ class Comparison {
     parallel_chunks(nodes_.size(), [&](std::size_t i) {
       const auto pixel = projector.project(nodes_[i].x);
       if (!pixel || !projector.contains(*pixel)) return;
-      cell_of[i] = static_cast<std::int32_t>(((*pixel)[1] + 0.5) / kCell) * columns +
-                   static_cast<std::int32_t>(((*pixel)[0] + 0.5) / kCell);
+      cell_of[i] = static_cast<std::int32_t>(((*pixel)[1] + 0.5) / cell) * columns +
+                   static_cast<std::int32_t>(((*pixel)[0] + 0.5) / cell);
       z_of[i] = static_cast<float>((projector.device_from_world * nodes_[i].x).z());
     });
     for (std::size_t i = 0; i < nodes_.size(); ++i) {

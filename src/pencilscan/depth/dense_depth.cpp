@@ -163,8 +163,6 @@ DepthOptions options_for(const CameraLight& light, DepthOptions options) {
   const int narrow = 2 * options.half + 1;
   if (light.of_mosaic)
     options.half = static_cast<int>(std::lround((options.half + 0.5) * kWider - 0.5));
-  options.max_move =
-      std::max(options.max_move, options.max_move_lines * static_cast<double>(light.spacing_px));
   // A window holds a line with half as much of the dark on both its sides. One that holds an edge
   // alone takes any error of the line's width for depth (docs/depth.md).
   const int of_line = std::min(static_cast<int>(std::lround(light.line_px)), kWidestHalf);
@@ -226,20 +224,24 @@ void measure_light(std::span<const PilotWindow> pilots, const DepthOptions& opti
       if (const auto fit = fitter.fit(pixel, start, 5)) take(*fit, fitter);
     }
   };
+  // Of all pilots: a blur with which few windows fit shall not win by these few. Where half of them
+  // do not, more fits are better.
   const auto median_misfit = [&](float blur) {
+    constexpr float kNoFit = 1e9F;
     std::vector<float> values;
     run(blur, [&](const WindowFit& fit, const WindowFitter&) { values.push_back(fit.misfit); });
-    if (values.empty()) return 1e9F;
-    return upper_median(std::move(values));
+    const auto missing = static_cast<int>(pilots.size() - values.size());
+    values.resize(pilots.size(), kNoFit);
+    return std::pair(values.empty() ? kNoFit : upper_median(std::move(values)), missing);
   };
   const float before = light.blur_px;
   // Golden section for the blur.
   float low = 0.3F, high = 2.5F;
   constexpr float kGolden = 0.618034F;
   float a = high - kGolden * (high - low), b = low + kGolden * (high - low);
-  float fa = median_misfit(a), fb = median_misfit(b);
+  auto fa = median_misfit(a), fb = median_misfit(b);
   for (int round = 0; round < 4; ++round) {
-    if (fa < fb) {
+    if (fa <= fb) {
       high = b;
       b = a;
       fb = fa;

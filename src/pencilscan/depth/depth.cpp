@@ -101,7 +101,8 @@ void guided_depth(const Rig& rig, const RayScene& surface, const DepthStageOptio
   std::vector<std::size_t> found(result.maps.size());
   parallel_for(result.maps.size(), [&](std::size_t i) {
     DepthMap& map = result.maps[i];
-    const DepthOptions depth = options_for(result.lights[i], options.depth);
+    DepthOptions depth = options_for(result.lights[i], options.depth);
+    depth.max_move = std::max(depth.max_move, depth.max_move_lines * line_spacing(rig));
     const auto completed = [&](const CameraLight& light, DepthMap& completing) {
       std::size_t count = 0;
       const auto complete = [&](const CameraLight& seen, DepthMap& nodes) {

@@ -248,13 +248,11 @@ TEST(DenseDepth, WindowsHoldAWholeLine) {
   const DepthOptions usual = options_for(light, {});
   EXPECT_EQ(usual.half, DepthOptions{}.half);
   EXPECT_EQ(usual.stride, DepthOptions{}.stride);
-  EXPECT_EQ(usual.max_move, DepthOptions{}.max_move);
   light.spacing_px = 24.5F;
   light.line_px = 8.2F;
   const DepthOptions wide = options_for(light, {});
   EXPECT_EQ(wide.half, 8);
   EXPECT_EQ(wide.stride, 6);  // even: wider windows beside these join 2 x 2 pixels
-  EXPECT_NEAR(wide.max_move, 0.16 * 24.5, 1e-5);
   light.of_mosaic = true;
   EXPECT_EQ(options_for(light, {}).half, 8);
   light.line_px = 30;
@@ -396,6 +394,25 @@ TEST(Consistency, FloatingPatchIsRemovedAndUnconfirmedDepthStays) {
   // One camera alone: nobody confirms it, all of it stays.
   std::vector<DepthMap> alone = {ball_scene().measure().maps[1]};
   EXPECT_LT(check_consistency(scene.rig, projectors, alone).contradicted, 5u);
+}
+
+TEST(Consistency, ShadowsAreTheSameHoweverFineTheProjectorsPixelsAre) {
+  const BallScene& scene = ball_scene();
+  const std::vector<int> projectors = {0, 1};
+  std::vector<std::size_t> contradicted;
+  for (const double finer : {1.0, 0.2, 5.0}) {
+    Rig rig = scene.rig;
+    for (Projector& projector : rig.projectors) {
+      projector.width = static_cast<int>(projector.width * finer);
+      projector.height = static_cast<int>(projector.height * finer);
+      projector.K.topRows<2>() *= finer;
+      for (LinePattern& pattern : projector.patterns) pattern.pitch_px *= finer;
+    }
+    std::vector<DepthMap> maps = scene.measure().maps;
+    contradicted.push_back(check_consistency(rig, projectors, maps).contradicted);
+  }
+  EXPECT_LE(contradicted[1], contradicted[0] + 20);
+  EXPECT_LE(contradicted[2], contradicted[0] + 20);
 }
 
 /// How many nodes around the middle of the ball one camera alone keeps after change(node,

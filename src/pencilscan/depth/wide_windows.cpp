@@ -60,7 +60,8 @@ int binning_for(double spacing_px, const DepthOptions& options) {
   constexpr double kNarrow = 1.2;
   const double width = 2 * options.half + 1;
   int binning = 1;
-  while (kNarrow * binning * width < spacing_px) binning *= 2;
+  // Nodes lie on whole pixels of the joined ones.
+  while (2 * binning <= options.stride && kNarrow * binning * width < spacing_px) binning *= 2;
   return binning;
 }
 

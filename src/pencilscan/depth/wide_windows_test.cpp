@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <limits>
+
 #include "pencilscan/rig/sample_devices.h"
 
 namespace pencilscan {
@@ -40,6 +42,13 @@ TEST(WideWindows, LightIsJoinedWithItsNoiseAndBlur) {
   EXPECT_FLOAT_EQ(wide.blur_px, std::sqrt(1.5F) / 2);
   EXPECT_EQ(wide.valid.at<std::uint8_t>(10, 15), 0);
   EXPECT_EQ(wide.valid.at<std::uint8_t>(10, 17), 1);
+}
+
+TEST(WideWindows, JoinNoMorePixelsThanNodesAreApart) {
+  DepthOptions options;
+  EXPECT_EQ(binning_for(std::numeric_limits<double>::infinity(), options), options.stride);
+  options.stride = 3;
+  EXPECT_EQ(binning_for(1e6, options), 2);
 }
 
 TEST(WideWindows, GoAsFarAsLinesLieApartAndLeaveTheMapInItsPixels) {

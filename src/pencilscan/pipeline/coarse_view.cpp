@@ -54,8 +54,9 @@ DepthOptions of_joined(double n, DepthOptions options) {
   const double before = width_px(options.half);
   const double width = before * std::pow(n, -0.2);
   options.half = std::max(2, static_cast<int>(std::lround((width - 1) / 2)));
-  options.stride =
-      std::max(1, static_cast<int>(std::lround(options.stride * width_px(options.half) / before)));
+  // Even: wider windows beside these need an even number.
+  const double stride = options.stride * width_px(options.half) / before;
+  options.stride = std::max(2, 2 * static_cast<int>(std::lround(stride / 2)));
   return options;
 }
 

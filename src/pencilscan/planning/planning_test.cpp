@@ -154,6 +154,24 @@ TEST(RigCheck, SensitivityIsTheSineOfTheTriangulationAngleForLinesAcrossTheBasel
   EXPECT_NEAR(check.pairs[0].px_per_mm_median, sine * options.projector_focal_px / 1100, 1e-2);
 }
 
+TEST(RigCheck, SensitivityIsTheSameHoweverFarTheProjectorStands) {
+  Rig rig = make_ring({});
+  const RigCheck near = check_rig(rig);
+  for (Projector& projector : rig.projectors) {
+    projector.device_from_world.translation *= 4;
+    projector.K.topLeftCorner<2, 2>() *= 4;
+  }
+  const RigCheck far = check_rig(rig);
+  EXPECT_NEAR(far.coverage.usable, near.coverage.usable, 0.05);
+  EXPECT_NEAR(far.coverage.grid, near.coverage.grid, 0.15);  // from afar lines slant otherwise
+  ASSERT_EQ(far.pairs.size(), near.pairs.size());
+  for (std::size_t i = 0; i < near.pairs.size(); ++i) {
+    if (near.pairs[i].shared > 100 && far.pairs[i].shared > 100) {
+      EXPECT_NEAR(far.pairs[i].sensitivity_median, near.pairs[i].sensitivity_median, 0.1) << i;
+    }
+  }
+}
+
 TEST(RigCheck, AxesOfKnownSkewLinesAreMeasured) {
   RingOptions options = one_height();
   options.cameras = 1;

@@ -114,7 +114,8 @@ std::optional<Observation> observe(const Camera& camera, const Projector& projec
   Observation observation;
   observation.px_per_mm =
       std::abs(RayInProjector(camera, projector, pixel).slope(depth, pattern.axis));
-  observation.sensitivity = observation.px_per_mm * depth / focal(projector, pattern.axis);
+  const double thrown = (projector.device_from_world * sample.point).z();
+  observation.sensitivity = observation.px_per_mm * thrown / focal(projector, pattern.axis);
   observation.spacing_px = 1 / gradient->norm();
   observation.direction_rad = std::atan2(gradient->x(), -gradient->y());
   observation.sensitive = observation.sensitivity > options.min_sensitivity;

@@ -12,10 +12,11 @@ namespace pencilscan {
 /// with their outward normals stand for surfaces of every place and direction. (No occlusion but
 /// the sphere's own: this judges the rig, not an object.)
 ///
-/// **Depth sensitivity** of a camera-projector pair at a point at camera depth z: with the
-/// projector coordinate c across the lines, s = |dc / d ln z| / f_p. It is the sine of the
-/// triangulation angle times the sine of the angle between line and epipolar line: 0 means that
-/// moving along the camera ray stays on the same line, so the line says nothing about depth.
+/// **Depth sensitivity** of a camera-projector pair at a point at camera depth z and projector
+/// depth z_p: with the projector coordinate c across the lines, s = |dc / dz| z_p / f_p, near the
+/// devices' axes. It is the sine of the triangulation angle times the sine of the angle between
+/// line and epipolar line: 0 means that moving along the camera ray stays on the same line, so the
+/// line says nothing about depth.
 ///
 /// **Skewness** of two pencils of planes. The planes of a projector's lines share an axis through
 /// its centre, parallel to the lines. With axes c + t d, the volume's centre at mean distance D,

@@ -1,5 +1,6 @@
 #include "pencilscan/rig/object_space.h"
 
+#include <algorithm>
 #include <utility>
 #include <vector>
 
@@ -9,12 +10,18 @@ namespace pencilscan {
 
 namespace {
 
+/// From a device to the volume's centre. One within the volume sees things a radius away and
+/// nearer.
+double distance_to(const Sphere& volume, const Device& device) {
+  return std::max((device.center() - volume.center).norm(), volume.radius);
+}
+
 /// The median over the patterns of a length on the panel, as the volume's centre sees it.
 double length_at_center(const Rig& rig, double LinePattern::*length_px) {
-  const Vec3 center = working_volume(rig).center;
+  const Sphere volume = working_volume(rig);
   std::vector<double> lengths;
   for (const Projector& projector : rig.projectors) {
-    const double distance = (projector.center() - center).norm();
+    const double distance = distance_to(volume, projector);
     for (const LinePattern& pattern : projector.patterns) {
       const auto axis = static_cast<Eigen::Index>(pattern.axis);
       lengths.push_back(pattern.*length_px * distance / projector.K(axis, axis));
@@ -29,7 +36,7 @@ double line_spacing(const Rig& rig) { return length_at_center(rig, &LinePattern:
 double line_width(const Rig& rig) { return length_at_center(rig, &LinePattern::line_width_px); }
 
 double pixels_at_center(const Rig& rig, const Device& device, double length) {
-  return length * device.focal_px() / (device.center() - working_volume(rig).center).norm();
+  return length * device.focal_px() / distance_to(working_volume(rig), device);
 }
 
 ObjectSpace::ObjectSpace(const Rig& rig, double volume_margin)

@@ -128,12 +128,13 @@ void require_patterns(const Rig& rig, const std::string& source, const std::stri
 std::string unit_name(const Rig& rig) { return rig.unit_known ? "mm" : "units"; }
 
 double footprint(const Rig& rig) {
-  const Vec3 center = working_volume(rig).center;
+  const Sphere volume = working_volume(rig);
   std::vector<double> footprints;
   for (const Camera& camera : rig.cameras) {
     if (camera.sees_texture_only) continue;
-    const double focal = camera.focal_px();
-    footprints.push_back((camera.center() - center).norm() / focal);
+    // One within the volume sees things a radius away and nearer.
+    const double distance = std::max((camera.center() - volume.center).norm(), volume.radius);
+    footprints.push_back(distance / camera.focal_px());
   }
   return footprints.empty() ? 1 : upper_median(std::move(footprints));
 }
