@@ -100,6 +100,7 @@ FrameOptions frame_options(const Rig& rig, const ReconstructionOptions& options)
 Reconstruction reconstruction_of(const Rig& rig, const Frame& frame, FrameResult found,
                                  bool depth_maps) {
   Reconstruction result;
+  result.unit_known = rig.unit_known;
   result.report = json_text(frame_report(rig, frame, found.points, found.shape));
   result.curves = describe_curves(rig, found.points);
   if (depth_maps) result.depth = depth_of(rig, found.shape.depth);

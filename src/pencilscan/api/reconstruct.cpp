@@ -28,11 +28,11 @@ Reconstruction reconstruct(const Rig& rig, const Images& images,
 }
 
 void write_reconstruction(const std::filesystem::path& folder, const Reconstruction& result) {
-  write_points(folder / "points.ply", result.points);
+  write_points(folder / "points.ply", result.points, result.unit_known);
   write_curves(folder / "curves.ply", result.curves);
   if (!result.mesh.faces.empty()) {
-    write_mesh(folder / "mesh.ply", result.mesh);
-    write_mesh(folder / "mesh_measured.ply", result.measured);
+    write_mesh(folder / "mesh.ply", result.mesh, result.unit_known);
+    write_mesh(folder / "mesh_measured.ply", result.measured, result.unit_known);
   }
   write_text(folder / "report.json", result.report);
 }

@@ -47,6 +47,7 @@ struct Reconstruction {
   TriangleMesh measured;              ///< mesh_measured.ply
   std::vector<CameraDepth> depth;     ///< with options.depth_maps
   std::string report;                 ///< report.json
+  bool unit_known = true;             ///< of the rig: lengths are mm
 };
 
 /// The shape in one frame. The same values as `pencilscan reconstruct` for any number of threads.

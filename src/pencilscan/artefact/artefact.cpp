@@ -39,7 +39,9 @@ Box box_of(std::span<const Vec3> points) {
   throw StageError(
       points.source + ": no " + shape + " fits " + std::to_string(points.points.size()) +
       " points, which reach over " + formatted((box.high - box.low).maxCoeff(), "%.3g") +
-      " mm (lengths are taken as millimetres)" + why +
+      (points.unit_known ? " mm (lengths are taken as millimetres)"
+                         : " of the rig's units (which unit, it does not say)") +
+      why +
       (points.outside_region > 0 ? "; --region left out " + std::to_string(points.outside_region)
                                  : std::string()));
 }
@@ -113,7 +115,9 @@ std::optional<SphereFits> fit_both(std::span<const Vec3> points, const Sphere& s
   return SphereFits{*all, std::move(*trimmed)};
 }
 
-ArtefactPoints of_region(const ArtefactPoints& points, const ArtefactOptions& options) {
+/// The points that are the artefact, with what the rig says of their unit.
+ArtefactPoints of_region(ArtefactPoints points, const Rig* rig, const ArtefactOptions& options) {
+  points.unit_known = rig == nullptr || rig->unit_known;
   if (!options.region || points.points.empty()) return points;
   ArtefactPoints part = within(points, *options.region);
   const Box box = box_of(points.points);
@@ -223,20 +227,22 @@ void require_stated_sides(const PlateFigures& plate, const ArtefactOptions& opti
   constexpr double kUnitTolerance = 0.15;  // of the surface's sides: its rim may be missing
   const UnitFactor* unit = unit_behind_factor(
       std::sqrt(surface.length_mm * surface.width_mm / (length * width)), kUnitTolerance);
+  const std::string of_surface =
+      formatted(surface.length_mm, "%.4g") + " x " + formatted(surface.width_mm, "%.4g");
+  const std::string why =
+      !plate.points.unit_known ? " of the rig's units (which unit, it does not say)"
+      : unit != nullptr        ? " mm: they are probably in " + std::string(unit->words)
+                               : " mm; --region leaves out what is not the plate";
   throw InputError(
       plate.points.source, "--length x --width", mm_text(length, width),
-      "must be the sides of the plate in mm, whose surface goes on over " +
-          formatted(surface.length_mm, "%.4g") + " x " + formatted(surface.width_mm, "%.4g") +
-          " mm" +
-          (unit != nullptr ? ": they are probably in " + std::string(unit->words)
-                           : std::string("; --region leaves out what is not the plate")));
+      "must be the sides of the plate in mm, whose surface goes on over " + of_surface + why);
 }
 
 }  // namespace
 
 BallFigures measure_sphere(const ArtefactPoints& given, const Rig* rig,
                            const ArtefactOptions& options) {
-  ArtefactPoints points = of_region(given, options);
+  ArtefactPoints points = of_region(given, rig, options);
   const auto start = find_sphere(points.points, {radius_of(options), {}, options.seed});
   if (!start) no_fit(points, "sphere");
   std::size_t left_out = 0;
@@ -265,7 +271,7 @@ BallBarFigures measure_ball_bar(const ArtefactPoints& given, const Rig* rig,
                                 const ArtefactOptions& options) {
   PENCILSCAN_CHECK(options.diameter_mm.has_value());
   const double radius = *options.diameter_mm / 2;
-  const ArtefactPoints points = of_region(given, options);
+  const ArtefactPoints points = of_region(given, rig, options);
   SphereSearch search{radius, {}, options.seed};
   auto first = find_sphere(points.points, search);
   if (!first) no_fit(points, "ball of this diameter");
@@ -319,7 +325,7 @@ BallBarFigures measure_ball_bar(const ArtefactPoints& given, const Rig* rig,
 PlateFigures measure_plate(const ArtefactPoints& given, const Rig* rig,
                            const ArtefactOptions& options) {
   PlateFigures plate;
-  plate.points = of_region(given, options);
+  plate.points = of_region(given, rig, options);
   if (options.plate_thickness_mm) {
     const std::size_t whole = plate.points.points.size();
     FacePoints face = points_of_face(

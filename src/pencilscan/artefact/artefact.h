@@ -85,7 +85,8 @@ struct PlateFigures {
   std::optional<ZScores> z;
 };
 
-// The rig is for z-scores; may be null. InputError where an option leaves none of the points.
+// The rig is for z-scores and says whether its unit is known; may be null. InputError where an
+// option leaves none of the points.
 
 /// StageError when no sphere fits, or none whose size differs by kSizeTolerance at most.
 [[nodiscard]] BallFigures measure_sphere(const ArtefactPoints& points, const Rig* rig,
@@ -99,6 +100,8 @@ struct PlateFigures {
                                          const ArtefactOptions& options);
 
 /// What a user should know of a position: one sentence each.
+[[nodiscard]] std::vector<std::string> artefact_warnings(const BallFigures& ball,
+                                                         const ArtefactOptions& options);
 [[nodiscard]] std::vector<std::string> artefact_warnings(const BallBarFigures& bar,
                                                          const ArtefactOptions& options);
 [[nodiscard]] std::vector<std::string> artefact_warnings(const PlateFigures& plate,

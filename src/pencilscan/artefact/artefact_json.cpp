@@ -120,10 +120,8 @@ void add_positions(Json& json, const Positions& positions, const ArtefactOptions
       entry["file"] = position.points.source;
     }
     entry.update(to_json(position));
-    if constexpr (requires { artefact_warnings(position, options); }) {
-      const auto warnings = artefact_warnings(position, options);
-      if (!warnings.empty()) entry["warnings"] = warnings;
-    }
+    const auto warnings = artefact_warnings(position, options);
+    if (!warnings.empty()) entry["warnings"] = warnings;
     json["positions"].push_back(std::move(entry));
   }
 }

@@ -53,6 +53,7 @@ ArtefactPoints ArtefactPoints::subset(const std::vector<std::size_t>& indices) c
   ArtefactPoints part;
   part.source = source;
   part.is_mesh = is_mesh;
+  part.unit_known = unit_known;
   part.not_finite = not_finite;
   part.outside_region = outside_region;
   for (const std::size_t i : indices) {

@@ -27,6 +27,7 @@ struct ArtefactPoints {
   std::vector<float> sigma;          ///< mm; along the camera ray of points, the normal of a mesh
   std::vector<PointOrigin> origins;  ///< of our points.ply
   bool is_mesh = false;              ///< the file has faces
+  bool unit_known = true;            ///< false: of a rig whose unit is unknown
   std::size_t not_finite = 0;        ///< vertices without a position, as organised clouds have
   std::size_t outside_region = 0;    ///< left out: outside of what was asked for
 

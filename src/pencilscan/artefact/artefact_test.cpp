@@ -223,6 +223,45 @@ TEST(ArtefactBallBar, ALengthThatIsNotThisBarsIsTold) {
   EXPECT_THAT(artefact_html(test, ""), HasSubstr("is that the length of this bar"));
 }
 
+TEST(ArtefactBallBar, SizesThatAreNotAsStatedAreNotSaidToBe) {
+  std::vector<Vec3> points;
+  add_ball(points, {{-80, 0, 0}, 15}, 3000, [](int) { return 0.0; });
+  add_ball(points, {{80, 0, 0}, 15}, 3000, [](int) { return 0.0; });
+  ArtefactOptions options;
+  options.diameter_mm = 30;
+  options.length_mm = 120;
+  BallBarFigures bar = measure_ball_bar(as_points(points), nullptr, options);
+  bar.balls[1].trimmed.radius = 11.8;
+  EXPECT_THAT(artefact_warnings(bar, options),
+              ::testing::ElementsAre(HasSubstr("30 and 23.6 mm across, and --diameter says 30")));
+}
+
+TEST(ArtefactWarnings, AnUnknownUnitIsToldOfEveryArtefact) {
+  Rig rig;
+  rig.unit_known = false;
+  std::vector<Vec3> balls;
+  add_ball(balls, {{-80, 0, 0}, 15}, 3000, [](int) { return 0.0; });
+  ArtefactOptions options;
+  options.diameter_mm = 30;
+  const auto unknown = ::testing::ElementsAre(HasSubstr("the rig's unit is unknown"));
+  const BallFigures ball = measure_sphere(as_points(balls), &rig, options);
+  EXPECT_THAT(artefact_warnings(ball, options), unknown);
+  EXPECT_THAT(artefact_warnings(measure_sphere(as_points(balls), nullptr, options), options),
+              ::testing::IsEmpty());
+  EXPECT_EQ(artefact_json({options, {ball}, {}, {}})["positions"][0]["warnings"].size(), 1U);
+  add_ball(balls, {{80, 0, 0}, 15}, 3000, [](int) { return 0.0; });
+  options.length_mm = 120;  // not "though their size is as stated"
+  EXPECT_THAT(artefact_warnings(measure_ball_bar(as_points(balls), &rig, options), options),
+              unknown);
+  options.diameter_mm = 300;
+  try {
+    (void)measure_ball_bar(as_points(balls), &rig, options);
+    FAIL() << "no StageError";
+  } catch (const StageError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("190 of the rig's units"));
+  }
+}
+
 std::vector<Vec3> plate_points(double thickness, const RigidTransform& world_from_plate,
                                std::uint64_t seed) {
   Random random(seed);
@@ -333,6 +372,10 @@ TEST(ArtefactPlate, SidesOfASmallerPlateAreTold) {
   EXPECT_THAT(warnings_of(200), ::testing::IsEmpty());
   EXPECT_THAT(warnings_of(400), ::testing::IsEmpty());  // half of it was measured
   EXPECT_THAT(warnings_of(130), ::testing::ElementsAre(HasSubstr("are they this plate's?")));
+  Rig rig;
+  rig.unit_known = false;
+  EXPECT_THAT(artefact_warnings(measure_plate(points, &rig, options), options),
+              ::testing::ElementsAre(HasSubstr("the rig's unit is unknown")));
 }
 
 TEST(ArtefactPlate, OtherThingsInItsPlaneDoNotMakeItLarger) {

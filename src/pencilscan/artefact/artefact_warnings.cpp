@@ -7,27 +7,64 @@
 #include "pencilscan/core/length_units.h"
 
 namespace pencilscan {
+namespace {
+
+/// That lengths are not in mm, where they are those of a rig without scale.
+std::vector<std::string> unit_warnings(const ArtefactPoints& points) {
+  if (points.unit_known) return {};
+  return {
+      "the rig's unit is unknown: lengths are in that unit and not in mm, and what they differ by "
+      "from the stated ones says nothing"};
+}
+
+bool has_stated_size(const BallFigures& ball, double diameter_mm) {
+  return std::abs(2 * ball.trimmed.radius - diameter_mm) <= kSizeTolerance * diameter_mm;
+}
+
+/// "199.6 and 201.3".
+std::string sizes_of(const std::vector<BallFigures>& balls) {
+  std::string text;
+  for (const BallFigures& ball : balls)
+    text += (text.empty() ? "" : " and ") + formatted(2 * ball.trimmed.radius, "%.4g");
+  return text;
+}
+
+/// What may be wrong where the distance of the balls is `factor` times the stated one. The scan's
+/// scale is right to within kSizeTolerance where the balls have the stated size.
+std::string reason_of(const BallBarFigures& bar, const ArtefactOptions& options, double factor) {
+  const double diameter = *options.diameter_mm;
+  const bool have_size =
+      std::all_of(bar.balls.begin(), bar.balls.end(),
+                  [&](const BallFigures& ball) { return has_stated_size(ball, diameter); });
+  if (!have_size)
+    return ", and " + sizes_of(bar.balls) + " mm across, and --diameter says " +
+           formatted(diameter, "%.6g") +
+           " mm: these are hardly the balls, or the scan is not in mm";
+  const UnitFactor* unit = unit_behind_factor(factor, kSizeTolerance);
+  if (unit != nullptr) return ": it is probably in " + std::string(unit->words);
+  return " though their size is as stated: is that the length of this bar?";
+}
+
+}  // namespace
+
+std::vector<std::string> artefact_warnings(const BallFigures& ball, const ArtefactOptions&) {
+  return unit_warnings(ball.points);
+}
 
 std::vector<std::string> artefact_warnings(const BallBarFigures& bar,
                                            const ArtefactOptions& options) {
-  std::vector<std::string> warnings;
+  std::vector<std::string> warnings = unit_warnings(bar.balls.front().points);
   if (bar.between > 0) {
     warnings.push_back(std::to_string(bar.between) +
                        " points lie between the balls; if that is the bar, give --bar-diameter");
   }
-  if (!options.length_mm) return warnings;
-  // The balls are found with the stated diameter to within kSizeTolerance, and so the scan's scale
-  // is right to within it: what is farther off is no error of the scan.
+  if (!options.length_mm || !bar.balls.front().points.unit_known) return warnings;
   const double factor = bar.distance_mm.trimmed / *options.length_mm;
   if (std::abs(factor - 1) <= kSizeTolerance) return warnings;
-  const UnitFactor* unit = unit_behind_factor(factor, kSizeTolerance);
-  warnings.push_back(
-      "the balls are " + formatted(bar.distance_mm.trimmed, "%.4g") + " mm apart, " +
-      formatted(factor, "%.4g") + " times --length = " + formatted(*options.length_mm, "%.6g") +
-      " mm" +
-      (unit != nullptr
-           ? ": it is probably in " + std::string(unit->words)
-           : std::string(" though their size is as stated: is that the length of this bar?")));
+  warnings.push_back("the balls are " + formatted(bar.distance_mm.trimmed, "%.4g") + " mm apart, " +
+                     formatted(factor, "%.4g") +
+                     " times --length = " + formatted(*options.length_mm, "%.6g") + " mm" +
+                     reason_of(bar, options, factor));
   return warnings;
 }
 
@@ -35,7 +72,8 @@ std::vector<std::string> artefact_warnings(const PlateFigures& plate,
                                            const ArtefactOptions& options) {
   // A tenth of both sides, which no scale of a scanner is off by, is a fifth of the area.
   constexpr double kNoticed = (1 + kSizeTolerance) * (1 + kSizeTolerance);
-  if (!options.plate_length_mm || !options.plate_width_mm) return {};
+  if (!options.plate_length_mm || !options.plate_width_mm || !plate.points.unit_known)
+    return unit_warnings(plate.points);
   const double stated = *options.plate_length_mm * *options.plate_width_mm;
   if (plate.surface.area_mm2 <= kNoticed * stated) return {};
   return {"the plate's surface is " + formatted(plate.surface.length_mm, "%.4g") + " x " +

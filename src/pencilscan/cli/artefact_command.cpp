@@ -51,6 +51,7 @@ void measure(const ArtefactCommand& command, const fs::path& file, ArtefactTest&
   switch (command.artefact) {
     case Artefact::kSphere:
       test.spheres.push_back(measure_sphere(points, known, test.options));
+      tell_warnings(file, artefact_warnings(test.spheres.back(), test.options));
       break;
     case Artefact::kBallBar:
       test.ball_bars.push_back(measure_ball_bar(points, known, test.options));

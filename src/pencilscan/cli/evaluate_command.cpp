@@ -9,6 +9,7 @@
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/evaluation/evaluate.h"
+#include "pencilscan/evaluation/truth_check.h"
 #include "pencilscan/io/mesh_file.h"
 #include "pencilscan/labeling/point_file.h"
 
@@ -90,7 +91,11 @@ void run_evaluate(const EvaluateOptions& options) {
   evaluation_options.progress = stderr_progress("nothing was written");
   try {
     const Evaluation evaluation = evaluate(truth, rig, result.input, evaluation_options);
-    const nlohmann::ordered_json figures = figures_json(evaluation, rig);
+    nlohmann::ordered_json figures = figures_json(evaluation, rig);
+    if (const auto warning = unit_warning(rig, evaluation_options.align)) {
+      std::cerr << "pencilscan: warning: " << options.rig_path << ": " << *warning << "\n";
+      figures["warnings"].push_back(options.rig_path + ": " + *warning);
+    }
     if (evaluation.truth_warning) {
       std::cerr << "pencilscan: warning: " << options.truth_path << ": "
                 << *evaluation.truth_warning << "\n";

@@ -57,7 +57,7 @@ void run_scan(const ScanCommand& command) {
   }
   tell_steps(progress, "decoding: pair", pairs.size(), pairs.size());
   if (points.empty()) throw StageError("no pixel could be measured: see pencilscan calibrate");
-  write_points(out / "points.ply", points);
+  write_points(out / "points.ply", points, rig.unit_known);
   nlohmann::ordered_json figures{
       {"pairs", pairs.size()}, {"points", points.size()}, {"codes_without_point", missed}};
   if (!command.no_mesh) {
@@ -65,7 +65,7 @@ void run_scan(const ScanCommand& command) {
     const double cell = command.cell_mm > 0 ? command.cell_mm : 1.5 * median_spacing(samples);
     const TriangleMesh mesh = scan_mesh(samples, cell);
     if (mesh.faces.empty()) throw StageError("the points are too few for a mesh");
-    write_mesh(out / "mesh.ply", mesh);
+    write_mesh(out / "mesh.ply", mesh, rig.unit_known);
     progress("meshing", 1);
     figures["faces"] = mesh.faces.size();
   }

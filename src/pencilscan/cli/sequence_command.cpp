@@ -168,7 +168,7 @@ void run_info(const InfoCommand& command) {
     figures["frames_per_second"] = 1e9 / sets.period_ns;
     std::vector<double> spreads;
     for (const FrameSet& set : sets.sets) spreads.push_back(set.spread_ns / 1000);
-    figures["spread_us"] = {{"median", upper_median(spreads)},
+    figures["spread_us"] = {{"median", lower_quantile(spreads, 0.5)},
                             {"p90", lower_quantile(spreads, 0.9)},
                             {"max", *std::max_element(spreads.begin(), spreads.end())}};
   }

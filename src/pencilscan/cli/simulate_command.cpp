@@ -152,7 +152,7 @@ void write_frames(const SimulateOptions& options, const Rig& rig, const Triangle
     const std::string name = six_digits(static_cast<std::size_t>(frame));
     const fs::path truth =
         options.frame_count == 1 ? out / kTruthFolder : out / kTruthFolder / name;
-    write_mesh(truth / "mesh.ply", object.mesh());
+    write_mesh(truth / "mesh.ply", object.mesh(), rig.unit_known);
     for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
       const Camera& camera = rig.cameras[c];
       const auto image =

@@ -296,6 +296,25 @@ TEST(TruthWarning, NamesAMeshOfAnotherSizeOrPlace) {
     EXPECT_THAT(warning_of(truth, points), HasSubstr("it is truth/mesh.ply in the scene's folder"));
 }
 
+TEST(TruthWarning, ATruthInMillimetresIsNotBlamedForAResultInAnotherUnit) {
+  using ::testing::HasSubstr;
+  const TriangleMesh truth = make_sphere(100, kSphereRings);
+  EXPECT_THAT(warning_of(truth, make_sphere(0.1, kSphereRings).vertices),
+              HasSubstr("the result is probably in metres instead of millimetres, or the truth in "
+                        "micrometres"));
+  EXPECT_THAT(warning_of(truth, make_sphere(100 / 25.4, kSphereRings).vertices),
+              HasSubstr("the result is probably in inches instead of millimetres"));
+}
+
+TEST(UnitWarning, FiguresOfAnUnknownUnitAreNotInMillimetres) {
+  Rig rig;
+  EXPECT_FALSE(unit_warning(rig, AlignmentKind::kNone));
+  rig.unit_known = false;
+  EXPECT_TRUE(unit_warning(rig, AlignmentKind::kNone));
+  EXPECT_TRUE(unit_warning(rig, AlignmentKind::kRigid));
+  EXPECT_FALSE(unit_warning(rig, AlignmentKind::kSimilarity));
+}
+
 TEST(TruthWarning, IsSilentOfPartsAndOfResultsThatAreALittleOff) {
   const TriangleMesh truth = make_sphere(100, kSphereRings);
   std::vector<Vec3> part, larger, noisy;

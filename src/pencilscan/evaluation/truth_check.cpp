@@ -33,6 +33,20 @@ double extent_of(std::span<const Vec3> points) {
   return size.norm();
 }
 
+/// Which file is in another unit, where the result is `factor` times as large as the truth: the
+/// smaller one in a larger unit, and seldom the larger one in micrometres. Empty: neither.
+std::string unit_advice(double factor) {
+  constexpr double kTolerance = 0.15;  // some of the surface may not have been measured
+  const char* smaller = factor > 1 ? "the truth" : "the result";
+  const char* larger = factor > 1 ? "the result" : "the truth";
+  const double ratio = std::max(factor, 1 / factor);
+  const UnitFactor* of_smaller = unit_behind_factor(ratio, kTolerance);
+  if (of_smaller == nullptr) return {};
+  const UnitFactor* of_larger = unit_behind_factor(1 / ratio, kTolerance);
+  return std::string(smaller) + " is probably in " + of_smaller->words +
+         (of_larger == nullptr ? "" : std::string(", or ") + larger + " in " + of_larger->words);
+}
+
 }  // namespace
 
 std::optional<std::string> truth_warning(const RayScene& truth, std::span<const Vec3> points) {
@@ -45,15 +59,20 @@ std::optional<std::string> truth_warning(const RayScene& truth, std::span<const 
   const double median = quantile(distances_to(truth, looked), 0.5);
   if (!(extent > 0) || median <= kNear * extent) return std::nullopt;
   const double size = extent_of(of_truth);
-  constexpr double kUnitTolerance = 0.15;  // some of the surface may not have been measured
-  const UnitFactor* unit = unit_behind_factor(extent / size, kUnitTolerance);
-  return "this is hardly the truth of the result, half of which lies " + formatted(median, "%.3g") +
-         " mm and more off it; the truth is " + formatted(size, "%.3g") + " mm large, the result " +
-         formatted(extent, "%.3g") + " mm" +
-         (unit != nullptr ? ": the truth is probably in " + std::string(unit->words)
-                          : std::string(". Of a simulated scene it is truth/mesh.ply in the "
-                                        "scene's folder, not the mesh that was given to simulate; "
-                                        "evaluate --align moves a result onto it"));
+  const std::string advice = unit_advice(extent / size);
+  return "this is hardly the truth of the result: taken as mm, half of the result lies " +
+         formatted(median, "%.3g") + " and more off it; the truth is " + formatted(size, "%.3g") +
+         " large, the result " + formatted(extent, "%.3g") +
+         (advice.empty() ? ". Of a simulated scene it is truth/mesh.ply in the scene's folder, not "
+                           "the mesh that was given to simulate; evaluate --align moves a result "
+                           "onto it"
+                         : ": " + advice);
+}
+
+std::optional<std::string> unit_warning(const Rig& rig, AlignmentKind align) {
+  if (rig.unit_known || align == AlignmentKind::kSimilarity) return std::nullopt;
+  return "the rig's unit is unknown: figures and thresholds that are named mm are in that unit; "
+         "--align similarity measures in the truth's";
 }
 
 }  // namespace pencilscan

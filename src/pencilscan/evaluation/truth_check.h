@@ -4,7 +4,9 @@
 #include <span>
 #include <string>
 
+#include "pencilscan/evaluation/alignment.h"
 #include "pencilscan/geometry/ray_scene.h"
+#include "pencilscan/rig/rig.h"
 
 namespace pencilscan {
 
@@ -14,5 +16,9 @@ namespace pencilscan {
 /// or where there are no points.
 [[nodiscard]] std::optional<std::string> truth_warning(const RayScene& truth,
                                                        std::span<const Vec3> points);
+
+/// That the figures are not in mm: the rig's unit is unknown, and no similarity has brought the
+/// result to the truth's size.
+[[nodiscard]] std::optional<std::string> unit_warning(const Rig& rig, AlignmentKind align);
 
 }  // namespace pencilscan

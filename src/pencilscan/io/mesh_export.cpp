@@ -16,12 +16,13 @@
 namespace pencilscan {
 namespace {
 
-std::string obj_text(const TriangleMesh& mesh) {
-  std::string text = "# unit mm\n";
+std::string obj_text(const TriangleMesh& mesh, bool unit_known) {
+  std::string text = unit_known ? "# unit mm\n" : "# unit unknown\n";
   char line[128];
   for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
     const Vec3& v = mesh.vertices[i];
-    std::snprintf(line, sizeof line, "v %.5f %.5f %.5f", v[0], v[1], v[2]);
+    // Nine digits tell floats apart, whatever the unit is.
+    std::snprintf(line, sizeof line, "v %.9g %.9g %.9g", v[0], v[1], v[2]);
     text += line;
     if (!mesh.color.empty()) {
       const auto& c = mesh.color[i];
@@ -42,8 +43,8 @@ void append_vector(std::string& bytes, const Vec3& v) {
   for (int axis = 0; axis < 3; ++axis) append_little_endian(bytes, static_cast<float>(v[axis]));
 }
 
-std::string stl_bytes(const TriangleMesh& mesh) {
-  std::string bytes = "binary STL, unit mm";
+std::string stl_bytes(const TriangleMesh& mesh, bool unit_known) {
+  std::string bytes = unit_known ? "binary STL, unit mm" : "binary STL, unit unknown";
   bytes.resize(80, ' ');
   append_little_endian(bytes, static_cast<std::uint32_t>(mesh.faces.size()));
   for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
@@ -55,8 +56,10 @@ std::string stl_bytes(const TriangleMesh& mesh) {
   return bytes;
 }
 
-/// World z up in mm -> glTF's y up in m: (x, z, -y) / 1000.
-Vec3 gltf_position(const Vec3& v) { return Vec3(v[0], v[2], -v[1]) / 1000; }
+/// World z up in mm -> glTF's y up in m: (x, z, -y) / 1000. Numbers without a unit stay.
+Vec3 gltf_position(const Vec3& v, bool unit_known) {
+  return Vec3(v[0], v[2], -v[1]) / (unit_known ? 1000 : 1);
+}
 
 std::uint16_t unorm16(float value) {
   return static_cast<std::uint16_t>(std::lround(65535 * std::clamp(value, 0.F, 1.F)));
@@ -72,10 +75,10 @@ struct GltfData {
   std::size_t indices = 0;
 };
 
-GltfData gltf_data(const TriangleMesh& mesh) {
+GltfData gltf_data(const TriangleMesh& mesh, bool unit_known) {
   GltfData data;
   for (const Vec3& v : mesh.vertices) {
-    const Vec3 p = as_floats(gltf_position(v));
+    const Vec3 p = as_floats(gltf_position(v, unit_known));
     data.low = data.low.cwiseMin(p);
     data.high = data.high.cwiseMax(p);
     append_vector(data.bytes, p);
@@ -109,9 +112,10 @@ json gltf_view(std::size_t begin, std::size_t end, int target) {
 }
 
 /// What the data are.
-json gltf_description(const TriangleMesh& mesh, const GltfData& data) {
+json gltf_description(const TriangleMesh& mesh, const GltfData& data, bool unit_known) {
   json root;
   root["asset"] = {{"version", "2.0"}, {"generator", "pencilscan"}};
+  if (!unit_known) root["asset"]["extras"]["unit"] = "unknown";
   root["scene"] = 0;
   root["scenes"] = json::array({{{"nodes", {0}}}});
   root["nodes"] = json::array({{{"mesh", 0}, {"name", "surface"}}});
@@ -157,9 +161,9 @@ json gltf_description(const TriangleMesh& mesh, const GltfData& data) {
 
 /// glTF 2.0, "GLB File Format Specification": a header, a chunk of JSON padded with spaces and one
 /// of binary data padded with zeros, each to four bytes.
-std::string glb_bytes(const TriangleMesh& mesh) {
-  GltfData data = gltf_data(mesh);
-  std::string text = gltf_description(mesh, data).dump();
+std::string glb_bytes(const TriangleMesh& mesh, bool unit_known) {
+  GltfData data = gltf_data(mesh, unit_known);
+  std::string text = gltf_description(mesh, data, unit_known).dump();
   text.resize((text.size() + 3) / 4 * 4, ' ');
   data.bytes.resize((data.bytes.size() + 3) / 4 * 4, '\0');
   std::string bytes = "glTF";
@@ -175,15 +179,15 @@ std::string glb_bytes(const TriangleMesh& mesh) {
 
 }  // namespace
 
-void export_mesh(const std::filesystem::path& path, const TriangleMesh& mesh) {
+void export_mesh(const std::filesystem::path& path, const TriangleMesh& mesh, bool unit_known) {
   const std::string ending = lower_case(path.extension().string());
   std::string bytes;
   if (ending == ".obj") {
-    bytes = obj_text(mesh);
+    bytes = obj_text(mesh, unit_known);
   } else if (ending == ".stl") {
-    bytes = stl_bytes(mesh);
+    bytes = stl_bytes(mesh, unit_known);
   } else if (ending == ".glb") {
-    bytes = glb_bytes(mesh);
+    bytes = glb_bytes(mesh, unit_known);
   } else {
     throw InputError(path.string(), "", ending, "a mesh is exported to .obj, .stl or .glb");
   }

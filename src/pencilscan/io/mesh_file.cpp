@@ -130,20 +130,28 @@ TriangleMesh with_joined_vertices(const TriangleMesh& mesh) {
   return joined;
 }
 
+/// Reads a line of an OBJ with those that it goes on in, which a backslash at its end says; false
+/// at the end of the file. A comment ends with its line. `number` counts the lines of the file.
+bool read_obj_line(std::istream& lines, std::string& line, int& number) {
+  line.clear();
+  for (std::string part; std::getline(lines, part);) {
+    ++number;
+    part.erase(part.find_last_not_of(" \t\r") + 1);
+    const bool goes_on = part.ends_with('\\');
+    if (goes_on) part.back() = ' ';
+    line += part;
+    if (!goes_on || line.find('#') != std::string::npos) return true;
+  }
+  return !line.empty();
+}
+
 /// An OBJ as Assimp understands it. It passes over coordinates that begin with a point (".5",
 /// "-.5") or are no numbers, and takes those that follow for them.
 std::string with_leading_zeros(const std::filesystem::path& path, const std::string& obj) {
   std::string text;
   std::istringstream lines(obj);
   std::string line;
-  for (int number = 1; std::getline(lines, line); ++number) {
-    while (line.ends_with('\\')) {  // goes on in the next line
-      std::string rest;
-      std::getline(lines, rest);
-      line.back() = ' ';
-      line += rest;
-      ++number;
-    }
+  for (int number = 0; read_obj_line(lines, line, number);) {
     if (!line.starts_with("v ") && !line.starts_with("v\t")) {
       text += line + "\n";
       continue;
@@ -222,7 +230,7 @@ TriangleMesh read_mesh(const std::filesystem::path& path) {
   return mesh;
 }
 
-void write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh) {
+void write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh, bool unit_known) {
   const bool has_sigma = !mesh.sigma.empty();
   const bool has_confidence = !mesh.confidence.empty();
   PENCILSCAN_CHECK(!has_sigma || mesh.sigma.size() == mesh.vertices.size());
@@ -248,9 +256,9 @@ void write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh) {
     for (const int corner : face) append_little_endian(bytes, static_cast<std::int32_t>(corner));
   }
   write_atomically(path, [&](std::ostream& stream) {
-    stream << "ply\nformat binary_little_endian 1.0\ncomment unit mm, world frame of rig.json\n"
-           << "element vertex " << mesh.vertices.size()
-           << "\nproperty float x\nproperty float y\nproperty float z\n";
+    stream << "ply\nformat binary_little_endian 1.0\ncomment unit "
+           << (unit_known ? "mm" : "unknown") << ", world frame of rig.json\nelement vertex "
+           << mesh.vertices.size() << "\nproperty float x\nproperty float y\nproperty float z\n";
     if (has_sigma) stream << "property float sigma\n";
     if (has_confidence) stream << "property float confidence\n";
     if (has_hole) stream << "property uchar hole\n";

@@ -12,12 +12,15 @@ namespace pencilscan {
 [[nodiscard]] TriangleMesh read_mesh(const std::filesystem::path& path);
 
 /// Binary little-endian PLY: float x y z, optional float sigma, confidence, uchar hole; triangles.
-/// Whole or not at all.
-void write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh);
+/// `unit_known`: as the rig has it; else the file says "unit unknown". Whole or not at all.
+void write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh,
+                bool unit_known = true);
 
 /// Writes for other programs, by the ending: .obj (text, mm), .stl (binary, mm) or .glb (glTF 2.0
-/// binary: metres, y up, as glTF wants it), positions, triangles and colours. Whole or not at all.
-/// InputError for another ending.
-void export_mesh(const std::filesystem::path& path, const TriangleMesh& mesh);
+/// binary: metres, y up, as glTF wants it), positions, triangles and colours. Without `unit_known`
+/// the numbers are those of the mesh in all of them, and the file says that their unit is unknown.
+/// Whole or not at all. InputError for another ending.
+void export_mesh(const std::filesystem::path& path, const TriangleMesh& mesh,
+                 bool unit_known = true);
 
 }  // namespace pencilscan

@@ -70,6 +70,19 @@ TEST_F(Io, ObjCoordinatesMayBeginWithAPoint) {
         << word;
 }
 
+TEST_F(Io, ObjLinesGoOnBehindABackslash) {
+  // As Windows ends them, with a blank behind, in faces, and not out of a comment.
+  const TriangleMesh mesh = read_mesh(
+      put("t.obj",
+          "# C:\\models\\\r\nv 0 0 0\r\nv 6 \\\r\n0 0\r\nv 0 6 \\ \n0 # last \\\nv 0 0 6\n"
+          "f 1 3 \\\r\n2\r\nf 1 2 4\nf 1 4 3\nf 2 \\\n3 4\n"));
+  EXPECT_EQ(mesh.vertices.size(), 4U);
+  EXPECT_NEAR(signed_volume(mesh), 36, 1e-9);
+  EXPECT_THAT(
+      error_of([&] { return read_mesh(put("b.obj", "v 1 \\\r\n0 0\r\nv x 0 0\r\nf 1 1 1\n")); }),
+      ::testing::HasSubstr("line 3 = x"));
+}
+
 TEST_F(Io, ObjStlAndOffGiveOneClosedTetrahedron) {
   const auto obj = put("t.obj",
                        "v 0 0 0\nv 6 0 0\nv 0 6 0\nv 0 0 6\nvn 0 0 1\nf 1//1 3//1 2//1\n"
@@ -99,10 +112,42 @@ TEST_F(Io, ExportedMeshesAreReadBack) {
     const TriangleMesh read = read_mesh(folder_ / name);
     EXPECT_EQ(read.vertices.size(), ball.vertices.size()) << name;
     EXPECT_EQ(count_edges(read).boundary, 0U) << name;
-    // Five decimals in the text, floats in the binary file.
+    // Nine digits in the text, floats in the binary file.
     EXPECT_NEAR(signed_volume(read), signed_volume(ball), 1e-4 * signed_volume(ball)) << name;
   }
   EXPECT_THROW(export_mesh(folder_ / "ball.xyz", ball), InputError);
+}
+
+TEST_F(Io, ObjKeepsSmallVerticesApart) {
+  const TriangleMesh ball = make_sphere(3e-5, 8, Vec3(0.5, -0.25, 0));  // of a ring in metres
+  export_mesh(folder_ / "ball.obj", ball, false);
+  const TriangleMesh read = read_mesh(folder_ / "ball.obj");
+  EXPECT_EQ(read.vertices.size(), ball.vertices.size());
+  EXPECT_EQ(read.faces.size(), ball.faces.size());
+}
+
+TEST_F(Io, MeshesSayTheirUnit) {
+  const TriangleMesh box = make_box(Vec3(1, 2, 3));
+  const auto bytes_of = [&](const char* name, bool unit_known) {
+    if (std::string_view(name).ends_with(".ply")) {
+      write_mesh(folder_ / name, box, unit_known);
+    } else {
+      export_mesh(folder_ / name, box, unit_known);
+    }
+    return read_file(folder_ / name);
+  };
+  using ::testing::HasSubstr;
+  using ::testing::StartsWith;
+  EXPECT_THAT(bytes_of("b.ply", true), HasSubstr("\ncomment unit mm, world frame of rig.json\n"));
+  EXPECT_THAT(bytes_of("b.ply", false), HasSubstr("\ncomment unit unknown, world frame of"));
+  EXPECT_THAT(bytes_of("b.obj", true), StartsWith("# unit mm\n"));
+  EXPECT_THAT(bytes_of("b.obj", false), StartsWith("# unit unknown\n"));
+  EXPECT_THAT(bytes_of("b.stl", true), StartsWith("binary STL, unit mm "));
+  EXPECT_THAT(bytes_of("b.stl", false), StartsWith("binary STL, unit unknown "));
+  EXPECT_THAT(bytes_of("b.glb", true), ::testing::Not(HasSubstr("unknown")));
+  const std::string glb = bytes_of("b.glb", false);
+  EXPECT_THAT(glb, HasSubstr("\"extras\":{\"unit\":\"unknown\"}"));
+  EXPECT_THAT(glb, HasSubstr("\"max\":[0.5,1.5,1.0]"));  // numbers of the mesh, y up
 }
 
 TEST_F(Io, GlbIsInMetresWithYUp) {

@@ -1,6 +1,7 @@
 #include "pencilscan/jobs/film.h"
 
 #include <algorithm>
+#include <array>
 #include <cstdio>
 #include <nlohmann/json.hpp>
 #include <span>
@@ -13,13 +14,16 @@
 #include "pencilscan/io/partial_folder.h"
 #include "pencilscan/io/zarr_array.h"
 #include "pencilscan/pipeline/run_folder.h"
+#include "pencilscan/rig/rig.h"
 
 namespace pencilscan {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kFilmFormat = "surface/1";  ///< of the group's attribute `format`
+constexpr std::array<float, 3> kWhite = {1, 1, 1};
+constexpr const char* kFilmFormat = "surface/1";      ///< of the group's attribute `format`
+constexpr const char* kDevicesFile = "devices.json";  ///< the rig in use, beside the frames
 
 template <class Number>
 void write_column(const fs::path& folder, const std::vector<Number>& values, std::int64_t width) {
@@ -131,9 +135,9 @@ void write_attributes(TimeSamples& samples, bool has_color) {
   if (!has_color) return;
   samples.attribute("color3f[] primvars:displayColor", "interpolation = \"vertex\"",
                     [&](const TriangleMesh& mesh) {
-                      bool is_first = true;
-                      for (const auto& c : mesh.color) {
-                        samples.comma(std::exchange(is_first, false));
+                      for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
+                        const std::array<float, 3> c = mesh.color.empty() ? kWhite : mesh.color[i];
+                        samples.comma(i == 0);
                         samples.triple(static_cast<double>(c[0]), static_cast<double>(c[1]),
                                        static_cast<double>(c[2]));
                       }
@@ -143,6 +147,20 @@ void write_attributes(TimeSamples& samples, bool has_color) {
 std::size_t first_mesh(const Film& film) {
   return static_cast<std::size_t>(std::find(film.has_mesh.begin(), film.has_mesh.end(), 1) -
                                   film.has_mesh.begin());
+}
+
+/// Whether any mesh has colours; reads up to the first that has.
+bool has_colors(const Film& film) {
+  for (std::size_t k = 0; k < film.frames.size(); ++k)
+    if (film.has_mesh[k] != 0 && !read_mesh(film.mesh_file(k)).color.empty()) return true;
+  return false;
+}
+
+/// What the numbers are. USD takes those that say nothing for centimetres.
+const char* unit_metadata(const Film& film) {
+  if (film.unit_known) return "    metersPerUnit = 0.001\n";
+  return "    metersPerUnit = 1\n    customLayerData = {\n        string unit = \"unknown\"\n"
+         "    }\n";
 }
 
 }  // namespace
@@ -155,8 +173,10 @@ Film find_film(const fs::path& out, bool measured_only) {
   if (!has_run_inputs(out))
     throw InputError("--result", "", out.string(),
                      "must be an output folder of reconstruct (with inputs.json)");
-  Film film{out, read_run_inputs(out).frames, {}, measured_only};
+  Film film{out, read_run_inputs(out).frames, {}, true, measured_only};
   std::error_code ignored;
+  if (fs::exists(out / kDevicesFile, ignored))
+    film.unit_known = read_rig(out / kDevicesFile).unit_known;
   for (std::size_t k = 0; k < film.frames.size(); ++k)
     film.has_mesh.push_back(fs::exists(film.mesh_file(k), ignored) ? 1 : 0);
   if (first_mesh(film) == film.frames.size())
@@ -189,15 +209,15 @@ void write_film_zarr(const Film& film, const fs::path& folder, const Progress& p
 
 void write_film_usd(const Film& film, double frames_per_second, const fs::path& file,
                     const Progress& progress) {
-  const bool has_color = !read_mesh(film.mesh_file(first_mesh(film))).color.empty();
   write_atomically(file, [&](std::ostream& stream) {
     stream << "#usda 1.0\n(\n    defaultPrim = \"Shape\"\n    upAxis = \"Z\"\n"
-           << "    metersPerUnit = 0.001\n    startTimeCode = 0\n    endTimeCode = "
-           << film.frames.size() - 1 << "\n    timeCodesPerSecond = " << frames_per_second
+           << unit_metadata(film)
+           << "    startTimeCode = 0\n    endTimeCode = " << film.frames.size() - 1
+           << "\n    timeCodesPerSecond = " << frames_per_second
            << "\n    framesPerSecond = " << frames_per_second << "\n)\n\ndef Mesh \"Shape\"\n{\n"
            << "    uniform token subdivisionScheme = \"none\"\n";
     TimeSamples samples(film, stream, progress);
-    write_attributes(samples, has_color);
+    write_attributes(samples, has_colors(film));
     stream << "}\n";
   });
 }

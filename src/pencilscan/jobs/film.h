@@ -14,6 +14,7 @@ struct Film {
   std::filesystem::path out;        ///< output folder of reconstruct
   std::vector<std::string> frames;  ///< all frames of the sequence
   std::vector<char> has_mesh;       ///< per frame
+  bool unit_known = true;           ///< of the rig in use
   bool measured_only = false;       ///< mesh_measured.ply in place of the closed mesh.ply
 
   [[nodiscard]] std::filesystem::path mesh_file(std::size_t frame) const;
@@ -29,7 +30,9 @@ void write_film_zarr(const Film& film, const std::filesystem::path& folder,
                      const Progress& progress = {});
 
 /// One mesh of USD text (.usda) with time samples of points, faces, colours and sigma; the k-th
-/// frame is time code k. A frame without a mesh shows nothing. One frame is in memory at a time.
+/// frame is time code k. A frame without a mesh shows nothing; one without colours is white where
+/// others have some. Of an unknown unit `metersPerUnit` is 1, and `customLayerData` says so. One
+/// frame is in memory at a time.
 void write_film_usd(const Film& film, double frames_per_second, const std::filesystem::path& file,
                     const Progress& progress = {});
 

@@ -11,6 +11,7 @@
 #include "pencilscan/io/temporary_folder.h"
 #include "pencilscan/io/zarr_array.h"
 #include "pencilscan/pipeline/run_folder.h"
+#include "pencilscan/rig/sample_devices.h"
 
 namespace pencilscan {
 namespace {
@@ -115,6 +116,40 @@ TEST_F(Films, UsdHasATimeSampleAFrame) {
   const auto counts = text.find("faceVertexCounts.timeSamples");
   const std::string part = text.substr(counts, text.find('}', counts) - counts);
   EXPECT_EQ(count_of(part, "3"), 12 + ball);
+}
+
+TEST_F(Films, AFrameWithoutColorsIsWhiteAmongOthers) {
+  TriangleMesh box = make_box({2, 4, 6});
+  box.sigma.assign(box.vertices.size(), 0.01F);
+  write_mesh(out() / "000000" / "mesh.ply", box);
+  const fs::path file = temporary_.path() / "film.usda";
+  write_film_usd(find_film(out(), false), 30, file);
+  const std::string text = read_file(file);
+  const auto colors = text.find("primvars:displayColor.timeSamples");
+  ASSERT_NE(colors, std::string::npos);
+  EXPECT_EQ(count_of(text.substr(colors), "(1, 1, 1)"), box.vertices.size());
+  EXPECT_GT(count_of(text.substr(colors), "(0."), 0U);
+}
+
+TEST_F(Films, AFilmWithoutColorsHasNone) {
+  for (const char* frame : {"000000", "000002"})
+    write_mesh(out() / frame / "mesh.ply", make_box({2, 4, 6}));
+  const fs::path file = temporary_.path() / "film.usda";
+  write_film_usd(find_film(out(), false), 30, file);
+  EXPECT_EQ(count_of(read_file(file), "displayColor"), 0U);
+}
+
+TEST_F(Films, ARigOfUnknownUnitGivesOne) {
+  const fs::path file = temporary_.path() / "film.usda";
+  Rig rig = sample::small_rig(480, 360, 110);
+  write_rig(rig, out() / "devices.json");
+  write_film_usd(find_film(out(), false), 30, file);
+  EXPECT_THAT(read_file(file), HasSubstr("    metersPerUnit = 0.001\n    startTimeCode"));
+  rig.unit_known = false;
+  write_rig(rig, out() / "devices.json");
+  write_film_usd(find_film(out(), false), 30, file);
+  EXPECT_THAT(read_file(file), HasSubstr("    metersPerUnit = 1\n    customLayerData = {\n"
+                                         "        string unit = \"unknown\"\n    }\n"));
 }
 
 TEST_F(Films, WhatIsNoFilmIsRefusedAndNothingElseReplaced) {

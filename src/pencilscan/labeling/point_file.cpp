@@ -87,11 +87,13 @@ class Columns {
 
 }  // namespace
 
-void write_points(const std::filesystem::path& path, const std::vector<MeasuredPoint>& points) {
+void write_points(const std::filesystem::path& path, const std::vector<MeasuredPoint>& points,
+                  bool unit_known) {
   const KnownProperties known = known_of(points);
   write_atomically(path, [&](std::ostream& stream) {
-    stream << "ply\nformat binary_little_endian 1.0\ncomment unit mm, world frame of rig.json\n"
-           << "element vertex " << points.size() << "\n";
+    stream << "ply\nformat binary_little_endian 1.0\ncomment unit "
+           << (unit_known ? "mm" : "unknown") << ", world frame of rig.json\nelement vertex "
+           << points.size() << "\n";
     for (const char* name : {"x", "y", "z", "u", "v"}) stream << "property float " << name << "\n";
     for (const char* name : {"camera", "projector", "pattern"}) {
       stream << "property uchar " << name << "\n";

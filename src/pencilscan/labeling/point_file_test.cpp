@@ -6,6 +6,7 @@
 #include <fstream>
 
 #include "pencilscan/core/error.h"
+#include "pencilscan/io/file.h"
 #include "pencilscan/io/temporary_folder.h"
 
 namespace pencilscan {
@@ -60,6 +61,15 @@ TEST_F(PointFile, PointsRoundTrip) {
     EXPECT_EQ(back[i].line, points[i].line);
     EXPECT_EQ(back[i].plane, points[i].plane);
   }
+}
+
+TEST_F(PointFile, PointsSayTheirUnit) {
+  write_points(folder_ / "mm.ply", std::vector<MeasuredPoint>(1));
+  write_points(folder_ / "any.ply", std::vector<MeasuredPoint>(1), false);
+  EXPECT_THAT(read_file(folder_ / "mm.ply"),
+              ::testing::HasSubstr("1.0\ncomment unit mm, world frame of rig.json\nelement"));
+  EXPECT_THAT(read_file(folder_ / "any.ply"),
+              ::testing::HasSubstr("1.0\ncomment unit unknown, world frame of rig.json\nelement"));
 }
 
 TEST_F(PointFile, PointsOfOtherOrderAndMorePropertiesAreRead) {

@@ -3,8 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 #include <string>
+#include <utility>
 
+#include "pencilscan/core/formatted.h"
+#include "pencilscan/core/median.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/depth/depth_image.h"
 #include "pencilscan/io/image.h"
@@ -56,24 +60,62 @@ cv::Mat hole_picture(const Device& camera, const DepthMap& map) {
   return with_legend;
 }
 
+constexpr float kFarthest = 6553;  ///< that 16 bits of a tenth hold
+
+/// Depth in tenths of the rig's unit; 0: none, or none that 16 bits hold.
+cv::Mat in_tenths(const cv::Mat& depth) {
+  cv::Mat tenths(depth.size(), CV_16U, cv::Scalar(0));
+  for (int v = 0; v < depth.rows; ++v) {
+    for (int u = 0; u < depth.cols; ++u) {
+      const float z = depth.at<float>(v, u);
+      if (z < kFarthest)
+        tenths.at<std::uint16_t>(v, u) = static_cast<std::uint16_t>(std::lround(10 * z));
+    }
+  }
+  return tenths;
+}
+
+/// What the PNG of a camera lacks of its depth.
+std::optional<std::string> png_warning(const Camera& camera, const cv::Mat& depth,
+                                       const std::string& unit) {
+  std::vector<float> depths;
+  for (int v = 0; v < depth.rows; ++v) {
+    for (int u = 0; u < depth.cols; ++u)
+      if (const float z = depth.at<float>(v, u); z > 0) depths.push_back(z);
+  }
+  if (depths.empty()) return std::nullopt;
+  const std::string file = "depth/" + camera.name;
+  const auto far =
+      std::count_if(depths.begin(), depths.end(), [](float z) { return !(z < kFarthest); });
+  if (far > 0) {
+    const double percent = 100 * static_cast<double>(far) / static_cast<double>(depths.size());
+    return file + ".png holds 0 (none) in place of " + formatted(percent, "%.3g") +
+           " % of the depths, which reach " +
+           formatted(static_cast<double>(*std::max_element(depths.begin(), depths.end())), "%.4g") +
+           " " + unit + ": 16 bits in steps of 0.1 end at 6553; " + file + ".tiff holds them all";
+  }
+  constexpr double kWidestStep = 2;  // of what a pixel covers
+  const double pixel = static_cast<double>(upper_median(std::move(depths))) / camera.K(0, 0);
+  if (0.1 <= kWidestStep * pixel) return std::nullopt;
+  return file + ".png is coarse: its steps are 0.1 " + unit + ", and a pixel covers " +
+         formatted(pixel, "%.2g") + "; " + file + ".tiff holds the depths as they are";
+}
+
 }  // namespace
 
-void write_depth_maps(const fs::path& folder, const Rig& rig, const ShapeResult& shape) {
+std::vector<std::string> write_depth_maps(const fs::path& folder, const Rig& rig,
+                                          const ShapeResult& shape) {
+  std::vector<std::string> warnings;
   for (const DepthMap& map : shape.depth.maps) {
     const Camera& camera = rig.cameras[static_cast<std::size_t>(map.camera)];
     const DepthImage image = depth_image(camera, map);
     write_image(folder / "depth" / (camera.name + ".tiff"), image.depth);
     write_image(folder / "sigma" / (camera.name + ".tiff"), image.sigma);
-    cv::Mat tenths(camera.height, camera.width, CV_16U, cv::Scalar(0));
-    for (int v = 0; v < camera.height; ++v) {
-      for (int u = 0; u < camera.width; ++u) {
-        const float z = image.depth.at<float>(v, u);
-        if (z < 6553)
-          tenths.at<std::uint16_t>(v, u) = static_cast<std::uint16_t>(std::lround(10 * z));
-      }
-    }
-    write_image(folder / "depth" / (camera.name + ".png"), tenths);
+    write_image(folder / "depth" / (camera.name + ".png"), in_tenths(image.depth));
+    if (auto warning = png_warning(camera, image.depth, unit_name(rig)))
+      warnings.push_back(std::move(*warning));
   }
+  return warnings;
 }
 
 void write_hole_pictures(const fs::path& folder, const Rig& rig, const ShapeResult& shape) {

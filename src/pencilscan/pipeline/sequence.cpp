@@ -50,15 +50,17 @@ void write_frame(const Rig& rig, const FrameSource& frames, std::size_t index,
   const double reading = total.seconds();
   auto [points, shape, times] = reconstruct_frame(rig, frame, options.frame, links);
   const SurfaceResult& surface = shape.surface;
-  write_points(folder / "points.ply", points.points);
+  write_points(folder / "points.ply", points.points, rig.unit_known);
   write_curves(folder / "curves.ply", describe_curves(rig, points));
   if (options.frame.meshes) {
-    write_mesh(folder / "mesh.ply", surface.mesh);
-    write_mesh(folder / "mesh_measured.ply", surface.measured);
+    write_mesh(folder / "mesh.ply", surface.mesh, rig.unit_known);
+    write_mesh(folder / "mesh_measured.ply", surface.measured, rig.unit_known);
     for (const std::string& format : options.mesh_formats)
-      export_mesh(folder / ("mesh." + format), surface.mesh);
+      export_mesh(folder / ("mesh." + format), surface.mesh, rig.unit_known);
   }
-  if (options.frame.meshes && options.depth_maps) write_depth_maps(folder, rig, shape);
+  std::vector<std::string> of_depth_maps;
+  if (options.frame.meshes && options.depth_maps)
+    of_depth_maps = write_depth_maps(folder, rig, shape);
   if (options.pictures) {
     const Stopwatch picture_watch;
     write_camera_pictures(folder / "pictures", rig, frame);
@@ -73,6 +75,7 @@ void write_frame(const Rig& rig, const FrameSource& frames, std::size_t index,
   timing["seconds"]["total"] = total.seconds();
   write_json(folder / "timing.json", timing);
   ordered_json report = frame_report(rig, frame, points, shape);
+  for (std::string& warning : of_depth_maps) report["warnings"].push_back(std::move(warning));
   for (std::size_t c = 0; c < images.of_cameras.size(); ++c)
     if (images.of_cameras[c] != 0) report["cameras"][c]["picture"] = hex(images.of_cameras[c]);
   write_json(folder / "report.json", report);
