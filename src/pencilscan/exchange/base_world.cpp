@@ -7,6 +7,7 @@
 #include "pencilscan/core/formatted.h"
 #include "pencilscan/core/length_units.h"
 #include "pencilscan/core/median.h"
+#include "pencilscan/geometry/least_squares.h"
 #include "pencilscan/rig/device_list.h"
 
 namespace pencilscan {
@@ -186,7 +187,7 @@ RigidTransform laid_onto(const std::vector<Common>& common, const MergedFiles& f
       to.col(column) = common[i].in_base.inverse() * beside;
     }
   }
-  const Eigen::Matrix4d found = Eigen::umeyama(from, to, false);
+  const Eigen::Matrix4d found = fit_similarity(from, to, false);
   return {found.topLeftCorner<3, 3>(), found.topRightCorner<3, 1>()};
 }
 
