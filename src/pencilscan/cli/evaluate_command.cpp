@@ -93,12 +93,11 @@ void run_evaluate(const EvaluateOptions& options) {
     const Evaluation evaluation = evaluate(truth, rig, result.input, evaluation_options);
     nlohmann::ordered_json figures = figures_json(evaluation, rig);
     if (const auto warning = unit_warning(rig, evaluation_options.align)) {
-      std::cerr << "pencilscan: warning: " << options.rig_path << ": " << *warning << "\n";
+      warn_of(options.rig_path + ": " + *warning);
       figures["warnings"].push_back(options.rig_path + ": " + *warning);
     }
     if (evaluation.truth_warning) {
-      std::cerr << "pencilscan: warning: " << options.truth_path << ": "
-                << *evaluation.truth_warning << "\n";
+      warn_of(options.truth_path + ": " + *evaluation.truth_warning);
     }
     if (evaluation.point_distance && !evaluation.labels) {
       std::cerr << "pencilscan: " << result.points_path.string()

@@ -1,27 +1,21 @@
 #include "pencilscan/rig/object_space.h"
 
-#include <algorithm>
 #include <utility>
 #include <vector>
 
 #include "pencilscan/core/median.h"
+#include "pencilscan/rig/viewing_distance.h"
 
 namespace pencilscan {
 
 namespace {
-
-/// From a device to the volume's centre. One within the volume sees things a radius away and
-/// nearer.
-double distance_to(const Sphere& volume, const Device& device) {
-  return std::max((device.center() - volume.center).norm(), volume.radius);
-}
 
 /// The median over the patterns of a length on the panel, as the volume's centre sees it.
 double length_at_center(const Rig& rig, double LinePattern::*length_px) {
   const Sphere volume = working_volume(rig);
   std::vector<double> lengths;
   for (const Projector& projector : rig.projectors) {
-    const double distance = distance_to(volume, projector);
+    const double distance = viewing_distance(projector, volume);
     for (const LinePattern& pattern : projector.patterns) {
       const auto axis = static_cast<Eigen::Index>(pattern.axis);
       lengths.push_back(pattern.*length_px * distance / projector.K(axis, axis));
@@ -36,7 +30,7 @@ double line_spacing(const Rig& rig) { return length_at_center(rig, &LinePattern:
 double line_width(const Rig& rig) { return length_at_center(rig, &LinePattern::line_width_px); }
 
 double pixels_at_center(const Rig& rig, const Device& device, double length) {
-  return length * device.focal_px() / distance_to(working_volume(rig), device);
+  return length * device.focal_px() / viewing_distance(device, working_volume(rig));
 }
 
 ObjectSpace::ObjectSpace(const Rig& rig, double volume_margin)

@@ -7,6 +7,7 @@
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/median.h"
 #include "pencilscan/geometry/least_squares.h"
+#include "pencilscan/rig/viewing_distance.h"
 
 namespace pencilscan {
 namespace {
@@ -132,9 +133,7 @@ double footprint(const Rig& rig) {
   std::vector<double> footprints;
   for (const Camera& camera : rig.cameras) {
     if (camera.sees_texture_only) continue;
-    // One within the volume sees things a radius away and nearer.
-    const double distance = std::max((camera.center() - volume.center).norm(), volume.radius);
-    footprints.push_back(distance / camera.focal_px());
+    footprints.push_back(viewing_distance(camera, volume) / camera.focal_px());
   }
   return footprints.empty() ? 1 : upper_median(std::move(footprints));
 }
