@@ -33,21 +33,26 @@ class Mesh:
         Albedo in linear light: red, green, blue in [0, 1].
     hole : (n,) uint8, or None
         Why nobody measured the vertex; 0 where it was measured.
+    unit_known : bool
+        False: of a rig of unknown unit; lengths are its numbers, and files that are written say so.
 
     Other programs take the arrays as they are: `trimesh.Trimesh(mesh.vertices, mesh.faces)`,
     `open3d.utility.Vector3dVector(mesh.vertices)`.
     """
+
+    unit_known: bool = True
 
     def __init__(self, vertices: Any, faces: Any) -> None:
         """From arrays of the shapes (n, 3), mm, and (m, 3); they are copied."""
         self._core = _core.Mesh(np.asarray(vertices, dtype=np.float64), _whole(faces))
 
     @classmethod
-    def _of(cls, core: Any) -> Optional["Mesh"]:
+    def _of(cls, core: Any, unit_known: bool = True) -> Optional["Mesh"]:
         if core is None:
             return None
         mesh = cls.__new__(cls)
         mesh._core = core
+        mesh.unit_known = unit_known
         return mesh
 
     @property
@@ -89,8 +94,12 @@ class Mesh:
         return self._core.volume_mm3
 
     def write(self, path: PathLike) -> None:
-        """Writes .ply (all there is), .obj, .stl (mm) or .glb (metres, y up)."""
-        self._core.write(os.fspath(path))
+        """Writes .ply (all there is), .obj, .stl (mm) or .glb (metres, y up).
+
+        Where the unit is unknown, the numbers are those of the mesh in all of them, and the file
+        says so.
+        """
+        self._core.write(os.fspath(path), self.unit_known)
 
     def __repr__(self) -> str:
         return f"<pencilscan.Mesh: {len(self.vertices)} vertices, {len(self.faces)} faces>"
@@ -294,8 +303,8 @@ class Result:
         self.points = Points(core.points)
         self.curves = Curves(core.curves)
         self.crossings = Crossings(core.crossings)
-        self.mesh = Mesh._of(core.mesh)
-        self.measured = Mesh._of(core.measured)
+        self.mesh = Mesh._of(core.mesh, core.unit_known)
+        self.measured = Mesh._of(core.measured, core.unit_known)
         self.depth = {name: CameraDepth(*maps) for name, maps in core.depth.items()}
         self.report: dict = json.loads(core.report)
 

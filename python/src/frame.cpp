@@ -152,6 +152,7 @@ void add_results(py::module_& module) {
       .def_property_readonly(
           "crossings", [](const ResultPtr& r) { return crossing_arrays(r->curves, py::cast(r)); })
       .def_property_readonly("depth", &depth_arrays)
+      .def_readonly("unit_known", &Reconstruction::unit_known)
       .def_property_readonly("mesh", [](const ResultPtr& r) { return part(r, r->mesh); })
       .def_property_readonly("measured", [](const ResultPtr& r) { return part(r, r->measured); })
       .def_property_readonly("report", [](const Reconstruction& r) { return r.report; })

@@ -111,12 +111,12 @@ void add_mesh(py::module_& module) {
                         result.mutable_data());
             return result;
           })
-      .def("write", [](const TriangleMesh& mesh, const std::string& path) {
+      .def("write", [](const TriangleMesh& mesh, const std::string& path, bool unit_known) {
         const py::gil_scoped_release unlocked;
         if (path.ends_with(".ply")) {
-          write_mesh(path, mesh);
+          write_mesh(path, mesh, unit_known);
         } else {
-          export_mesh(path, mesh);
+          export_mesh(path, mesh, unit_known);
         }
       });
   module.def("read_mesh", [](const std::string& path) {

@@ -406,6 +406,10 @@ class PackageTest(unittest.TestCase):
         path = self.scene.folder / "ball.stl"
         again.write(path)
         self.assertEqual(len(ps.read_mesh(path).faces), len(ball.faces))
+        again.unit_known = False
+        again.write(self.scene.folder / "ball.obj")
+        self.assertIn("unit unknown", (self.scene.folder / "ball.obj").read_text()[:200])
+        self.assertTrue(self.scene.result.mesh.unit_known)
 
     def test_calibration_gives_a_rig(self) -> None:
         folder = self.scene.folder / "calibration"

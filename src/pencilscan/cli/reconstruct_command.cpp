@@ -15,11 +15,10 @@ namespace {
 
 void print_refinement(const RefinementOutcome& refinement, nlohmann::ordered_json& figures) {
   for (const std::string& move : refinement.moves) std::cerr << "pencilscan: " << move << "\n";
-  for (const std::string& warning : refinement.warnings)
-    std::cerr << "pencilscan: warning: " << warning << "\n";
+  for (const std::string& warning : refinement.warnings) warn_of(warning);
   figures["rig_refined"] = refinement.refined;
   if (!refinement.refined) {
-    std::cerr << "pencilscan: warning: the rig was not refined: " << refinement.reason << "\n";
+    warn_of("the rig was not refined: " + refinement.reason);
     return;
   }
   figures["crossing_disagreement_before_px"] = refinement.before_px;
@@ -45,12 +44,10 @@ void reconstruct(const ReconstructOptions& options) {
   nlohmann::ordered_json figures;
   if (refinement) print_refinement(*refinement, figures);
   std::size_t failed = 0;
-  for (const std::string& warning : warnings)
-    std::cerr << "pencilscan: warning: " << warning << "\n";
+  for (const std::string& warning : warnings) warn_of(warning);
   for (const FrameOutcome& outcome : outcomes) {
-    for (const std::string& warning : outcome.warnings) {
-      std::cerr << "pencilscan: warning: frame " << outcome.name << ": " << warning << "\n";
-    }
+    for (const std::string& warning : outcome.warnings)
+      warn_of("frame " + outcome.name + ": " + warning);
     if (!outcome.done) {
       std::cerr << "pencilscan: frame " << outcome.name << ": " << outcome.failure << "\n";
       ++failed;

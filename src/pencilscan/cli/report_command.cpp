@@ -33,10 +33,9 @@ void run_report(const ReportOptions& options) {
       write_report(options.folder, file, page, stderr_progress("nothing was written"));
   constexpr std::size_t kShown = 12;
   for (std::size_t i = 0; i < std::min(report.missing.size(), kShown); ++i)
-    std::cerr << "pencilscan: warning: " << report.missing[i] << "\n";
+    warn_of(report.missing[i]);
   if (report.missing.size() > kShown) {
-    std::cerr << "pencilscan: warning: " << report.missing.size() - kShown
-              << " more are listed in the report\n";
+    warn_of(std::to_string(report.missing.size() - kShown) + " more are listed in the report");
   }
   nlohmann::ordered_json figures;
   figures["results"] = report.results;

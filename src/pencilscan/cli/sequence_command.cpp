@@ -134,27 +134,25 @@ Json camera_figures(const RecordedCamera& camera, const CameraClock& clock) {
 }
 
 void say_what_is_wrong(const Recording& recording, const FrameSets& sets) {
-  const auto warn = [](const std::string& text) {
-    std::cerr << "pencilscan: warning: " << text << "\n";
-  };
   if (!recording.is_closed())
-    warn("the recording was cut off or goes on: it ends with the last picture that is whole");
-  if (!sets.by_row) warn("the rows are not the moments: pictures are grouped by their time stamps");
+    warn_of("the recording was cut off or goes on: it ends with the last picture that is whole");
+  if (!sets.by_row)
+    warn_of("the rows are not the moments: pictures are grouped by their time stamps");
   for (std::size_t c = 0; c < sets.clocks.size(); ++c) {
     const CameraClock& clock = sets.clocks[c];
     const std::string who = "camera " + recording.cameras()[c].name;
     if (!clock.dropped.empty())
-      warn(who + " has no picture in " + std::to_string(clock.dropped.size()) +
-           " frames: " + frame_list(clock.dropped));
+      warn_of(who + " has no picture in " + std::to_string(clock.dropped.size()) +
+              " frames: " + frame_list(clock.dropped));
     if (!clock.late.empty())
-      warn(who + " is early or late in " + std::to_string(clock.late.size()) +
-           " frames: " + frame_list(clock.late));
+      warn_of(who + " is early or late in " + std::to_string(clock.late.size()) +
+              " frames: " + frame_list(clock.late));
     if (!clock.shared)
-      warn(who + ": its clock counts from another moment; it was shifted onto the others'");
+      warn_of(who + ": its clock counts from another moment; it was shifted onto the others'");
   }
   for (const auto& [before, count] : sets.gaps)
-    warn("before frame " + six_digits(before) + " " + std::to_string(count) +
-         " moments are missing in all cameras");
+    warn_of("before frame " + six_digits(before) + " " + std::to_string(count) +
+            " moments are missing in all cameras");
 }
 
 void run_info(const InfoCommand& command) {

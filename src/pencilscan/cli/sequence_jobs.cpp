@@ -83,7 +83,7 @@ void report_sequence(const CommonOptions& common, const fs::path& out) {
   write_summary(out, summary);
   say_holes(summary);
   for (const SequenceEvent& event : summary.watch.events)
-    std::cerr << "pencilscan: warning: from frame " << event.frame << ": " << event.text << "\n";
+    warn_of("from frame " + event.frame + ": " + event.text);
   print_figures(common, summary_figures(out, summary));
   if (!summary.holes.empty()) {
     throw StageError(std::to_string(summary.holes.size()) + " of " +
@@ -100,8 +100,8 @@ void run_here(const Job& job, std::span<const std::size_t> tasks, Interruption& 
   options.say = [](const std::string& text) { std::cerr << "pencilscan: " << text << std::endl; };
   const TaskReport report = run_tasks(job, tasks, options);
   if (!report.lost.empty()) {
-    std::cerr << "pencilscan: warning: " << report.lost.size()
-              << " tasks were ended as often as they may be started\n";
+    warn_of(std::to_string(report.lost.size()) +
+            " tasks were ended as often as they may be started");
   }
 }
 

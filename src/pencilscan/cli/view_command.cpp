@@ -36,8 +36,9 @@ void run_view(const ViewCommandOptions& options) {
   print_figures(options.common, figures);
   std::cout.flush();
   if (view.address != ViewOptions{}.address) {
-    std::cerr << "pencilscan: warning: other computers reach this page, and what they read is not "
-                 "encrypted; only who knows the link gets an answer\n";
+    warn_of(
+        "other computers reach this page, and what they read is not encrypted; only who knows "
+        "the link gets an answer");
   }
   std::cerr << "pencilscan: open " << server.link() << " in a browser; Ctrl-C stops\n";
   std::thread waiting([&] {

@@ -1,5 +1,7 @@
 #include "pencilscan/lab/virtual_lab.h"
 
+#include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
@@ -12,8 +14,30 @@ namespace {
 
 // Numbers of pixel formats (PFNC) that cameras of this laboratory can be asked for.
 constexpr std::uint32_t kMono8 = 0x01080001;
-constexpr std::uint32_t kBayerRG8 = 0x01080009;
 constexpr std::uint32_t kRgb8 = 0x02180014;
+struct BayerFormat {
+  std::uint32_t number;
+  const char* name;
+  const char* mosaic;
+};
+constexpr std::array<BayerFormat, 4> kBayer{{{0x01080008, "BayerGR8", "GRBG"},
+                                             {0x01080009, "BayerRG8", "RGGB"},
+                                             {0x0108000A, "BayerGB8", "GBRG"},
+                                             {0x0108000B, "BayerBG8", "BGGR"}}};
+
+std::optional<Mosaic> mosaic_of(std::uint32_t format) {
+  for (const BayerFormat& bayer : kBayer)
+    if (bayer.number == format) return Mosaic::from_name(bayer.mosaic);
+  return std::nullopt;
+}
+
+std::string format_of(const std::optional<Mosaic>& mosaic) {
+  if (!mosaic) return "RGB8";
+  const auto* const bayer = std::find_if(kBayer.begin(), kBayer.end(), [&](const BayerFormat& b) {
+    return b.mosaic == mosaic->name();
+  });
+  return bayer->name;
+}
 
 const std::string kSerial = "LAB";
 
@@ -58,11 +82,10 @@ std::unique_ptr<FakeCamera> VirtualLab::make_camera(std::size_t camera) {
                                  double exposure_us, double gain) {
     wait_until(begin_ns + std::llround(1e3 * exposure_us));
     watch_.settle();
-    const std::optional<Mosaic> mosaic =
-        format == kBayerRG8 ? Mosaic::from_name("RGGB") : std::nullopt;
+    const std::optional<Mosaic> mosaic = mosaic_of(format);
     cv::Mat seen = room_.expose(camera, begin_ns, exposure_us, std::pow(10, gain / 20), mosaic);
     if (format == kMono8) cv::cvtColor(seen, seen, cv::COLOR_RGB2GRAY);
-    const bool known = format == kMono8 || format == kBayerRG8 || format == kRgb8;
+    const bool known = format == kMono8 || format == kRgb8 || mosaic;
     if (known && seen.size() == picture.size() && seen.type() == picture.type())
       seen.copyTo(picture);
     else
@@ -80,7 +103,7 @@ Lab VirtualLab::lab_file() const {
     camera.device = "aravis:Aravis-Fake-" + kSerial + std::to_string(c);
     camera.exposure_ms = kRoomExposureMs;
     camera.gain = 0;
-    camera.pixel_format = rig.cameras[c].mosaic ? "BayerRG8" : "RGB8";
+    camera.pixel_format = format_of(rig.cameras[c].mosaic);
   }
   for (std::size_t p = 0; p < rig.projectors.size(); ++p)
     lab.outputs[rig.projectors[p].name] = virtual_output(p);

@@ -112,6 +112,14 @@ TEST_F(Virtual, CapturesAreThoseOfTheSimulator) {
   EXPECT_LE(cv::countNonZero(other), 3 * 160 * 120 / 1000);
 }
 
+TEST_F(Virtual, ACameraHasItsOwnMosaic) {
+  rig_.cameras[1].mosaic = Mosaic::from_name("GRBG");
+  lab_.reset();
+  lab_ = std::make_unique<VirtualLab>(rig_, temporary_.path() / "screen");
+  EXPECT_EQ(lab_->lab_file().cameras.at("cam0").pixel_format, "RGB8");
+  EXPECT_EQ(lab_->lab_file().cameras.at("cam1").pixel_format, "BayerGR8");
+}
+
 TEST_F(Virtual, ProjectorsThatAreLateAreWaitedFor) {
   lab_->room().set_delay(0, 3 * kRoomExposureMs);
   lab_->room().set_delay(1, kRoomExposureMs);
