@@ -17,7 +17,7 @@ MeshLike = Union["Mesh", PathLike, tuple, Any]
 
 
 class Mesh:
-    """A triangle mesh. Its arrays are views of the library's memory.
+    """A triangle mesh. Its arrays are views of the library's memory, to read.
 
     Attributes
     ----------
@@ -109,7 +109,15 @@ def _whole(faces: Any) -> np.ndarray:
     faces = np.asarray(faces)
     if faces.size and not np.issubdtype(faces.dtype, np.integer):
         raise InputError("mesh", "faces", str(faces.dtype), "must be whole numbers")
+    if faces.size and not 0 <= faces.min() <= faces.max() <= np.iinfo(np.int32).max:
+        raise InputError("mesh", "faces", f"{faces.min()} to {faces.max()}", "must be indices of vertices")
     return faces.astype(np.int32) if faces.size else np.empty((0, 3), np.int32)
+
+
+def _check_range(name: str, value: int, last: int) -> None:
+    """InputError unless 0 <= value <= last, before the library says it in terms of its own."""
+    if not 0 <= value <= last:
+        raise InputError("options", name, str(value), f"must be a whole number from 0 to {last}")
 
 
 def read_mesh(path: PathLike) -> Mesh:
@@ -454,6 +462,8 @@ def simulate(
     progress
         As in `reconstruct`.
     """
+    _check_range("seed", seed, 2**64 - 1)
+    _check_range("frame", frame, 2**31 - 1)
     shift = tuple(float(x) for x in translate_mm)
     if len(shift) != 3:
         raise InputError("simulate", "translate_mm", str(shift), "must have three numbers")

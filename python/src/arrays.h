@@ -13,7 +13,8 @@ namespace pencilscan::python {
 
 namespace py = pybind11;
 
-/// A view of a field of a vector's elements; `owner` keeps them alive. Shape (n) or (n, columns).
+/// A view of a field of a vector's elements, to read; `owner` keeps them alive. Shape (n) or
+/// (n, columns). Indices among them were checked: nobody may change them behind that check.
 template <class Element, class T>
 py::array field_view(const std::vector<Element>& values, std::size_t offset, py::ssize_t columns,
                      const py::object& owner) {
@@ -25,7 +26,9 @@ py::array field_view(const std::vector<Element>& values, std::size_t offset, py:
     strides.push_back(sizeof(T));
   }
   if (values.empty()) return py::array(py::dtype::of<T>(), shape);
-  return py::array(py::dtype::of<T>(), shape, strides, first, owner);
+  py::array view(py::dtype::of<T>(), shape, strides, first, owner);
+  view.attr("setflags")(py::arg("write") = false);
+  return view;
 }
 
 /// The pixels of a matrix, shape (rows, columns[, channels]). They stay alive with the array;

@@ -354,7 +354,7 @@ class PackageTest(unittest.TestCase):
             ps.reconstruct(rig, {"cam0": np.zeros((360, 480, 3), np.uint8)})
         with self.assertRaises(TypeError):
             ps.reconstruct(rig, frame, metod="joint")
-        self.assertIn("must be joint", str(self.complaint(
+        self.assertIn("must be one of joint", str(self.complaint(
             lambda: ps.reconstruct(rig, frame, method="magic"))))
 
     def test_pictures_may_be_a_list_in_the_rigs_order(self) -> None:
@@ -376,6 +376,16 @@ class PackageTest(unittest.TestCase):
         self.assertIn("view", str(self.complaint(lambda: ps.simulate(self.scene.rig, far))))
         self.assertIn("index", str(self.complaint(lambda: ps.Mesh(np.eye(3), [[0, 1, 3]]))))
         self.assertIn("(n, 3)", str(self.complaint(lambda: ps.Mesh(np.eye(2), [[0, 1, 1]]))))
+        wrapped = np.array([[0, 1, 2 + 2**32]])
+        self.assertIn("indices", str(self.complaint(lambda: ps.Mesh(np.eye(3), wrapped))))
+        ball = ps.make_sphere(100)
+        for array in (ball.faces, ball.vertices):  # what was checked stays as it was
+            with self.assertRaises(ValueError):
+                array[0, 0] = 10**8
+        for options in ({"seed": -1}, {"seed": 2**64}, {"frame": 2**31}, {"rotate_deg": np.inf},
+                        {"translate_mm": (np.nan, 0, 0)}):
+            self.assertIn("must", str(self.complaint(
+                lambda: ps.simulate(self.scene.rig, ball, **options))), options)
         self.assertIn("medium", str(self.complaint(
             lambda: ps.simulate(self.scene.rig, ps.make_sphere(100), noise="loud"))))
         self.assertIn("colours^order", str(self.complaint(lambda: ps.ring(order=30))))

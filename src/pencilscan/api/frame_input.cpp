@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "pencilscan/core/error.h"
+#include "pencilscan/core/name_list.h"
 #include "pencilscan/depth/depth_image.h"
 #include "pencilscan/io/image.h"
 #include "pencilscan/io/json_text.h"
@@ -34,7 +35,9 @@ std::vector<cv::Mat> camera_images(const Rig& rig, const Images& images) {
     }
     // Far outside [0, 1] means bytes as numbers; a little above it an image that was worked on.
     if (stored.depth() == CV_32F && !cv::checkRange(stored, true, nullptr, -1, 2)) {
-      throw InputError("images", camera.name, "", "float pixels must be finite and lie in [0, 1]");
+      throw InputError(
+          "images", camera.name, "",
+          "float pixels must be finite and lie in [0, 1], or not far outside (-1 to 2)");
     }
     check_channels(camera, stored.channels(), "images");
     result[c] = stored;
@@ -82,8 +85,9 @@ FrameOptions frame_options(const Rig& rig, const ReconstructionOptions& options)
   PointOptions& points = frame.points;
   const SolutionMethod* method = find_method(options.method);
   if (method == nullptr) {
-    throw InputError("options", "method", options.method,
-                     "must be joint, linear, multiview or single-projector");
+    std::string names;
+    for (const std::string& name : method_names()) add_name(names, name);
+    throw InputError("options", "method", options.method, "must be one of " + names);
   }
   points.method = method->defaults;
   if (!set_multiview_cost(options.multiview_cost, points.method)) {

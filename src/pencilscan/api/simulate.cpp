@@ -1,6 +1,7 @@
 #include "pencilscan/api/simulate.h"
 
 #include <array>
+#include <cmath>
 #include <vector>
 
 #include "pencilscan/api/run_stages.h"
@@ -22,6 +23,10 @@ void check_options(const SimulationOptions& options) {
     throw InputError("options", "bits", std::to_string(options.bits), "must be 8 or 16");
   if (!(options.albedo >= 0 && options.albedo <= 1))
     throw InputError("options", "albedo", std::to_string(options.albedo), "must be in [0, 1]");
+  if (!std::isfinite(options.rotate_rad))
+    throw InputError("options", "rotate", std::to_string(options.rotate_rad), "must be finite");
+  if (!options.translate_mm.allFinite())
+    throw InputError("options", "translate", "", "must have three finite numbers");
   if (options.frame < 0)
     throw InputError("options", "frame", std::to_string(options.frame), "must be >= 0");
 }

@@ -111,7 +111,7 @@ void add_reconstruct_options(CLI::App& command, ReconstructOptions& options) {
       .add_option("--method", options.method,
                   "how lines are told apart: joint, the paper's two, or the grid of one projector "
                   "that it compares itself with")
-      ->check(one_of({"linear", "multiview", "joint", "single-projector"}))
+      ->check(one_of(method_names()))
       ->capture_default_str();
   command
       .add_option(

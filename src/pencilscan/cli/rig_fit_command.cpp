@@ -70,8 +70,14 @@ void run_rig_fit(const CommonOptions& common, const std::string& rig_path,
   write_figures(common, report);
   report.erase("devices");
   print_figures({}, report);
-  if (!options.put_back.empty()) write_rig(fit.put_back, options.put_back);
-  if (fit.verdict != RigVerdict::kFits) throw StageError(fit.text);
+  const bool is_known = fit.verdict == RigVerdict::kFits || fit.verdict == RigVerdict::kOneMoved ||
+                        fit.verdict == RigVerdict::kSeveralMoved;
+  if (is_known && !options.put_back.empty()) write_rig(fit.put_back, options.put_back);
+  if (fit.verdict != RigVerdict::kFits) {
+    throw StageError(fit.text + (is_known || options.put_back.empty()
+                                     ? ""
+                                     : "; " + options.put_back + " was not written"));
+  }
 }
 
 }  // namespace pencilscan::cli

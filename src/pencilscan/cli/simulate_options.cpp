@@ -54,8 +54,8 @@ void add_scene_options(CLI::App& command, SimulateOptions& options) {
   CLI::Option* motion =
       command
           .add_option("--motion-mm-s", options.speed_mm_s,
-                      "Speed x y z within the exposure of every frame, whose truth is its middle; "
-                      "Gray-code captures stand still")
+                      "Speed x y z (in the rig's unit) within the exposure of every frame, whose "
+                      "truth is its middle; Gray-code captures stand still")
           ->expected(3)
           ->check(any_number<double>());
   CLI::Option* spin = command

@@ -48,18 +48,18 @@ Coverage cover(const TruthScene& truth, const std::vector<PatternChannel>& chann
   return coverage;
 }
 
-/// Distance to the nearest facet and whether its normal agrees.
+/// Distance to the nearest facet within reach, else infinity, and whether its normal agrees.
 struct Nearest {
   double distance = std::numeric_limits<double>::infinity();
   bool normal_agrees = false;
 };
 
 std::vector<Nearest> nearest_facets(const RayScene& scene, const std::vector<DrawnPoint>& samples,
-                                    double max_deg) {
+                                    double max_deg, double reach) {
   std::vector<Nearest> nearest(samples.size());
   const double limit = cos_deg(max_deg);
   parallel_chunks(samples.size(), [&](std::size_t i) {
-    const auto closest = scene.closest_point(samples[i].point);
+    const auto closest = scene.closest_point(samples[i].point, reach);
     if (!closest) return;
     const Vec3 normal = face_normal(scene.mesh(), closest->face);
     nearest[i] = {closest->distance, normal.dot(samples[i].normal) >= limit};
@@ -148,7 +148,10 @@ SurfaceFigures surface_figures(const TruthScene& truth, const TriangleMesh& meas
   const auto samples = sample_surface(truth.scene().mesh(), options.sample_count, options.seed);
   const auto coverage = surface_coverage(truth, samples);
   const RayScene measured_scene(measured);
-  const auto nearest = nearest_facets(measured_scene, samples, options.max_normal_deg);
+  double reach = 0;
+  for (const double threshold : options.thresholds_mm)
+    reach = std::max(reach, threshold / mm_per_unit);
+  const auto nearest = nearest_facets(measured_scene, samples, options.max_normal_deg, reach);
 
   Share measurable;
   Share one;

@@ -3,7 +3,9 @@
 #include <embree3/rtcore.h>
 #include <tbb/global_control.h>
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 #include <new>
 #include <string>
 #include <utility>
@@ -56,6 +58,7 @@ struct RayScene::State {
   TriangleMesh mesh;
   RTCDevice device = nullptr;
   RTCScene scene = nullptr;
+  double reach = 0;  ///< largest coordinate
 
   ~State() {
     if (scene != nullptr) rtcReleaseScene(scene);
@@ -69,6 +72,8 @@ struct RayScene::State {
 
 RayScene::RayScene(const TriangleMesh& mesh) : state_(std::make_unique<State>()) {
   state_->mesh = mesh;
+  for (const Vec3& v : mesh.vertices)
+    state_->reach = std::max(state_->reach, v.lpNorm<Eigen::Infinity>());
   // One build thread: the tree, and with it the choice among equal hits, must not vary. Not by the
   // device's "threads=1", which holds oneTBB's limit for the whole process down while it lives.
   const tbb::global_control one_thread(tbb::global_control::max_allowed_parallelism, 1);
@@ -175,13 +180,20 @@ std::optional<RayScene::Closest> RayScene::closest_point(const Vec3& point,
     Vec3 point;
     Closest best;
     bool found = false;
+
+    /// A little more than asked for, since the tree is in float: a few of its steps at the largest
+    /// number that takes part. The callback compares in double.
+    [[nodiscard]] float in_tree(double distance) const {
+      constexpr double kSteps = 8 * std::numeric_limits<float>::epsilon();
+      return static_cast<float>(
+          distance + kSteps * (distance + state->reach + point.lpNorm<Eigen::Infinity>()));
+    }
   } search{state_.get(), point, {max_distance, 0, Vec3::Zero()}, false};
   RTCPointQuery query{};
   query.x = static_cast<float>(point.x());
   query.y = static_cast<float>(point.y());
   query.z = static_cast<float>(point.z());
-  // A little more than asked for, since the tree is in float; the callback compares in double.
-  query.radius = static_cast<float>(max_distance) * 1.0001F + 1e-3F;
+  query.radius = search.in_tree(max_distance);
   RTCPointQueryContext context;
   rtcInitPointQueryContext(&context);
   rtcPointQuery(
@@ -197,7 +209,7 @@ std::optional<RayScene::Closest> RayScene::closest_point(const Vec3& point,
         if (!better && !(distance <= s.best.distance && !s.found)) return false;
         s.best = {distance, face, candidate};
         s.found = true;
-        arguments->query->radius = static_cast<float>(distance) * 1.0001F + 1e-3F;
+        arguments->query->radius = s.in_tree(distance);
         return true;
       },
       &search);

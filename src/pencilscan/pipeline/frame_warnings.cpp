@@ -6,18 +6,12 @@
 
 #include "pencilscan/core/formatted.h"
 #include "pencilscan/core/median.h"
+#include "pencilscan/core/name_list.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/grid/gamma_trace.h"
 #include "pencilscan/rig/camera_light.h"
 
 namespace pencilscan {
-namespace {
-
-void add_name(std::string& names, const std::string& name, const char* separator) {
-  names += (names.empty() ? "" : separator) + name;
-}
-
-}  // namespace
 
 std::vector<Warning> detection_warnings(const Rig& rig, const Frame& frame,
                                         std::span<const ColorFamily> families,
@@ -103,6 +97,13 @@ std::optional<Warning> gamma_warning(const Rig& rig, const Frame& frame,
                      names + "; state it as \"gamma\" of these cameras, or switch it off there",
                  {},
                  {{"gamma", first}}};
+}
+
+Warning naming_warning(const std::string& doubt) {
+  return {WarningCode::kRigIsOff,
+          doubt +
+              ": a device stands farther from where the rig has it than this frame can tell, "
+              "or shows or sees something else; rig check --frames looks at several frames"};
 }
 
 Warning rig_warning(const CrossingDisagreement& crossings, RigInFrame rig_in_frame) {

@@ -27,6 +27,8 @@ namespace pencilscan {
                                                    std::span<const GridGraph> graphs);
 
 /// Crossings miss each other by more than noise; what was done about it.
+/// Of NamingDoubt::text().
+[[nodiscard]] Warning naming_warning(const std::string& doubt);
 [[nodiscard]] Warning rig_warning(const CrossingDisagreement& crossings, RigInFrame rig_in_frame);
 
 /// The one device whose crossings miss each other by far more than noise, where the rig as a whole

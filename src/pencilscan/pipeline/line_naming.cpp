@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "pencilscan/pipeline/frame_warnings.h"
+#include "pencilscan/pipeline/naming_doubt.h"
 #include "pencilscan/pipeline/rig_refinement.h"
 
 namespace pencilscan {
@@ -22,6 +23,13 @@ void judge(const Rig& rig, const std::vector<GridGraph>& graphs, LineNaming& nam
   naming.crossings = crossing_disagreement(rig, tracks);
   naming.device_crossings = naming.crossings.crossings > 0 ? device_disagreements(rig, tracks)
                                                            : std::vector<CrossingDisagreement>();
+}
+
+NamingDoubt doubt_of(const Rig& rig, const std::vector<ColorFamily>& families,
+                     const std::vector<GridGraph>& graphs, const Labeling& labeling) {
+  NamingDoubt doubt(rig);
+  doubt.add(families, graphs, labeling);
+  return doubt;
 }
 
 }  // namespace
@@ -56,9 +64,13 @@ LineNaming name_lines(const Rig& rig, const std::vector<ColorFamily>& families,
   const bool is_off = disagrees(result.crossings);
   const auto points = static_cast<double>(labelled_points(result.labeling));
   if (!are_enough(result.crossings)) return result;
-  if (!is_off && points > kNearlyAll * static_cast<double>(telling_points(result.labeling).all()))
+  const NamingDoubt doubt = doubt_of(rig, families, graphs, result.labeling);
+  const bool is_wrong = is_off || !doubt.denied().empty();
+  const bool lacks_names = !doubt.unnamed().empty();
+  if (!is_wrong && !lacks_names &&
+      points > kNearlyAll * static_cast<double>(telling_points(result.labeling).all()))
     return result;
-  if (!is_off) {
+  if (!is_wrong && !lacks_names) {
     // Two of three signs of a right rig.
     const bool meets = result.crossings.median_px <= kAsClosely * result.crossings.expected_px;
     const bool are_named = least_named_share(result.labeling) > kMostNamed;
@@ -84,7 +96,9 @@ LineNaming name_lines(const Rig& rig, const std::vector<ColorFamily>& families,
     // names may meet as well as right ones: but they leave many curves without one.
     const bool is_better =
         (names_more && misses < kAsWell) || (named > points && misses < kClearlyLess);
-    if (is_off ? agrees || is_better : agrees && names_more) {
+    const bool is_settled = lacks_names && agrees && named > points &&
+                            doubt_of(found.rig, families, graphs, again).text().empty();
+    if (is_settled || (is_wrong ? agrees || is_better : agrees && names_more)) {
       result.labeling = std::move(again);
       result.corrected = std::move(found.rig);
       result.rig_in_frame = agrees ? RigInFrame::kCorrected : RigInFrame::kPartlyCorrected;
@@ -93,6 +107,8 @@ LineNaming name_lines(const Rig& rig, const std::vector<ColorFamily>& families,
   }
   if (is_off || result.corrected)
     result.warning = rig_warning(result.crossings, result.rig_in_frame);
+  else if (is_wrong || lacks_names)
+    result.warning = naming_warning(doubt.text());
   return result;
 }
 

@@ -45,9 +45,10 @@ inline constexpr double kMostNamed = 0.5;  ///< of it: the rest are close togeth
 /// with a corrected rig. For methods that may correct the rig (MethodCapabilities).
 ///
 /// The rig is doubted where crossings miss each other, or where many curves that others cross have
-/// no name. It is not doubted where two of three signs say that it is right: crossings meet about
-/// as closely as noise lets expect; most such curves of every camera have a name; something else
-/// confirms it: `is_confirmed`, asked only where it matters.
+/// no name, of one device alone too, or have the colours of other lines (naming_doubt.h). It is not
+/// doubted where two of three signs say that it is right: crossings meet about as closely as noise
+/// lets expect; most such curves of every camera have a name; something else confirms it:
+/// `is_confirmed`, asked only where it matters.
 ///
 /// A rig in doubt is corrected from the crossings (refine_rig_on_frames). The names with the
 /// corrected rig are taken if its crossings agree, or agree better, or if clearly more curves have

@@ -42,6 +42,12 @@ const SolutionMethod& solution_method(const MethodOptions& options) {
   return solution_methods()[options.index()];
 }
 
+std::vector<std::string> method_names() {
+  std::vector<std::string> names;
+  for (const SolutionMethod& method : solution_methods()) names.emplace_back(method.name);
+  return names;
+}
+
 const SolutionMethod* find_method(std::string_view name) {
   const auto methods = solution_methods();
   const auto it = std::find_if(methods.begin(), methods.end(),

@@ -2,6 +2,7 @@
 
 #include <optional>
 #include <span>
+#include <string>
 #include <string_view>
 #include <variant>
 #include <vector>
@@ -40,6 +41,8 @@ struct SolutionMethod {
 [[nodiscard]] std::span<const SolutionMethod> solution_methods();
 /// The method that these options are of.
 [[nodiscard]] const SolutionMethod& solution_method(const MethodOptions& options);
+/// The default one first.
+[[nodiscard]] std::vector<std::string> method_names();
 /// Nothing for a name that no method has.
 [[nodiscard]] const SolutionMethod* find_method(std::string_view name);
 

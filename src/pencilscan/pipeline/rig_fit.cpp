@@ -3,38 +3,53 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <utility>
 
 #include "pencilscan/core/formatted.h"
+#include "pencilscan/core/name_list.h"
 #include "pencilscan/pipeline/line_naming.h"
+#include "pencilscan/pipeline/naming_doubt.h"
 
 namespace pencilscan {
 namespace {
 
 using nlohmann::ordered_json;
 
+/// Labels of frames, and what their crossings and names say.
 struct NamedCrossings {
+  explicit NamedCrossings(const Rig& rig) : doubt(rig) {}
+
   std::vector<CrossingTrack> tracks;
   double labelled_share = 0;
+  NamingDoubt doubt;
 };
 
-NamedCrossings named_crossings(const Rig& rig, std::span<const FrameCurves> frames) {
-  NamedCrossings result;
-  std::size_t points = 0;
-  std::size_t labelled = 0;
+std::vector<Labeling> labels_of(const Rig& rig, std::span<const FrameCurves> frames) {
+  std::vector<Labeling> labelings;
   for (const FrameCurves& frame : frames) {
     const PointOptions options;
     const SolutionMethod& method = solution_method(options.method);
-    const LineNaming naming =
-        name_lines(rig, frame.families, frame.graphs,
-                   method.solve(rig, frame.families, frame.graphs, options.method), options);
-    auto tracks = crossing_tracks(rig, frame.graphs, naming.labeling);
+    labelings.push_back(name_lines(rig, frame.families, frame.graphs,
+                                   method.solve(rig, frame.families, frame.graphs, options.method),
+                                   options)
+                            .labeling);
+  }
+  return labelings;
+}
+
+NamedCrossings named_crossings(const Rig& rig, std::span<const FrameCurves> frames,
+                               std::span<const Labeling> labelings) {
+  NamedCrossings result(rig);
+  std::size_t points = 0;
+  std::size_t labelled = 0;
+  for (std::size_t f = 0; f < frames.size(); ++f) {
+    auto tracks = crossing_tracks(rig, frames[f].graphs, labelings[f]);
     std::move(tracks.begin(), tracks.end(), std::back_inserter(result.tracks));
-    for (const GridGraph& graph : frame.graphs) {
-      labelled += labelled_points(naming.labeling.runs[static_cast<std::size_t>(graph.camera)]);
-      points += curve_points(graph);
-    }
+    result.doubt.add(frames[f].families, frames[f].graphs, labelings[f]);
+    labelled += labelled_points(labelings[f]);
+    for (const GridGraph& graph : frames[f].graphs) points += curve_points(graph);
   }
   if (points > 0)
     result.labelled_share = static_cast<double>(labelled) / static_cast<double>(points);
@@ -47,7 +62,10 @@ std::string full_name(const DeviceFit& device) {
 
 RigVerdict verdict_of(const RigFit& fit, std::size_t moved) {
   if (!are_enough(fit.before)) return RigVerdict::kUnknown;
-  if (disagrees(fit.after)) return RigVerdict::kUnexplained;
+  if (!fit.doubt.empty() || disagrees(fit.after)) return RigVerdict::kUnexplained;
+  const bool all_told = std::all_of(fit.devices.begin(), fit.devices.end(),
+                                    [](const DeviceFit& device) { return device.is_told; });
+  if (moved == 0 && !all_told) return RigVerdict::kUnknown;
   return moved == 0   ? RigVerdict::kFits
          : moved == 1 ? RigVerdict::kOneMoved
                       : RigVerdict::kSeveralMoved;
@@ -74,10 +92,25 @@ std::string verdict_text(const RigFit& fit) {
              formatted(fit.after.median_px, "%.3f px") +
              ": reconstruct --refine-rig, or calibrate anew";
     case RigVerdict::kUnexplained:
+      if (!fit.doubt.empty()) {
+        return fit.doubt +
+               ": what has no name, or a wrong one, stands farther from where the rig has it than "
+               "crossings can tell, or its picture is another's; " +
+               misses;
+      }
       return misses +
              ", and putting devices back does not help: lens parameters, or an object "
              "that moved while the shutters were open";
     case RigVerdict::kUnknown:
+      if (are_enough(fit.before)) {
+        std::string untold;
+        for (const DeviceFit& device : fit.devices) {
+          if (!device.is_told)
+            add_name(untold,
+                     full_name(device) + " (" + std::to_string(device.crossings.crossings) + ")");
+        }
+        return "too few crossings of labelled lines to judge " + untold + "; of all, " + misses;
+      }
       return "only " + std::to_string(fit.before.crossings) +
              " crossings of labelled lines: too few to tell";
   }
@@ -114,7 +147,17 @@ RigFit check_rig_on_frames(const Rig& stated, std::span<const FrameCurves> frame
                            const MovedDevicesOptions& options) {
   const double unit = footprint(stated);
   const Rig rig = with_registered_patterns(scaled(stated, 1 / unit));
-  const NamedCrossings named = named_crossings(rig, frames);
+  NamedCrossings named = named_crossings(rig, frames, labels_of(rig, frames));
+  if (!named.doubt.text().empty()) {
+    // All frames together, and colours, may tell where it stands.
+    RigRefinementOptions refinement;
+    refinement.refine.max_remaining = std::numeric_limits<double>::infinity();
+    const RigRefinement found = refine_rig_on_frames(rig, frames, refinement);
+    if (found.report.refined) {
+      NamedCrossings again = named_crossings(rig, frames, found.labelings);
+      if (again.doubt.text().empty()) named = std::move(again);
+    }
+  }
   const MovedDevices found = find_moved_devices(rig, named.tracks, options);
   RigCorrection correction(device_count(rig));
   for (const DeviceMove& move : found.moved) correction[move.device] = move.correction;
@@ -125,10 +168,12 @@ RigFit check_rig_on_frames(const Rig& stated, std::span<const FrameCurves> frame
   fit.labelled_share = named.labelled_share;
   fit.before = crossing_disagreement(rig, named.tracks);
   fit.after = crossing_disagreement(put_back, named.tracks);
+  fit.doubt = named.doubt.text();
   const auto per_device = device_disagreements(rig, named.tracks);
   for (std::size_t d = 0; d < device_count(rig); ++d) {
     fit.devices.push_back({device_at(rig, d).name, d >= rig.cameras.size(), per_device[d],
-                           found.alone[d].shift_px, found.alone[d].sigma_px, false, 0, 0});
+                           found.alone[d].shift_px, found.alone[d].sigma_px, false,
+                           are_enough(per_device[d]), 0, 0});
   }
   fit.put_back = stated;
   for (const DeviceMove& move : found.moved) {

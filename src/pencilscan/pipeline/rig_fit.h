@@ -15,8 +15,8 @@ enum class RigVerdict {
   kFits,
   kOneMoved,  ///< one device has to be put back
   kSeveralMoved,
-  kUnexplained,  ///< crossings miss each other, and no device put back helps
-  kUnknown,      ///< too few crossings
+  kUnexplained,  ///< crossings miss each other, and no device put back helps; or names are wrong
+  kUnknown,      ///< too few crossings, of the rig or of a device
 };
 [[nodiscard]] const char* to_string(RigVerdict verdict);
 
@@ -27,6 +27,7 @@ struct DeviceFit {
   double shift_px = 0;             ///< how far it alone would have to be put back (DeviceMove)
   double sigma_px = 0;
   bool has_moved = false;
+  bool is_told = true;        ///< what is named of it is enough to judge it by
   double rotation_px = 0;     ///< where it has moved, with the others that have
   double translation_mm = 0;  ///< the same
 };
@@ -39,7 +40,10 @@ struct RigFit {
   CrossingDisagreement before;     ///< the rig as given
   CrossingDisagreement after;      ///< with what moved put back
   std::vector<DeviceFit> devices;  ///< cameras, then projectors
-  Rig put_back;                    ///< the rig with what moved put back
+  /// Devices of which names say more than crossings do: most curves of a camera, or the lines of a
+  /// projector's colours, have none, or colours speak against them. In plain words; empty: none.
+  std::string doubt;
+  Rig put_back;  ///< the rig with what moved put back
 };
 
 /// Looks at the crossings of labelled lines of some frames (joint labels, made with corrected

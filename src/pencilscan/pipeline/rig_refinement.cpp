@@ -4,10 +4,13 @@
 #include <iterator>
 #include <limits>
 #include <optional>
+#include <string>
 #include <utility>
 
+#include "pencilscan/core/name_list.h"
 #include "pencilscan/joint/joint.h"
 #include "pencilscan/refinement/moved_devices.h"
+#include "pencilscan/refinement/shown_colors.h"
 
 namespace pencilscan {
 namespace {
@@ -38,8 +41,17 @@ struct Attempt {
   std::vector<CrossingTrack> tracks;  ///< of the last labels
   std::vector<std::size_t> moved;     ///< RefineRigOptions::moved
   bool agrees = false;
+  std::string denied;  ///< projectors whose colours speak against their lines' names
   std::size_t points = 0;
 };
+
+std::vector<ShownColors> shown_colors(const Rig& rig, std::span<const FrameCurves> frames,
+                                      std::span<const Labeling> labelings) {
+  ShownColorCount count(rig);
+  for (std::size_t f = 0; f < frames.size(); ++f)
+    count.add(frames[f].families, frames[f].graphs, labelings[f]);
+  return count.shown();
+}
 
 /// Where few devices moved and all others are as calibrated, refinement starts with those put back.
 void put_back_few(const Rig& calibrated, std::span<const CrossingTrack> tracks, Attempt& attempt) {
@@ -54,13 +66,13 @@ void put_back_few(const Rig& calibrated, std::span<const CrossingTrack> tracks, 
   }
 }
 
-Attempt attempt(const Rig& calibrated, std::span<const FrameCurves> frames, double tolerance,
-                const RigRefinementOptions& options) {
-  Attempt result;
+/// Labels and refines in turn, from a first tolerance down to the last one.
+bool run_rounds(const Rig& calibrated, std::span<const FrameCurves> frames, double tolerance,
+                const RigRefinementOptions& options, Attempt& result) {
   RigRefinement& refinement = result.refinement;
-  refinement.rig = calibrated;
   // What the first labels' crossings leave open stays as given; the last ones may tell.
   RefineRigOptions refine = options.refine;
+  refine.moved = result.moved;
   refine.max_remaining = std::numeric_limits<double>::infinity();
   const auto* chosen = std::get_if<JointOptions>(&options.points.method);
   JointOptions joint = chosen != nullptr ? *chosen : JointOptions{};
@@ -76,7 +88,7 @@ Attempt attempt(const Rig& calibrated, std::span<const FrameCurves> frames, doub
     }
     RefineRigResult refined = refine_rig(calibrated, tracks, result.correction, refine);
     refinement.report = std::move(refined.report);
-    if (!refinement.report.refined) return result;
+    if (!refinement.report.refined) return false;
     RefinementRound round{
         tolerance, tracks.size(), crossing_disagreement(refinement.rig, tracks), {}};
     result.correction = std::move(refined.correction);
@@ -90,8 +102,53 @@ Attempt attempt(const Rig& calibrated, std::span<const FrameCurves> frames, doub
   }
   refinement.labelings = label(refinement.rig, frames, joint);
   result.tracks = tracks_of(refinement.rig, frames, refinement.labelings, options.tracks);
-  result.agrees = !disagrees(crossing_disagreement(refinement.rig, result.tracks));
-  for (const Labeling& labeling : refinement.labelings) result.points += labelled_points(labeling);
+  return true;
+}
+
+/// Turns projectors of whose lines all colours say that they are a few lines further. True where
+/// there is one.
+bool turn_by_colors(const Rig& calibrated, std::span<const FrameCurves> frames, Attempt& result) {
+  bool turned = false;
+  RigCorrection correction = result.correction;
+  correction.resize(device_count(calibrated));
+  for (const ShownColors& shown : shown_colors(calibrated, frames, result.refinement.labelings)) {
+    if (shown.better_shift() == 0) continue;
+    const auto p = static_cast<std::size_t>(shown.pattern.projector);
+    const LinePattern& lines =
+        calibrated.projectors[p].patterns[static_cast<std::size_t>(shown.pattern.pattern)];
+    const double way_px = shown.better_shift() * lines.pitch_px;
+    const std::size_t device = calibrated.cameras.size() + p;
+    // A turn about y moves the image along x, one about x moves it against y.
+    correction[device].rotation_px +=
+        lines.axis == Axis::kColumn ? Vec3(0, way_px, 0) : Vec3(-way_px, 0, 0);
+    if (std::find(result.moved.begin(), result.moved.end(), device) == result.moved.end())
+      result.moved.push_back(device);
+    turned = true;
+  }
+  if (turned) {
+    result.correction = correction;
+    result.refinement.rig = corrected_rig(calibrated, correction);
+  }
+  return turned;
+}
+
+Attempt attempt(const Rig& calibrated, std::span<const FrameCurves> frames, double tolerance,
+                const RigRefinementOptions& options) {
+  Attempt result;
+  result.refinement.rig = calibrated;
+  if (!run_rounds(calibrated, frames, tolerance, options, result)) return result;
+  if (turn_by_colors(calibrated, frames, result) &&
+      !run_rounds(calibrated, frames, tolerance, options, result))
+    return result;
+  result.agrees = !disagrees(crossing_disagreement(result.refinement.rig, result.tracks));
+  for (const ShownColors& shown : shown_colors(calibrated, frames, result.refinement.labelings)) {
+    if (!shown.deny()) continue;
+    const auto p = static_cast<std::size_t>(shown.pattern.projector);
+    add_name(result.denied, calibrated.projectors[p].name);
+    result.agrees = false;
+  }
+  for (const Labeling& labeling : result.refinement.labelings)
+    result.points += labelled_points(labeling);
   return result;
 }
 
@@ -121,6 +178,12 @@ RigRefinement refine_rig_on_frames(const Rig& stated, std::span<const FrameCurve
     if (is_settled) break;
   }
   RigRefinement result = std::move(best->refinement);
+  if (result.report.refined && !best->denied.empty()) {
+    result.report.refined = false;
+    result.report.reason = "where crossings meet, the colours of " + best->denied +
+                           " speak against its lines' names: it stands too far from where the rig "
+                           "has it; calibrate anew";
+  }
   if (result.report.refined) {
     RefineRigOptions refine = options.refine;
     refine.moved = best->moved;

@@ -6,9 +6,12 @@
 
 #include "pencilscan/core/check.h"
 #include "pencilscan/core/error.h"
+#include "pencilscan/core/formatted.h"
 
 namespace pencilscan {
 namespace {
+
+constexpr double kWidestBlur = 256;  ///< footprints that an object may go in an exposure
 
 SensorPreset preset_of(const PhotographyOptions& options) {
   const std::optional<SensorPreset> preset = sensor_preset(options.noise);
@@ -67,6 +70,11 @@ std::vector<SimulatedObject> through_exposure(const TriangleMesh& mesh, const Re
     for (const Vec3& v : mesh.vertices) reach = std::max(reach, (middle * v - motion.pivot).norm());
   }
   const double way = motion.shift.norm() + motion.turn_rad.norm() * reach;
+  if (!(way <= kWidestBlur * footprint_mm)) {
+    throw InputError("options", "motion", formatted(way, "%g") + " within an exposure",
+                     "must be at most " + formatted(kWidestBlur * footprint_mm, "%.3g") + " (" +
+                         formatted(kWidestBlur, "%g") + " pixels of the rig, in its unit)");
+  }
   const int count = std::max(1, static_cast<int>(std::ceil(way / (kStep * footprint_mm))));
   std::vector<SimulatedObject> moments;
   for (int k = 0; k < count; ++k) {

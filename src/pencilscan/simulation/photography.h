@@ -41,7 +41,9 @@ struct PhotographyOptions {
 
 /// An object at even steps through an exposure; `middle`: where half of the exposure has it. No
 /// vertex steps by more than half a footprint (mm), below what a pixel resolves: the mean of the
-/// moments' light is that of the exposure. One moment where nothing moves.
+/// moments' light is that of the exposure. One moment where nothing moves. InputError beyond 256
+/// footprints, more than lines are apart in any picture of use: every moment is an object in
+/// memory.
 [[nodiscard]] std::vector<SimulatedObject> through_exposure(const TriangleMesh& mesh,
                                                             const Reflectance& surface,
                                                             const RigidTransform& middle,

@@ -72,6 +72,16 @@ TEST_F(PhotographyTest, WhatMovesAlongTheEdgeOrNotAtAllKeepsIt) {
   for (std::size_t x = 0; x < still.size(); ++x) EXPECT_NEAR(along[x], still[x], 1e-3) << x;
 }
 
+TEST_F(PhotographyTest, AWayOfThousandsOfPixelsIsRefused) {
+  const auto moved_by = [&](double mm) {
+    return through_exposure(make_box({1, 1, 1}, Vec3::Zero()), surface_, {},
+                            {.shift = Vec3(0, mm, 0)}, 0.5);
+  };
+  EXPECT_EQ(moved_by(128).size(), 512U);
+  EXPECT_THROW(moved_by(1000), InputError);
+  EXPECT_THROW(moved_by(1e300), InputError);
+}
+
 TEST_F(PhotographyTest, MomentsAreEvenAroundTheMiddleOfTheExposure) {
   const auto moments =
       through_exposure(make_box({1, 1, 1}, Vec3::Zero()), surface_,

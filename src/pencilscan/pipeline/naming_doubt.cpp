@@ -1,0 +1,98 @@
+#include "pencilscan/pipeline/naming_doubt.h"
+
+#include <algorithm>
+
+#include "pencilscan/core/formatted.h"
+#include "pencilscan/core/name_list.h"
+
+namespace pencilscan {
+namespace {
+
+/// The projectors that show patterns in the colours of a family.
+std::vector<std::size_t> projectors_of(const ColorFamily& family) {
+  std::vector<std::size_t> projectors;
+  for (const PatternRef& ref : family.patterns)
+    projectors.push_back(static_cast<std::size_t>(ref.projector));
+  std::sort(projectors.begin(), projectors.end());
+  projectors.erase(std::unique(projectors.begin(), projectors.end()), projectors.end());
+  return projectors;
+}
+
+/// Points of a camera's curves of one family that a right rig could have named, and has not.
+std::size_t unnamed_points(const GridGraph& graph, const Labeling& labeling, std::size_t family) {
+  const auto c = static_cast<std::size_t>(graph.camera);
+  std::vector<UndecidedRun> runs;
+  for (const UndecidedRun& run : labeling.undecided[c]) {
+    const Curve& curve = graph.curves[static_cast<std::size_t>(run.curve)];
+    if (curve.family == static_cast<int>(family)) runs.push_back(run);
+  }
+  const auto points = undecided_points(runs, labeling.runs[c]);
+  return points[static_cast<std::size_t>(UndecidedReason::kAmbiguous)] +
+         points[static_cast<std::size_t>(UndecidedReason::kContradicted)];
+}
+
+}  // namespace
+
+NamingDoubt::NamingDoubt(const Rig& rig) : rig_(rig), devices_(device_count(rig)), colors_(rig) {}
+
+void NamingDoubt::add(const std::vector<ColorFamily>& families, std::span<const GridGraph> graphs,
+                      const Labeling& labeling) {
+  colors_.add(families, graphs, labeling);
+  for (const GridGraph& graph : graphs) {
+    const auto c = static_cast<std::size_t>(graph.camera);
+    devices_[c].add(telling_points(labeling, c));
+    for (const LabeledRun& run : labeling.runs[c]) {
+      const auto p = static_cast<std::size_t>(run.label.pattern.projector);
+      devices_[rig_.cameras.size() + p].named += static_cast<std::size_t>(run.end - run.begin);
+    }
+    for (std::size_t f = 0; f < families.size(); ++f) {
+      const std::size_t unnamed = unnamed_points(graph, labeling, f);
+      for (const std::size_t p : projectors_of(families[f]))
+        devices_[rig_.cameras.size() + p].unnamed += unnamed;
+    }
+  }
+}
+
+std::string NamingDoubt::denied() const {
+  std::string names;
+  for (const ShownColors& shown : colors_.shown()) {
+    if (shown.deny())
+      add_name(names, rig_.projectors[static_cast<std::size_t>(shown.pattern.projector)].name);
+  }
+  return names;
+}
+
+std::string NamingDoubt::unnamed() const {
+  // What has no name in a projector's colours may be of any projector that has them.
+  std::vector<std::size_t> sharing(devices_.size(), 1);
+  for (const ColorFamily& family : color_families(rig_)) {
+    const std::vector<std::size_t> projectors = projectors_of(family);
+    for (const std::size_t p : projectors) {
+      std::size_t& most = sharing[rig_.cameras.size() + p];
+      most = std::max(most, projectors.size());
+    }
+  }
+  std::string text;
+  for (std::size_t d = 0; d < devices_.size(); ++d) {
+    const TellingPoints& points = devices_[d];
+    if (!points.are_enough() || points.named_share() > kMostNamed / static_cast<double>(sharing[d]))
+      continue;
+    add_name(text,
+             "only " + formatted(100 * points.named_share(), "%.0f") + " % of the curves " +
+                 (d < rig_.cameras.size() ? "of camera " : "in the colours of projector ") +
+                 device_at(rig_, d).name + " have a name",
+             "; ");
+  }
+  return text;
+}
+
+std::string NamingDoubt::text() const {
+  std::string text = unnamed();
+  const std::string projectors = denied();
+  if (!projectors.empty())
+    add_name(text, "the colours of " + projectors + " are those of other lines than the ones named",
+             "; ");
+  return text;
+}
+
+}  // namespace pencilscan

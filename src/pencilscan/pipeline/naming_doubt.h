@@ -1,0 +1,36 @@
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "pencilscan/pipeline/line_naming.h"
+#include "pencilscan/refinement/shown_colors.h"
+
+namespace pencilscan {
+
+/// What names of lines say against a rig, where crossings say nothing: a device that stands far
+/// from where the rig has it has few names, or names that are whole lines off, and what crossings
+/// there are may meet.
+class NamingDoubt {
+ public:
+  explicit NamingDoubt(const Rig& rig);
+  /// One frame.
+  void add(const std::vector<ColorFamily>& families, std::span<const GridGraph> graphs,
+           const Labeling& labeling);
+
+  /// Projectors whose colours are those of other lines than the ones named; empty: none.
+  [[nodiscard]] std::string denied() const;
+  /// Cameras most of whose curves have no name, and projectors most of what is drawn in whose
+  /// colours has none, in plain words; empty: none.
+  [[nodiscard]] std::string unnamed() const;
+  /// Both.
+  [[nodiscard]] std::string text() const;
+
+ private:
+  const Rig& rig_;
+  std::vector<TellingPoints> devices_;  ///< cameras, then projectors: in the colours of each
+  ShownColorCount colors_;
+};
+
+}  // namespace pencilscan

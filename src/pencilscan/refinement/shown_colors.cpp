@@ -1,0 +1,109 @@
+#include "pencilscan/refinement/shown_colors.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace pencilscan {
+namespace {
+
+constexpr int kFarthest = 16;  // lines
+
+int reach_of(const LinePattern& pattern) { return std::min(kFarthest, pattern.period() / 2); }
+
+/// The likeliest colour of a curve's point, and how much it tells: 0 where another is as likely.
+struct SeenColor {
+  int color = 0;
+  double weight = 0;
+};
+
+SeenColor seen_color(const float* code, int colors) {
+  SeenColor seen;
+  float second = -INFINITY;
+  for (int k = 1; k < colors; ++k) {
+    if (code[k] > code[seen.color]) {
+      second = code[seen.color];
+      seen.color = k;
+    } else {
+      second = std::max(second, code[k]);
+    }
+  }
+  seen.weight = 1 - std::exp(static_cast<double>(second - code[seen.color]));
+  return seen;
+}
+
+}  // namespace
+
+ShownColorCount::ShownColorCount(const Rig& rig) : rig_(rig) {
+  for (std::size_t p = 0; p < rig.projectors.size(); ++p) {
+    for (std::size_t k = 0; k < rig.projectors[p].patterns.size(); ++k) {
+      const PatternRef ref{static_cast<int>(p), static_cast<int>(k)};
+      const auto shifts = static_cast<std::size_t>(2 * reach_of(pattern(ref)) + 1);
+      counts_.push_back({ref, 0, 0, std::vector<double>(shifts, 0)});
+    }
+  }
+}
+
+const LinePattern& ShownColorCount::pattern(PatternRef ref) const {
+  return rig_.projectors[static_cast<std::size_t>(ref.projector)]
+      .patterns[static_cast<std::size_t>(ref.pattern)];
+}
+
+void ShownColorCount::add(const std::vector<ColorFamily>& families,
+                          std::span<const GridGraph> graphs, const Labeling& labeling) {
+  for (const GridGraph& graph : graphs) {
+    for (const LabeledRun& run : labeling.runs[static_cast<std::size_t>(graph.camera)]) {
+      const Curve& curve = graph.curves[static_cast<std::size_t>(run.curve)];
+      const ColorFamily& family = families[static_cast<std::size_t>(curve.family)];
+      const int colors = static_cast<int>(family.colors.size());
+      const auto count = std::find_if(counts_.begin(), counts_.end(),
+                                      [&](const Count& c) { return c.ref == run.label.pattern; });
+      if (colors < 2 || count == counts_.end()) continue;
+      const LinePattern& lines = pattern(count->ref);
+      const std::vector<int> color_of = family.color_of_symbol(lines);
+      const int reach = reach_of(lines);
+      ++count->runs;
+      for (int i = run.begin; i < run.end; ++i) {
+        const SeenColor seen =
+            seen_color(curve.code.data() + static_cast<std::ptrdiff_t>(i) * colors, colors);
+        count->weight += seen.weight;
+        for (int shift = -reach; shift <= reach; ++shift) {
+          // Lines before the first one are those of the period before.
+          const int id = (run.label.line + shift + lines.period() * kFarthest) % lines.period();
+          if (color_of[static_cast<std::size_t>(lines.symbol(id))] == seen.color)
+            count->agree[static_cast<std::size_t>(shift + reach)] += seen.weight;
+        }
+      }
+    }
+  }
+}
+
+std::vector<ShownColors> ShownColorCount::shown() const {
+  std::vector<ShownColors> result;
+  for (const Count& count : counts_) {
+    const LinePattern& lines = pattern(count.ref);
+    const int reach = reach_of(lines);
+    ShownColors& shown = result.emplace_back();
+    shown.pattern = count.ref;
+    shown.runs = count.runs;
+    if (!(count.weight > 0)) continue;  // no colour tells
+    std::vector<double> of_symbol(static_cast<std::size_t>(lines.alphabet), 0);
+    for (int line = 0; line < lines.period(); ++line)
+      of_symbol[static_cast<std::size_t>(lines.symbol(line))] += 1.0 / lines.period();
+    shown.chance = 0;
+    for (const double share : of_symbol) shown.chance += share * share;
+    const auto share_at = [&](int shift) {
+      return count.agree[static_cast<std::size_t>(shift + reach)] / count.weight;
+    };
+    shown.share = shown.shifted_share = share_at(0);
+    for (int far = 1; far <= reach; ++far) {
+      for (const int shift : {-far, far}) {
+        if (!(share_at(shift) > shown.shifted_share)) continue;
+        shown.shift = shift;
+        shown.shifted_share = share_at(shift);
+      }
+    }
+  }
+  return result;
+}
+
+}  // namespace pencilscan

@@ -1,0 +1,60 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "pencilscan/labeling/labeling.h"
+#include "pencilscan/rig/rig.h"
+#include "pencilscan/view/color_family.h"
+
+namespace pencilscan {
+
+/// What the colours of labelled curves say of the names of one pattern's lines. A device that
+/// stands elsewhere may have every crossing agree with names that are whole lines off; colours do
+/// not agree then.
+struct ShownColors {
+  PatternRef pattern;
+  std::size_t runs = 0;  ///< stretches with a name
+  double chance = 1;     ///< share that would agree if names had no meaning
+  double share = 0;      ///< of the points, by what their colours tell: they have their line's
+  int shift = 0;         ///< if all lines were named so much further, most would agree
+  double shifted_share = 0;
+
+  /// Half of what lies between chance and certainty. Right names have .9 and more, names a few
+  /// lines off what chance gives; in between lie patterns of which some places are named wrong.
+  [[nodiscard]] bool deny() const { return tell() && share < 0.5 * (chance + 1); }
+  /// Which shift is right, where they deny the names as they are; 0: none is.
+  [[nodiscard]] int better_shift() const {
+    return deny() && shifted_share > 0.5 * (chance + 1) ? shift : 0;
+  }
+
+ private:
+  /// Stretches are of many lines then: by chance two colours agree in 3 of 4 of 30 lines once in
+  /// 300 times.
+  [[nodiscard]] bool tell() const { return runs >= 30 && chance < 1; }
+};
+
+/// Adds what one frame shows to `shown`, which is empty at first: then one entry per pattern, in
+/// the order of projectors and patterns. Shifts are looked for up to half a period of the code,
+/// beyond which they begin anew, and up to 16 lines.
+class ShownColorCount {
+ public:
+  explicit ShownColorCount(const Rig& rig);
+  void add(const std::vector<ColorFamily>& families, std::span<const GridGraph> graphs,
+           const Labeling& labeling);
+  [[nodiscard]] std::vector<ShownColors> shown() const;
+
+ private:
+  struct Count {
+    PatternRef ref;
+    std::size_t runs = 0;
+    double weight = 0;
+    std::vector<double> agree;  ///< per shift, from -reach
+  };
+  [[nodiscard]] const LinePattern& pattern(PatternRef ref) const;
+
+  const Rig& rig_;
+  std::vector<Count> counts_;
+};
+
+}  // namespace pencilscan

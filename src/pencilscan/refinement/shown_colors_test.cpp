@@ -1,0 +1,70 @@
+#include "pencilscan/refinement/shown_colors.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+
+#include "pencilscan/labeling/two_projector_scene.h"
+
+namespace pencilscan {
+namespace {
+
+/// The scene of two projectors with its lines named `off[p]` lines too far.
+class ShownColorsTest : public ::testing::Test {
+ protected:
+  std::vector<ShownColors> shown_with(std::array<int, 2> off) {
+    TwoProjectorScene scene;
+    change(scene);
+    Labeling labeling;
+    std::vector<GridGraph> graphs;
+    for (const int camera : {0, 1}) {
+      graphs.push_back(scene.graph(camera, 60, 0.02, 3));
+      const GridGraph& graph = graphs.back();
+      std::vector<LabeledRun>& runs = labeling.runs.emplace_back();
+      for (std::size_t i = 0; i < graph.curves.size(); ++i) {
+        const int p = graph.curves[i].family;
+        const int line = scene.true_lines[camera][i] + off[static_cast<std::size_t>(p)];
+        runs.push_back({static_cast<int>(i),
+                        0,
+                        static_cast<int>(graph.curves[i].points.size()),
+                        {{p, 0}, line, static_cast<double>(line), 1}});
+      }
+    }
+    ShownColorCount count(scene.rig);
+    count.add(scene.families, graphs, labeling);
+    return count.shown();
+  }
+  virtual void change(TwoProjectorScene& /*scene*/) {}
+};
+
+TEST_F(ShownColorsTest, RightNamesHaveTheirColors) {
+  for (const ShownColors& shown : shown_with({0, 0})) {
+    EXPECT_GE(shown.runs, 30U);
+    EXPECT_DOUBLE_EQ(shown.chance, 0.5);
+    EXPECT_DOUBLE_EQ(shown.share, 1);
+    EXPECT_FALSE(shown.deny());
+    EXPECT_EQ(shown.better_shift(), 0);
+  }
+}
+
+TEST_F(ShownColorsTest, NamesThatAreLinesOffAreDeniedAndTheWayBackIsFound) {
+  for (const int off : {-3, -1, 2, 3}) {
+    const std::vector<ShownColors> shown = shown_with({0, off});
+    EXPECT_FALSE(shown[0].deny()) << off;
+    EXPECT_TRUE(shown[1].deny()) << off;
+    EXPECT_EQ(shown[1].better_shift(), -off) << off;
+  }
+  // Half a period: the way back is one of two.
+  EXPECT_EQ(std::abs(shown_with({4, 0})[0].better_shift()), 4);
+}
+
+class ColorsThatDoNotTell : public ShownColorsTest {
+  void change(TwoProjectorScene& scene) override { scene.code_evidence = 0; }
+};
+
+TEST_F(ColorsThatDoNotTell, DenyNothing) {
+  for (const ShownColors& shown : shown_with({0, 3})) EXPECT_FALSE(shown.deny());
+}
+
+}  // namespace
+}  // namespace pencilscan
