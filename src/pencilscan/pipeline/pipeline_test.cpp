@@ -124,6 +124,9 @@ TEST_F(PipelineTest, SurfaceWhosePointsWereTakenBackIsNotMeasured) {
   EXPECT_GT(highest(surface.measured), 20);
   EXPECT_GT(highest(surface.mesh), 20 + 2 * reach);  // closed as before
   EXPECT_LT(surface.report.measured_share, 0.9 * share);
+  const auto measured_area =
+      made.shape.holes.area_mm2[static_cast<std::size_t>(HoleReason::kMeasured)];
+  EXPECT_NEAR(surface.report.measured_share, measured_area / whole_area(), 1e-9);
   EXPECT_NEAR(whole_area(), area, 1e-9 * area);
   const auto contradicted = static_cast<std::uint8_t>(HoleReason::kContradicted);
   for (std::size_t v = 0; v < surface.mesh.vertices.size(); ++v) {

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "pencilscan/surface/sample_ball.h"
+#include "pencilscan/surface/surface.h"
 
 namespace pencilscan {
 namespace {
@@ -44,6 +45,21 @@ TEST(Holes, ReasonsFollowFromWhoSeesAndWhoLights) {
   // What the depth stage found stays; rays past the ball are background.
   EXPECT_EQ(maps[0].nodes[map.index(80, 80)].reason, HoleReason::kContradicted);
   EXPECT_EQ(maps[0].nodes[0].reason, HoleReason::kBackground);
+}
+
+TEST(Holes, TheMeasuredShareIsThatOfTheAreas) {
+  SurfaceResult result;
+  result.mesh = make_sphere(kRadius, 48);
+  for (const Vec3& x : result.mesh.vertices)  // the lower half, and an island at the top
+    result.mesh.confidence.push_back(x.z() < 0 || x.z() > 0.99 * kRadius ? 1.F : 0.F);
+  result.report.spacing_mm = 0.1 * kRadius;
+  finish_surface({}, result);
+  std::vector<DepthMap> maps;
+  const HoleReport report = explain_holes(ball_rig(), RayScene(result.mesh), maps);
+  const double measured = report.area_mm2[static_cast<std::size_t>(HoleReason::kMeasured)];
+  const double whole = surface_area(result.mesh);
+  EXPECT_LT(surface_area(result.measured), 0.999 * measured);  // which the island is not in
+  EXPECT_NEAR(result.report.measured_share, measured / whole, 1e-9);
 }
 
 }  // namespace

@@ -105,12 +105,22 @@ void note_quality(SurfaceResult& result) {
   }
 }
 
+/// Share of the area whose faces were measured: that of kMeasured in HoleReport::area_mm2.
+double measured_share(const TriangleMesh& mesh) {
+  const std::vector<char> measured = measured_faces(mesh);
+  double area = 0, of_measured = 0;
+  for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
+    area += face_area(mesh, f);
+    if (measured[f] != 0) of_measured += face_area(mesh, f);
+  }
+  return area > 0 ? of_measured / area : 0;
+}
+
 /// The measured part without islands below an area, and what the surface is worth.
 void finish(double least_island, SurfaceResult& result) {
   result.measured = measured_part(result.mesh, least_island);
   result.measured.hole.clear();  // it has none
-  const double area = surface_area(result.mesh);
-  result.report.measured_share = area > 0 ? surface_area(result.measured) / area : 0;
+  result.report.measured_share = measured_share(result.mesh);
   note_quality(result);
 }
 

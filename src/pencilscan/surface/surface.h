@@ -62,7 +62,7 @@ struct SurfaceReport {
   std::size_t faces = 0;
   EdgeCounts edges;                    ///< of the closed mesh; all zero when it is watertight
   std::size_t self_intersections = 0;  ///< faces that cut another one (dense depth)
-  double measured_share = 0;           ///< area of mesh_measured / area of mesh
+  double measured_share = 0;  ///< area of `mesh` that was measured, islands and all / its area
   double seconds_filter = 0;
   double seconds_closing = 0;
   double seconds = 0;
