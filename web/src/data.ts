@@ -2,6 +2,7 @@
 // the server (view). The names are those of src/pencilscan/page/result_reader.h.
 import {Block, inflateJson, Unpacked} from './block';
 import type {DeviceJson} from './device';
+import type {FaultJson} from './fault';
 
 export interface PatternJson {
   lines: number;
@@ -30,7 +31,15 @@ export interface ResultJson {
   detail: 'full' | 'shape';
   summary: Record<string, number>;
   parts: string[];
-  missing: {what: string; why: string}[];
+  missing: FaultJson[];
+}
+
+/** A frame that has no result. */
+export interface FailedJson {
+  run: string;
+  frame: string;
+  why: string;
+  action: string; // may be empty
 }
 
 export interface CalibrationEntry {
@@ -79,7 +88,7 @@ export interface ExperimentJson {
   runs: RunJson[];
   commands: string[];
   commands_total?: number;
-  missing: {what: string; why: string}[];
+  missing: FaultJson[];
 }
 
 export interface IndexJson {
@@ -88,7 +97,7 @@ export interface IndexJson {
   title: string;
   rigs: (RigJson | null)[];
   results: ResultJson[];
-  failed: string[];
+  failed: FailedJson[];
   calibrations: CalibrationEntry[];
   experiment: ExperimentJson | null;
   sequence: boolean; // there is a sequence.json
@@ -111,6 +120,7 @@ export interface Details {
   timing?: Json;
   figures?: Json;
   warnings?: {text: string; action: string}[];
+  doubts?: FaultJson[]; // what is doubtful, of `missing` too where that was known in time
   histograms?: Record<string, HistogramJson | null>;
 }
 
@@ -361,6 +371,9 @@ export class Source {
     return answer.ok ? answer.json() : [];
   }
 }
+
+/** What a frame is called among those of all runs. */
+export const rowName = (run: string, frame: string): string => (run ? `${run} / ${frame}` : frame);
 
 /** report["a"]["b"], or undefined where something on the way is missing. */
 export function dig(value: Json | undefined, ...path: string[]): Json | undefined {

@@ -4,6 +4,7 @@ import type {App} from './app';
 import {inflate} from './block';
 import type {ExperimentJson, PictureJson, RunJson, Source, TableJson} from './data';
 import {byId, format, h, percent} from './dom';
+import {faultItem} from './fault';
 
 const kShownRows = 60; // of a table, before it is folded
 
@@ -155,12 +156,7 @@ function runTable(runs: RunJson[], within: string): HTMLElement | null {
 
 function missing(data: ExperimentJson): HTMLElement | null {
   if (!data.missing.length) return null;
-  return h('ul', {class: 'notes'}, ...data.missing.map(({what, why}) => {
-    const absent = !why.startsWith('unreadable');
-    return h('li', {class: absent ? 'absent' : 'warning'},
-      h('strong', {}, `${absent ? (why.startsWith('not in') ? 'Missing' : 'Note') : 'Cannot be read'}: ${what}`),
-      h('p', {}, why.replace(/^unreadable: /, '')));
-  }));
+  return h('ul', {class: 'notes'}, ...data.missing.map((fault) => faultItem(fault)));
 }
 
 export function showExperiment(app: App): void {

@@ -3,6 +3,7 @@ import type {App} from './app';
 import {bars, histogramChart, table, tiles, type Tile} from './charts';
 import {dig, digList, digNumber, type Details, type Json} from './data';
 import {byId, format, h} from './dom';
+import {faultItem} from './fault';
 import {figureText, kFigures, type FigureName, type FigureText} from './figure_text';
 import {kHoles} from './palette';
 import {kStageWords, wordList} from './words';
@@ -35,7 +36,7 @@ export class Figures {
     try {
       details = await source.details(result);
     } catch (error) {
-      found.missing.push({what: 'details', why: String(error)});
+      found.missing.push({what: 'details', why: String(error), kind: 'unreadable'});
     }
     if (app.result !== result) return;
     this.warnings(details);
@@ -50,17 +51,13 @@ export class Figures {
     for (const {text, action} of items) {
       list.append(h('li', {class: 'warning'}, h('strong', {}, text), action ? h('p', {}, action) : null));
     }
-    for (const {what, why} of found.missing) {
-      const absent = /^(not in|no )/.test(why);
-      list.append(h('li', {class: absent ? 'absent' : 'warning'},
-        h('strong', {}, `${absent ? 'Missing' : 'Cannot be read'}: ${this.nameOf(what)}`),
-        h('p', {}, why.replace(/^unreadable: /, ''))));
-    }
+    const faults = [...details.doubts ?? [], ...found.missing.filter(({kind}) => kind !== 'doubtful')];
+    list.append(...faults.map((fault) => faultItem(fault, this.nameOf(fault.what))));
     if (!list.childElementCount) {
       list.append(h('li', {class: 'fine'}, h('strong', {}, 'Nothing to warn of in this result.')));
     }
-    byId('warning-count').textContent = items.length + found.missing.length > 0
-      ? `${items.length + found.missing.length} to look at` : 'all fine';
+    byId('warning-count').textContent = items.length + faults.length > 0
+      ? `${items.length + faults.length} to look at` : 'all fine';
   }
 
   /** "image/1" in words. */

@@ -3,6 +3,7 @@ import {showCalibrations} from './calibration';
 import {Source} from './data';
 import {byId, h} from './dom';
 import {showExperiment} from './experiment';
+import {showFailedFrames} from './failed_frames';
 import {figureText} from './figure_text';
 import {Figures} from './figures';
 import {Images} from './images';
@@ -69,15 +70,15 @@ function start(): void {
   themeButton(app);
   showCalibrations(app);
   showExperiment(app);
+  showFailedFrames(app);
   const nothing = index.results.length === 0;
   document.body.classList.toggle('without-results', nothing);
-  if (nothing) document.querySelector('.skip')!.setAttribute('href', index.experiment ? '#experiment-section' : '#calibration-section');
+  if (nothing) document.querySelector('.skip')!.setAttribute('href', index.experiment ? '#experiment-section' : index.failed.length ? '#failed-section' : '#calibration-section');
   if (nothing) {
-    const text = index.calibrations.length || index.experiment ? '' :
+    const text = index.calibrations.length || index.experiment || index.failed.length ? '' :
       'This folder holds no result: no points.ply, mesh.ply or report.json of a frame was found in it or in its folders.';
-    const failed = index.failed.length ? `Frames without a result: ${index.failed.join(', ')}.` : '';
-    byId('nothing').textContent = [text, failed].filter(Boolean).join(' ');
-    byId('nothing').hidden = !text && !failed;
+    byId('nothing').textContent = text;
+    byId('nothing').hidden = !text;
   } else {
     // The first one that has everything: of long sequences, some have their shape only.
     app.show(Math.max(0, index.results.findIndex((result) => result.detail !== 'shape')));

@@ -1,5 +1,5 @@
 // A sequence as rows of figures: the table of `sequence finish`, or else what the index says.
-import type {ResultJson, Source} from './data';
+import {rowName, type IndexJson, type ResultJson, type Source} from './data';
 
 /** Of src/pencilscan/page/sequence_part.h. */
 interface SequenceJson {
@@ -47,7 +47,7 @@ export class Sequence {
 
   private constructor(private readonly json: SequenceJson, results: ResultJson[], readonly remark: string) {
     const rows = new Map(json.frames.map((name, row) => [name, row]));
-    this.rowOfResult = results.map((result) => rows.get(rowName(result)) ?? -1);
+    this.rowOfResult = results.map((result) => rows.get(nameOf(result)) ?? -1);
     this.resultOfRow = json.frames.map(() => -1);
     this.rowOfResult.forEach((row, result) => {
       if (row >= 0) this.resultOfRow[row] = result;
@@ -68,13 +68,14 @@ export class Sequence {
 
   static async read(source: Source): Promise<Sequence> {
     const {results, sequence} = source.index;
-    if (!sequence) return new Sequence(ofSummaries(results), results, 'Events and more curves: pencilscan sequence finish');
+    const own = () => ofSummaries(source.index);
+    if (!sequence) return new Sequence(own(), results, 'Events and more curves: pencilscan sequence finish');
     const json = await source.sequence<SequenceJson>().catch((error: unknown) =>
       ({broken: String(error)}) as SequenceJson);
-    if (json.broken !== undefined) return new Sequence(ofSummaries(results), results, `sequence.json cannot be read: ${json.broken}`);
+    if (json.broken !== undefined) return new Sequence(own(), results, `sequence.json cannot be read: ${json.broken}`);
     const known = new Set(json.frames);
-    if (results.some((result) => !known.has(rowName(result)))) {
-      return new Sequence(ofSummaries(results), results, 'sequence.json knows other frames: run pencilscan sequence finish again');
+    if (results.some((result) => !known.has(nameOf(result)))) {
+      return new Sequence(own(), results, 'sequence.json knows other frames: run pencilscan sequence finish again');
     }
     return new Sequence(json, results, '');
   }
@@ -103,16 +104,25 @@ export class Sequence {
   }
 }
 
-const rowName = ({run, name}: ResultJson): string => (run ? `${run} / ${name}` : name);
+const nameOf = ({run, name}: ResultJson): string => rowName(run, name);
 
-function ofSummaries(results: ResultJson[]): SequenceJson {
-  const column = (key: string) => results.map(({summary}) => summary[key] ?? null);
+/** Of what every result says itself. Frames that failed have their row too, without figures. */
+function ofSummaries({results, failed}: IndexJson): SequenceJson {
+  const done = results.map((result) => ({run: result.run, name: result.name, result}));
+  const lacking = failed.map(({run, frame, why}) => ({run, name: frame, why, result: undefined}));
+  const inOrder = (a: {run: string; name: string}, b: {run: string; name: string}) =>
+    compare(a.run, b.run) || compare(a.name, b.name);
+  const rows = [...done, ...lacking].sort(inOrder);
+  const column = (key: string) => rows.map(({result}) => result?.summary[key] ?? null);
   return {
-    frames: results.map(rowName),
-    states: results.map(() => 'done'),
+    frames: rows.map(({run, name}) => rowName(run, name)),
+    states: rows.map(({result}) => (result ? 'done' : 'failed')),
     columns: {points: column('points'), measured_share: column('measured_share'), crossing_px: column('median_px')},
-    remarks: results.flatMap(({summary}, row): [number, string][] =>
-      summary.warnings ? [[row, `${summary.warnings} to look at`]] : []),
-    events: [], holes: [], cameras: [], projectors: [],
+    remarks: rows.flatMap(({result}, row): [number, string][] =>
+      result?.summary.warnings ? [[row, `${result.summary.warnings} to look at`]] : []),
+    holes: lacking.map(({run, name, why}) => ({frame: rowName(run, name), reason: why})),
+    events: [], cameras: [], projectors: [],
   };
 }
+
+const compare = (a: string, b: string): number => (a < b ? -1 : a > b ? 1 : 0);

@@ -1,6 +1,7 @@
 // Frames of a sequence, or runs of an experiment: thumbnails, playing, figures as curves, comparing.
 import type {App} from './app';
 import {Comparing} from './comparing';
+import {rowName} from './data';
 import {byId, format, h} from './dom';
 import {figureText} from './figure_text';
 import {Film} from './film';
@@ -49,8 +50,8 @@ export class Timeline {
       h('div', {class: 'timeline-tools'}, ...(playable ? [this.play, this.speed,
         mode === 'view' ? this.faces : null, h('label', {class: 'check'}, this.loop, 'Loop'), this.rate] : []),
       sequence ? this.slider : null, this.name, this.strip.note,
-      failed.length ? h('span', {class: 'failed'}, `${failed.length} failed: ${failed.slice(0, 8).join(', ')}${
-        failed.length > 8 ? ', …' : ''}`) : null),
+      failed.length ? h('a', {class: 'failed', href: '#failed-section'}, `${failed.length} without a result: ${
+        failed.slice(0, 8).map(({run, frame}) => rowName(run, frame)).join(', ')}${failed.length > 8 ? ', …' : ''}`) : null),
       this.strip.element);
     app.on('result', () => this.shown());
     if (sequence) void this.readSequence();

@@ -13,8 +13,8 @@ export function run(...args) {
 }
 
 /** A server of a folder: its address, and how to end it by Ctrl-C; stop() tells how it ended. */
-export async function startView(folder) {
-  const server = spawn(program, ['view', folder], {stdio: ['ignore', 'pipe', 'ignore']});
+export async function startView(folder, ...options) {
+  const server = spawn(program, ['view', folder, ...options], {stdio: ['ignore', 'pipe', 'ignore']});
   const ended = new Promise((done) => server.on('exit', (code, signal) => done({code, signal})));
   const address = await new Promise((done, failed) => {
     server.on('error', failed).on('exit', (code) => failed(new Error(`view ended with ${code}`)));

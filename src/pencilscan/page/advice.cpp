@@ -5,6 +5,7 @@
 #include <map>
 
 #include "pencilscan/core/formatted.h"
+#include "pencilscan/io/frame_failure.h"
 #include "pencilscan/report/labelled_share.h"
 
 namespace pencilscan {
@@ -141,6 +142,18 @@ void advise_undecided(const json& report, std::vector<Advice>& advice) {
 }
 
 }  // namespace
+
+Advice advise_failure(const std::filesystem::path& folder) {
+  const auto failure = read_failure(folder);
+  if (!failure) {
+    return {"its folder holds neither a result nor a failure.json",
+            "Run the same reconstruct again: it makes what is not there."};
+  }
+  return {failure->reason, failure->is_passing
+                               ? "Another time may do better: make room on the disk or in memory "
+                                 "and run the same reconstruct again, which keeps what is done."
+                               : ""};
+}
 
 std::vector<Advice> advise(const json& report) {
   std::vector<Advice> advice;

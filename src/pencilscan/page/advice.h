@@ -1,5 +1,6 @@
 #pragma once
 
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
@@ -11,6 +12,9 @@ struct Advice {
   std::string warning;
   std::string action;  ///< may be empty
 };
+
+/// Why a frame has no result, by its failure.json in its folder, and what to do about it.
+[[nodiscard]] Advice advise_failure(const std::filesystem::path& folder);
 
 /// The warnings of a frame's report.json, with advice, and what its counts say beyond them: much
 /// undecided, surface in shadow, lines too dense, open surface. Tolerates any JSON.

@@ -1,12 +1,12 @@
 #include "pencilscan/page/experiment.h"
 
 #include <algorithm>
-#include <functional>
 #include <sstream>
 
 #include "pencilscan/core/error.h"
 #include "pencilscan/io/file.h"
 #include "pencilscan/page/experiment_pictures.h"
+#include "pencilscan/page/fault.h"
 #include "pencilscan/page/result_files.h"
 #include "pencilscan/page/result_folder.h"
 #include "pencilscan/page/result_reader.h"
@@ -18,7 +18,6 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 using nlohmann::ordered_json;
-using Note = std::function<void(const std::string&, const std::string&)>;
 
 constexpr std::size_t kMostRows = 2000;     ///< of a table in the page
 constexpr std::size_t kMostCommands = 200;  ///< in the page
@@ -54,7 +53,7 @@ ordered_json table_json(const std::string& file, const TextTable& table) {
           {"total", table.rows.size()}};
 }
 
-void add_tables(const ExperimentFolder& folder, const Note& note, ordered_json& page) {
+void add_tables(const ExperimentFolder& folder, const FaultNote& note, ordered_json& page) {
   page["tables"] = ordered_json::array();
   bool markdown = false;
   bool values = false;
@@ -64,21 +63,23 @@ void add_tables(const ExperimentFolder& folder, const Note& note, ordered_json& 
     try {
       for (const TextTable& table : read_tables(file)) {
         page["tables"].push_back(table_json(name, table));
-        if (table.rows.empty()) note(name, "the table has no rows: was the script stopped?");
+        if (table.rows.empty())
+          note(name, "the table has no rows: was the script stopped?", Fault::kNote);
       }
     } catch (const std::exception& error) {
-      note(name, std::string("unreadable: ") + error.what());
+      note(name, std::string("unreadable: ") + error.what(), Fault::kUnreadable);
     }
   }
   if (!markdown) {
     note("table.md",
-         "not in the folder: the script writes it at its end (--resume goes on where it stopped)");
+         "not in the folder: the script writes it at its end (--resume goes on where it stopped)",
+         Fault::kMissing);
   }
-  if (!values) note("results.csv", "not in the folder: no values of single runs");
+  if (!values) note("results.csv", "not in the folder: no values of single runs", Fault::kMissing);
 }
 
 /// Title, words and setting, where experiment.json states them.
-void add_about(const ExperimentFolder& folder, const Note& note, ordered_json& page) {
+void add_about(const ExperimentFolder& folder, const FaultNote& note, ordered_json& page) {
   const fs::path file = folder.root / "experiment.json";
   if (!is_file(file)) return;
   try {
@@ -88,11 +89,11 @@ void add_about(const ExperimentFolder& folder, const Note& note, ordered_json& p
         page[key] = about[key];
     }
   } catch (const std::exception& error) {
-    note("experiment.json", std::string("unreadable: ") + error.what());
+    note("experiment.json", std::string("unreadable: ") + error.what(), Fault::kUnreadable);
   }
 }
 
-void add_commands(const ExperimentFolder& folder, const Note& note, ordered_json& page) {
+void add_commands(const ExperimentFolder& folder, const FaultNote& note, ordered_json& page) {
   const fs::path file = folder.root / "commands.log";
   page["commands"] = ordered_json::array();
   if (!is_file(file)) return;
@@ -105,7 +106,7 @@ void add_commands(const ExperimentFolder& folder, const Note& note, ordered_json
     }
     page["commands_total"] = count;
   } catch (const std::exception& error) {
-    note("commands.log", std::string("unreadable: ") + error.what());
+    note("commands.log", std::string("unreadable: ") + error.what(), Fault::kUnreadable);
   }
 }
 
@@ -160,12 +161,12 @@ ExperimentPage read_experiment(const ExperimentFolder& folder, const ExperimentD
   ExperimentPage page;
   page.json = {{"folder", folder_name(folder.root)}};
   ordered_json missing = ordered_json::array();
-  const Note note = [&](const std::string& what, const std::string& why) {
+  const FaultNote note = [&](const std::string& what, const std::string& why, Fault kind) {
     std::string reason = why;
     const std::string place = folder.root.string() + "/";  // the page need not say where it lay
     const std::size_t at = reason.find(place);
     if (at != std::string::npos) reason.erase(at, place.size());
-    missing.push_back({{"what", what}, {"why", reason}});
+    missing.push_back({{"what", what}, {"why", reason}, {"kind", to_string(kind)}});
   };
   add_about(folder, note, page.json);
   add_tables(folder, note, page.json);

@@ -129,9 +129,7 @@ class Album {
   Album(const ExperimentFolder& folder, const ExperimentDetail& detail, ExperimentPage& page)
       : folder_(folder), detail_(detail), page_(page) {}
 
-  using Note = std::function<void(const std::string&, const std::string&)>;
-
-  void add(const std::vector<const ExperimentPicture*>& pictures, const Note& note) {
+  void add(const std::vector<const ExperimentPicture*>& pictures, const FaultNote& note) {
     std::vector<Shown> shown(pictures.size());
     parallel_for(pictures.size(),
                  [&](std::size_t i) { shown[i] = read_shown(*pictures[i], detail_); });
@@ -142,16 +140,16 @@ class Album {
   }
 
  private:
-  void add_one(const ExperimentPicture& picture, Shown& shown, const Note& note) {
+  void add_one(const ExperimentPicture& picture, Shown& shown, const FaultNote& note) {
     const std::string name = fs::relative(picture.file, folder_.root).generic_string();
-    if (!shown.broken.empty()) return note(name, shown.broken);
+    if (!shown.broken.empty()) return note(name, shown.broken, Fault::kUnreadable);
     const std::size_t bytes = embedded(shown.bytes.size());
     if (bytes > room()) {
       const auto megabytes = static_cast<double>(bytes) / 1e6;
       std::array<char, 80> text{};
       std::snprintf(text.data(), text.size(), "left out: its %.1f MB do not fit (--max-size)",
                     megabytes);
-      return note(name, text.data());
+      return note(name, text.data(), Fault::kNote);
     }
     used_ += bytes;
     nlohmann::ordered_json entry = {{"file", name},
@@ -217,8 +215,7 @@ std::optional<Kind> picture_kind(const fs::path& file) {
 }
 
 void add_pictures(const ExperimentFolder& folder, const ExperimentDetail& detail,
-                  const std::function<void(const std::string&, const std::string&)>& note,
-                  ExperimentPage& page) {
+                  const FaultNote& note, ExperimentPage& page) {
   page.json["pictures"] = nlohmann::ordered_json::array();
   std::vector<const ExperimentPicture*> own;
   std::vector<const ExperimentPicture*> gallery;
@@ -230,9 +227,11 @@ void add_pictures(const ExperimentFolder& folder, const ExperimentDetail& detail
   const auto shown = picked(gallery, detail, album.room());
   album.add(shown, note);
   if (shown.size() < gallery.size()) {
-    note(gallery.front()->group + "/", std::to_string(gallery.size() - shown.size()) + " of its " +
-                                           std::to_string(gallery.size()) +
-                                           " pictures are left out: they do not fit (--max-size)");
+    note(gallery.front()->group + "/",
+         std::to_string(gallery.size() - shown.size()) + " of its " +
+             std::to_string(gallery.size()) +
+             " pictures are left out: they do not fit (--max-size)",
+         Fault::kNote);
   }
 }
 

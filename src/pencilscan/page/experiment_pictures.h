@@ -1,11 +1,11 @@
 #pragma once
 
-#include <functional>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
 #include "pencilscan/page/experiment.h"
+#include "pencilscan/page/fault.h"
 
 namespace pencilscan {
 
@@ -13,8 +13,7 @@ namespace pencilscan {
 /// of folders of pictures, as many as fit are taken, evenly picked (001_a.png and 001_b.png
 /// together). note: is told what cannot be shown, and why.
 void add_pictures(const ExperimentFolder& folder, const ExperimentDetail& detail,
-                  const std::function<void(const std::string&, const std::string&)>& note,
-                  ExperimentPage& page);
+                  const FaultNote& note, ExperimentPage& page);
 
 /// What kind of picture a file is, by its ending and first bytes; nothing for other files.
 [[nodiscard]] std::optional<ExperimentPicture::Kind> picture_kind(

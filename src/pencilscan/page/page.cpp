@@ -8,6 +8,7 @@
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/io/file.h"
+#include "pencilscan/page/advice.h"
 #include "pencilscan/page/page_assets.h"
 #include "pencilscan/page/sequence_part.h"
 #include "pencilscan/view/color_family.h"
@@ -268,9 +269,7 @@ ordered_json PageData::entry(std::size_t result, ResultReader& reader,
                         {"detail", "full"},
                         {"summary", reader.summary()},
                         {"parts", parts}};
-  entry["missing"] = ordered_json::array();
-  for (const auto& missing : reader.missing())
-    entry["missing"].push_back({{"what", missing.what}, {"why", missing.why}});
+  entry["missing"] = reader.missing_json();
   return entry;
 }
 
@@ -291,8 +290,13 @@ ordered_json PageData::index(const std::string& mode, std::vector<ordered_json> 
   index["experiment"] = experiment;
   index["sequence"] = is_file(folder_.root / "sequence.json");
   index["failed"] = ordered_json::array();
-  for (const fs::path& path : folder_.failed)
-    index["failed"].push_back(fs::relative(path, folder_.root).string());
+  for (const fs::path& path : folder_.failed) {
+    const Advice advice = advise_failure(path);
+    index["failed"].push_back({{"run", run_of(path, folder_.root)},
+                               {"frame", path.filename().string()},
+                               {"why", advice.warning},
+                               {"action", advice.action}});
+  }
   index["calibrations"] = ordered_json::array();
   for (const fs::path& path : folder_.calibrations) {
     try {

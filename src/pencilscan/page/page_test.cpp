@@ -7,6 +7,7 @@
 
 #include <cstring>
 #include <fstream>
+#include <memory>
 #include <numeric>
 #include <random>
 
@@ -251,6 +252,27 @@ TEST_F(Folder, FindsFramesRunsAndFailedFrames) {
   EXPECT_EQ(find_results(root_ / "joint" / "000001").results.size(), 1U);
 }
 
+TEST_F(Folder, SaysWhyAFrameFailed) {
+  sample::write_output(root_ / "joint", 1);
+  write_json(root_ / "joint" / "inputs.json", {{"format", "any"}});
+  write_json(root_ / "joint" / "000001" / "failure.json",
+             {{"reason", "cam1: <black>"}, {"is_passing", false}});
+  write_json(root_ / "joint" / "000002" / "failure.json",
+             {{"reason", "the disk is full"}, {"is_passing", true}});
+  write_text(root_ / "joint" / "000003" / "failure.json", "{");
+  fs::create_directories(root_ / "joint" / "000004");
+  const auto failed = index_of(report())["failed"];
+  ASSERT_EQ(failed.size(), 4U);
+  EXPECT_EQ(failed[0]["run"], "joint");
+  EXPECT_EQ(failed[0]["frame"], "000001");
+  EXPECT_EQ(failed[0]["why"], "cam1: <black>");
+  EXPECT_EQ(failed[0]["action"], "");
+  EXPECT_EQ(failed[1]["why"], "the disk is full");
+  EXPECT_THAT(failed[1]["action"].get<std::string>(), HasSubstr("again"));
+  EXPECT_THAT(failed[2]["why"].get<std::string>(), HasSubstr("does not say why"));
+  EXPECT_THAT(failed[3]["why"].get<std::string>(), HasSubstr("neither a result nor"));
+}
+
 TEST(UnpackedMesh, LiesReadyForTheBrowser) {
   TriangleMesh mesh = sample::ball();
   mesh.sigma[3] = 0.25F;
@@ -310,7 +332,15 @@ TEST_F(Folder, WhatIsMissingOrBrokenIsSaidInThePage) {
   write_text(root_ / "devices.json", "{\"format\": 3}");
   const auto index = index_of(report());
   std::vector<std::string> what;
-  for (const auto& missing : index["results"][0]["missing"]) what.push_back(missing["what"]);
+  for (const auto& missing : index["results"][0]["missing"]) {
+    what.push_back(missing["what"]);
+    const bool is_broken = what.back().ends_with(".ply") || what.back() == "report.json";
+    if (what.back() == "mesh_measured.ply" || !is_broken) {
+      EXPECT_EQ(missing["kind"], "missing") << what.back();
+    } else {
+      EXPECT_EQ(missing["kind"], "unreadable") << what.back();
+    }
+  }
   EXPECT_THAT(what, Contains("points.ply"));
   EXPECT_THAT(what, Contains("report.json"));
   EXPECT_THAT(what, Contains("mesh_measured.ply"));
@@ -381,8 +411,18 @@ TEST_F(Folder, ATruthOfAnotherSizeIsTold) {
   static_cast<void>(report(options));
   EXPECT_THAT(last_.missing, Not(Contains(HasSubstr("true.ply"))));
   options.sources.truth = root_ / "small.ply";
-  static_cast<void>(report(options));
+  const std::string page = report(options);
   EXPECT_THAT(last_.missing, Contains(HasSubstr("small.ply: this is hardly the truth")));
+  const auto missing = index_of(page)["results"][0]["missing"];
+  ASSERT_EQ(missing.size(), 1U);
+  EXPECT_EQ(missing[0]["kind"], "doubtful");
+  // No figure is of it, and who asks for the details alone is told as well.
+  const ResultEntry entry = find_results(root_, options.sources).results.at(0);
+  ResultReader reader(entry, std::make_shared<const Rig>(sample::rig()), {});
+  const auto details = nlohmann::json::parse(inflated(*reader.part("details")));
+  EXPECT_FALSE(details.contains("figures"));
+  EXPECT_FALSE(details["histograms"].contains("error_mm"));
+  EXPECT_EQ(details["doubts"][0]["kind"], "doubtful");
 }
 
 TEST_F(Folder, ATruthAddsDistancesAndFigures) {

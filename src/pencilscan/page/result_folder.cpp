@@ -33,7 +33,7 @@ ResultEntry entry_for(const fs::path& folder, const fs::path& root, const Result
   entry.folder = folder;
   const fs::path above = folder.parent_path();
   entry.name = folder == root ? folder_name(root) : folder.filename().string();
-  if (folder != root && above != root) entry.run = fs::relative(above, root).string();
+  entry.run = run_of(folder, root);
   entry.rig = !sources.rig.empty()
                   ? sources.rig
                   : first_file({above / "devices.json", above / "rig.json", folder / "devices.json",
@@ -78,6 +78,11 @@ bool holds_result(const fs::path& folder) {
   if (is_file(folder / "points.ply") || is_file(folder / "mesh_measured.ply")) return true;
   return is_file(folder / "report.json") &&
          (is_file(folder / "timing.json") || is_file(folder / "mesh.ply"));
+}
+
+std::string run_of(const fs::path& frame, const fs::path& root) {
+  const fs::path above = frame.parent_path();
+  return frame == root || above == root ? std::string() : fs::relative(above, root).string();
 }
 
 std::string folder_name(const fs::path& folder) {

@@ -40,6 +40,9 @@ struct ResultFolder {
 
 /// True for a folder that itself holds the result of a frame or a scan.
 [[nodiscard]] bool holds_result(const std::filesystem::path& folder);
+/// The folder above a frame's within the output; empty where that is the output itself.
+[[nodiscard]] std::string run_of(const std::filesystem::path& frame,
+                                 const std::filesystem::path& root);
 /// Its own name, also of "." and "a/b/".
 [[nodiscard]] std::string folder_name(const std::filesystem::path& folder);
 /// The folders directly in a folder, ordered by name; no links.

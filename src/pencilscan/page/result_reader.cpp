@@ -51,14 +51,16 @@ ResultReader::ResultReader(ResultEntry entry, std::shared_ptr<const Rig> rig, co
     : rig_(std::move(rig)),
       detail_(detail),
       files_(std::move(entry), rig_.get(), detail.max_faces,
-             [this](const std::string& file, const std::string& why) { note(file, why); }) {
+             [this](const std::string& file, const std::string& why) {
+               note(file, why, Fault::kUnreadable);
+             }) {
   note_missing_files();
 }
 
-void ResultReader::note(const std::string& what, const std::string& why) {
+void ResultReader::note(const std::string& what, const std::string& why, Fault kind) {
   const bool known = std::any_of(missing_.begin(), missing_.end(),
                                  [&](const Missing& m) { return m.what == what; });
-  if (!known) missing_.push_back({what, why});
+  if (!known) missing_.push_back({what, why, kind});
 }
 
 bool ResultReader::is_scan() const {
@@ -71,11 +73,12 @@ bool ResultReader::is_scan() const {
 void ResultReader::note_missing_files() {
   if (rig_ == nullptr)
     note("the devices",
-         "no readable devices.json or rig.json beside the results; name the rig with --rig");
+         "no readable devices.json or rig.json beside the results; name the rig with --rig",
+         Fault::kMissing);
   if (is_scan()) return;
   const auto need = [&](const char* file, const char* consequence) {
     if (!is_file(files_.entry().folder / file))
-      note(file, std::string("not in the folder: ") + consequence);
+      note(file, std::string("not in the folder: ") + consequence, Fault::kMissing);
   };
   need("report.json", "no counts and warnings");
   need("points.ply", "no measured points");
@@ -94,8 +97,10 @@ void ResultReader::note_missing_files() {
     if (!there) without += (without.empty() ? "" : ", ") + name;
   }
   if (!without.empty()) {
-    note("pictures", "no picture of " + without +
-                         ": reconstructed with --no-pictures? --frames names the captured images");
+    note("pictures",
+         "no picture of " + without +
+             ": reconstructed with --no-pictures? --frames names the captured images",
+         Fault::kMissing);
   }
 }
 
@@ -128,12 +133,19 @@ std::vector<ResultReader::Missing> ResultReader::missing() const {
   return missing_;
 }
 
+ordered_json ResultReader::missing_json() const {
+  ordered_json list = ordered_json::array();
+  for (const Missing& m : missing())
+    list.push_back({{"what", m.what}, {"why", m.why}, {"kind", to_string(m.kind)}});
+  return list;
+}
+
 std::optional<std::string> ResultReader::part(const std::string& name) {
   const std::lock_guard lock(mutex_);
   try {
     return make_part(name);
   } catch (const std::exception& error) {
-    note(name, error.what());
+    note(name, error.what(), Fault::kUnreadable);
     return std::nullopt;
   }
 }
@@ -192,7 +204,7 @@ std::optional<std::string> ResultReader::make_camera_part(const std::string& nam
   return std::nullopt;
 }
 
-ordered_json ResultReader::histograms() {
+ordered_json ResultReader::histograms(bool has_truth) {
   ordered_json result = ordered_json::object();
   const auto* points = files_.points();
   if (points == nullptr) return result;
@@ -204,7 +216,7 @@ ordered_json ResultReader::histograms() {
   }
   result["sigma_mm"] = histogram(sigmas);
   result["confidence"] = histogram(confidences);
-  if (const PointErrors* errors = files_.errors()) {
+  if (const PointErrors* errors = has_truth ? files_.errors() : nullptr) {
     result["error_mm"] = histogram(errors->distance_mm);
     std::vector<float> ratio;
     for (std::size_t i = 0; i < points->size(); ++i) {
@@ -215,15 +227,19 @@ ordered_json ResultReader::histograms() {
   return result;
 }
 
-void ResultReader::check_truth(const RayScene& truth) {
+bool ResultReader::is_truth(const RayScene& truth) {
   std::vector<Vec3> positions;
   if (const auto* points = detail_.shape_only ? nullptr : files_.points()) {
     for (const MeasuredPoint& p : *points) positions.push_back(position_of(p));
   } else if (const TriangleMesh* mesh = files_.mesh()) {
     positions = mesh->vertices;
   }
-  if (const auto warning = truth_warning(truth, positions))
-    note(files_.entry().truth.string(), *warning);
+  const auto warning = truth_warning(truth, positions);
+  if (warning) {
+    note(files_.entry().truth.string(), *warning + "; figures against it are left out",
+         Fault::kDoubtful);
+  }
+  return !warning;
 }
 
 ordered_json ResultReader::details() {
@@ -235,12 +251,16 @@ ordered_json ResultReader::details() {
       result["warnings"].push_back({{"text", advice.warning}, {"action", advice.action}});
   }
   if (const json* timing = files_.timing()) result["timing"] = *timing;
-  if (!detail_.shape_only) result["histograms"] = histograms();
   const RayScene* truth = files_.truth();
-  if (truth != nullptr) check_truth(*truth);
+  const bool has_truth = truth != nullptr && is_truth(*truth);
+  for (const Missing& m : missing_) {  // `view` makes its index before it knows
+    if (m.kind == Fault::kDoubtful)
+      result["doubts"].push_back({{"what", m.what}, {"why", m.why}, {"kind", to_string(m.kind)}});
+  }
+  if (!detail_.shape_only) result["histograms"] = histograms(has_truth);
   if (const json* figures = files_.figures()) {
     result["figures"] = *figures;
-  } else if (truth != nullptr && rig_ != nullptr && detail_.evaluate && !detail_.shape_only) {
+  } else if (has_truth && rig_ != nullptr && detail_.evaluate && !detail_.shape_only) {
     EvaluationInput input;
     if (const auto* points = files_.points()) input.points = *points;
     const auto measured = files_.entry().folder / "mesh_measured.ply";

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "pencilscan/page/fault.h"
 #include "pencilscan/page/result_files.h"
 #include "pencilscan/page/result_folder.h"
 #include "pencilscan/rig/rig.h"
@@ -42,21 +43,24 @@ class ResultReader {
   /// True for points and a surface alone, as `scan` writes them: `line` is a column or row of the
   /// panel then.
   [[nodiscard]] bool is_scan() const;
-  /// What is not there, and why: file, reason.
+  /// What is not as it should be, and why: file, reason.
   struct Missing {
     std::string what;
     std::string why;
+    Fault kind = Fault::kMissing;
   };
   [[nodiscard]] std::vector<Missing> missing() const;
+  /// The same for the page: what, why, kind.
+  [[nodiscard]] nlohmann::ordered_json missing_json() const;
 
  private:
   [[nodiscard]] std::optional<std::string> make_part(const std::string& name);
   [[nodiscard]] std::optional<std::string> make_camera_part(const std::string& name);
   [[nodiscard]] nlohmann::ordered_json details();
-  [[nodiscard]] nlohmann::ordered_json histograms();
-  /// Notes a true mesh that can hardly be that of the result.
-  void check_truth(const RayScene& truth);
-  void note(const std::string& what, const std::string& why);
+  [[nodiscard]] nlohmann::ordered_json histograms(bool has_truth);
+  /// Notes a true mesh that can hardly be that of the result; false then.
+  [[nodiscard]] bool is_truth(const RayScene& truth);
+  void note(const std::string& what, const std::string& why, Fault kind);
   void note_missing_files();
 
   std::shared_ptr<const Rig> rig_;
