@@ -85,6 +85,7 @@ void Gate::guard(httplib::Server& server, int port, const std::string& only_by) 
                               {"X-Frame-Options", "DENY"},
                               {"Referrer-Policy", "no-referrer"},
                               {"Cross-Origin-Resource-Policy", "same-origin"},
+                              {"Accept-Ranges", "none"},
                               {"Cache-Control", "no-cache"}});
   server.set_pre_routing_handler(
       [this, only_by](const httplib::Request& request, httplib::Response& response) {

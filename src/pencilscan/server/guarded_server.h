@@ -8,7 +8,8 @@ namespace pencilscan {
 /// A LimitedServer with the Gate before it.
 class GuardedServer : public LimitedServer {
  public:
-  explicit GuardedServer(const std::string& address) : gate(address) {}
+  GuardedServer(const std::string& address, int answers_at_once)
+      : LimitedServer(answers_at_once), gate(address) {}
 
   Gate gate;
 };

@@ -9,7 +9,7 @@
 namespace pencilscan {
 namespace {
 
-constexpr int kLabThreads = 4;
+constexpr int kLabAnswersAtOnce = 4;
 
 void answer_preview(LabDesk& desk, const httplib::Request& request, httplib::Response& response) {
   const std::string digits = request.matches[1];
@@ -29,7 +29,7 @@ void answer_action(LabDesk& desk, const httplib::Request& request, httplib::Resp
 
 }  // namespace
 
-LabServer::LabServer(int port) : PageServer("127.0.0.1", port, kLabThreads, "lab") {
+LabServer::LabServer(int port) : PageServer("127.0.0.1", port, kLabAnswersAtOnce, "lab") {
   const std::string root = server().gate.path();
   server().Get(root, [](const httplib::Request&, httplib::Response& response) {
     response.set_content(kLabPage, "text/html; charset=utf-8");

@@ -1,10 +1,15 @@
 #include "pencilscan/server/lab_server.h"
 
+#include <arpa/inet.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
+#include <chrono>
 #include <nlohmann/json.hpp>
 #include <thread>
+#include <vector>
 
 #include "pencilscan/server/http.h"
 
@@ -77,6 +82,36 @@ TEST_F(LabPage, NobodyElsePressesButtons) {
   EXPECT_EQ(client_.Post((root_ + "act/capture").c_str(), foreign, "", "text/plain")->status, 403);
   EXPECT_NE(client_.Get((root_ + "act/capture").c_str())->status, 200);  // no link, no picture
   EXPECT_EQ(desk_.pressed, "");
+}
+
+TEST_F(LabPage, IdleConnectionsDoNotDelayIt) {
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_port = htons(static_cast<std::uint16_t>(server_.port()));
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  const auto idle = [&](int count) {
+    std::vector<int> sockets;
+    for (int i = 0; i < count; ++i) {
+      sockets.push_back(::socket(AF_INET, SOCK_STREAM, 0));
+      EXPECT_EQ(
+          ::connect(sockets.back(), reinterpret_cast<const sockaddr*>(&address), sizeof address),
+          0);
+    }
+    return sockets;
+  };
+  client_.set_read_timeout(60);
+  // With a thread for each of four and 5 s for a first byte, twelve would take 15 s, and the others
+  // more than a minute. The bounds leave a busy machine its time.
+  for (const auto& [count, seconds] : {std::pair(12, 5), std::pair(60, 12)}) {
+    const std::vector<int> silent = idle(count);
+    const auto begin = std::chrono::steady_clock::now();
+    const auto answer = client_.Get((root_ + "status").c_str());
+    const auto taken = std::chrono::steady_clock::now() - begin;
+    ASSERT_TRUE(answer) << count;
+    EXPECT_EQ(answer->status, 200);
+    EXPECT_LT(taken, std::chrono::seconds(seconds)) << count;
+    for (const int connection : silent) ::close(connection);
+  }
 }
 
 }  // namespace

@@ -5,10 +5,12 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cctype>
 #include <chrono>
 #include <cmath>
 #include <cstring>
 #include <optional>
+#include <string_view>
 
 namespace pencilscan {
 namespace {
@@ -33,6 +35,7 @@ ServerClock::time_point in_seconds(double seconds) {
 /// late.
 std::optional<std::string> read_request(int socket) {
   const auto until = in_seconds(LimitedServer::kRequestSeconds);
+  if (!is_ready(socket, POLLIN, in_seconds(LimitedServer::kFirstByteSeconds))) return std::nullopt;
   std::string request;
   char block[4096];
   while (request.find("\r\n\r\n") == std::string::npos) {
@@ -45,10 +48,30 @@ std::optional<std::string> read_request(int socket) {
   return request;
 }
 
+/// True for a line "Range: bytes=0-9".
+bool asks_for_range(std::string_view line) {
+  constexpr std::string_view kName = "range:";
+  std::string name(line.substr(0, kName.size()));
+  for (char& c : name) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return name == kName;
+}
+
+/// Without the headers that ask for a part: the library would refuse those that it cannot read.
+std::string without_ranges(const std::string& request) {
+  std::string kept;
+  for (std::size_t begin = 0; begin < request.size();) {
+    const std::size_t end = std::min(request.find('\n', begin), request.size() - 1) + 1;
+    const std::string_view line = std::string_view(request).substr(begin, end - begin);
+    if (!asks_for_range(line)) kept += line;
+    begin = end;
+  }
+  return kept;
+}
+
 /// A request that is whole already; what writes may do is the socket's or the test's.
 class RequestStream : public httplib::Stream {
  public:
-  explicit RequestStream(std::string request) : request_(std::move(request)) {}
+  explicit RequestStream(const std::string& request) : request_(without_ranges(request)) {}
 
   bool is_readable() const override { return at_ < request_.size(); }
   bool is_writable() const override { return true; }
@@ -75,8 +98,7 @@ class RequestStream : public httplib::Stream {
 
 class SocketStream : public RequestStream {
  public:
-  SocketStream(std::string request, int socket)
-      : RequestStream(std::move(request)), socket_(socket) {}
+  SocketStream(const std::string& request, int socket) : RequestStream(request), socket_(socket) {}
 
   ssize_t write(const char* bytes, std::size_t size) override {
     if (!is_ready(socket_, POLLOUT, in_seconds(LimitedServer::kStallSeconds))) return -1;
@@ -100,10 +122,15 @@ class TextStream : public RequestStream {
 
 }  // namespace
 
+LimitedServer::LimitedServer(int answers_at_once) : answers_(answers_at_once) {
+  new_task_queue = [] {
+    return new httplib::ThreadPool(kConnections);  // NOLINT: the server takes it
+  };
+}
+
 bool LimitedServer::serve(httplib::Stream& stream) {
   bool closed = false;
-  return process_request(stream, true, closed,
-                         [](httplib::Request& request) { request.ranges.clear(); });
+  return process_request(stream, true, closed, nullptr);
 }
 
 std::string LimitedServer::answer(const std::string& request) {
@@ -115,9 +142,11 @@ std::string LimitedServer::answer(const std::string& request) {
 
 bool LimitedServer::process_and_close_socket(socket_t socket) {
   bool done = false;
-  if (auto request = read_request(socket)) {
-    SocketStream stream(std::move(*request), socket);
+  if (const auto request = read_request(socket)) {
+    SocketStream stream(*request, socket);
+    answers_.acquire();
     done = serve(stream);
+    answers_.release();
   }
   ::shutdown(socket, SHUT_RDWR);
   ::close(socket);

@@ -4,12 +4,9 @@
 
 namespace pencilscan {
 
-PageServer::PageServer(const std::string& address, int port, int threads,
+PageServer::PageServer(const std::string& address, int port, int answers_at_once,
                        const std::string& command)
-    : server_(std::make_unique<GuardedServer>(address)) {
-  server_->new_task_queue = [threads] {
-    return new httplib::ThreadPool(threads);  // NOLINT: the server takes it
-  };
+    : server_(std::make_unique<GuardedServer>(address, answers_at_once)) {
   server_->gate.guard(*server_, port, "only by the link that pencilscan " + command + " prints");
 }
 

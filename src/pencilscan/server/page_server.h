@@ -24,7 +24,7 @@ class PageServer {
  protected:
   /// Takes the port (0: any free one) of an address of this computer. `command`: which prints the
   /// link. InputError when the address is none; StageError when the port is not free.
-  PageServer(const std::string& address, int port, int threads, const std::string& command);
+  PageServer(const std::string& address, int port, int answers_at_once, const std::string& command);
   ~PageServer();
 
   GuardedServer& server() { return *server_; }

@@ -204,6 +204,23 @@ TEST_F(Served, OpenConnectionsThatSayNothingDoNotKeepOthersOut) {
   for (const int connection : silent) ::close(connection);
 }
 
+TEST_F(Served, WhoAsksForAPartGetsTheWhole) {
+  const std::string file = token() + "/files/000000/points.ply";
+  const auto size = fs::file_size(root_ / "000000" / "points.ply");
+  for (const char* range : {"bytes=0-9", "bytes=9-0", "lines=1-2", "nonsense", ""}) {
+    for (const char* name : {"Range", "range"}) {
+      const auto answer = client_->Get(file.c_str(), {{name, range}});
+      ASSERT_TRUE(answer) << range;
+      EXPECT_EQ(answer->status, 200) << range;
+      EXPECT_EQ(answer->body.size(), size) << range;
+    }
+  }
+  const auto head = client_->Head(file.c_str());
+  ASSERT_TRUE(head);
+  EXPECT_EQ(head->status, 200);
+  EXPECT_EQ(head->get_header_value("Accept-Ranges"), "none");
+}
+
 TEST_F(Served, TheLongestRequestsFitTheStack) {
   const std::string host = "Host: 127.0.0.1:" + std::to_string(server_->port()) + "\r\n";
   const std::string path = token() + "/files/" + std::string(8000, 'a');

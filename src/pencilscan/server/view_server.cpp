@@ -20,7 +20,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kRequestThreads = 8;
+constexpr int kViewAnswersAtOnce = 8;
 constexpr std::size_t kOpenReaders = 4;
 constexpr std::size_t kThumbFaces = 20'000;  ///< of a mesh that is drawn as a small picture
 constexpr std::size_t kMostPlayFaces = 400'000;
@@ -196,7 +196,7 @@ void ViewServer::State::add_routes(GuardedServer& server) {
 }
 
 ViewServer::ViewServer(const fs::path& root, const ViewOptions& options)
-    : PageServer(options.address, options.port, kRequestThreads, "view"),
+    : PageServer(options.address, options.port, kViewAnswersAtOnce, "view"),
       state_(std::make_unique<State>(root, options)) {
   state_->data.require_content("view");
   state_->page = state_->make_page();
