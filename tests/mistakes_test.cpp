@@ -22,6 +22,17 @@ class Newcomer : public ProgramTest {
           "v -60 -60 -50\nv 60 -60 -50\nv 0 70 -50\nv 0 0 80\n"
           "f 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n");
   }
+  /// Points of a plate of 160 x 120 mm as PLY.
+  static std::string plate() {
+    std::string points =
+        "ply\nformat ascii 1.0\nelement vertex 4941\nproperty float x\n"
+        "property float y\nproperty float z\nend_header\n";
+    for (int x = 0; x <= 80; ++x)
+      for (int y = 0; y <= 60; ++y)
+        points += std::to_string(2 * x) + " " + std::to_string(2 * y) + " 0." +
+                  std::to_string((7 * x + 5 * y) % 10) + "\n";
+    return points;
+  }
   /// A rig of two small cameras and projectors before that mesh, and what simulates it.
   std::string small_scene() {
     EXPECT_EQ(run("rig ring --out r.json --cameras 2 --projectors 2 --camera-width 64 "
@@ -317,14 +328,7 @@ TEST_F(Newcomer, IsToldOfObjectsInAnotherUnit) {
 }
 
 TEST_F(Newcomer, IsToldOfArtefactsOfAnotherSize) {
-  std::string plate =
-      "ply\nformat ascii 1.0\nelement vertex 4941\nproperty float x\n"
-      "property float y\nproperty float z\nend_header\n";
-  for (int x = 0; x <= 80; ++x)
-    for (int y = 0; y <= 60; ++y)
-      plate += std::to_string(2 * x) + " " + std::to_string(2 * y) + " 0." +
-               std::to_string((7 * x + 5 * y) % 10) + "\n";
-  write("plate.ply", plate);
+  write("plate.ply", plate());
   const std::string measure = "artefact plate plate.ply --thickness 10 ";
   const Outcome right = run(measure + "--length 160 --width 120 --border 5");
   EXPECT_EQ(right.code, 0) << right.error;
@@ -338,6 +342,22 @@ TEST_F(Newcomer, IsToldOfArtefactsOfAnotherSize) {
   const Outcome ball = run("artefact sphere plate.ply --diameter 80");
   EXPECT_EQ(ball.code, 1);
   EXPECT_THAT(ball.error, HasSubstr("plate.ply: no sphere fits 4941 points"));
+}
+
+TEST_F(Newcomer, IsToldOfPositionsWithoutAResult) {
+  const fs::path out = folder_ / "out";
+  for (const char* frame : {"000000", "000001"}) fs::create_directories(out / frame);
+  write("out/000000/points.ply", plate());
+  write("out/000001/failure.json", R"({"reason": "cam1: black"})");
+  const Outcome both = run("artefact plate out --report plate.html --json plate.json");
+  EXPECT_EQ(both.code, 1);
+  EXPECT_THAT(both.error, HasSubstr("warning: out/000001 has no result: cam1: black"));
+  EXPECT_THAT(both.error, HasSubstr("1 of 2 positions have no result"));
+  EXPECT_TRUE(fs::exists(folder_ / "plate.html"));
+  EXPECT_TRUE(fs::exists(folder_ / "plate.json"));
+  const Outcome none = run("artefact plate out/000001");
+  EXPECT_EQ(none.code, 1);
+  EXPECT_THAT(none.error, HasSubstr("no position has a result; out/000001: cam1: black"));
 }
 
 TEST_F(Newcomer, MayJudgeAScanAndIsToldOfAWrongTruth) {
@@ -397,7 +417,7 @@ TEST_F(Newcomer, WritesScenesForOtherRenderers) {
   ASSERT_EQ(run(simulate + "--export-blender --frame-count 2 --out made").code, 0);
   for (const char* file : {"render.py", "scene.json", "film/proj0.png", "film/proj1.png",
                            "objects/000000.ply", "objects/000001.ply"}) {
-    EXPECT_TRUE(std::filesystem::exists(folder_ / "made/blender" / file)) << file;
+    EXPECT_TRUE(fs::exists(folder_ / "made/blender" / file)) << file;
   }
   expect_bad(simulate + "--export-blender --texture stripes --out o", "--texture");
 }

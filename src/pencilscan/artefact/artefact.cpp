@@ -82,10 +82,17 @@ double range(std::span<const Vec3> points, const Distance& distance,
   return high - low;
 }
 
+/// The farthest points, and among them the greatest and the least signed distance, which make the
+/// figure: where the farthest all lie on one side, the last place is the other side's.
 template <typename Distance>
 std::vector<WorstPoint> worst_points(std::span<const Vec3> points, const Distance& distance) {
   std::vector<WorstPoint> worst(points.size());
   for (std::size_t i = 0; i < points.size(); ++i) worst[i] = {i, distance(points[i])};
+  if (worst.empty()) return worst;
+  const auto [least, greatest] = std::minmax_element(
+      worst.begin(), worst.end(),
+      [](const WorstPoint& a, const WorstPoint& b) { return a.distance < b.distance; });
+  const WorstPoint ends[] = {*least, *greatest};
   const std::size_t shown = std::min(kWorstShown, worst.size());
   std::partial_sort(worst.begin(), worst.begin() + static_cast<std::ptrdiff_t>(shown), worst.end(),
                     [](const WorstPoint& a, const WorstPoint& b) {
@@ -93,6 +100,12 @@ std::vector<WorstPoint> worst_points(std::span<const Vec3> points, const Distanc
                       return x != y ? x > y : a.index < b.index;
                     });
   worst.resize(shown);
+  for (const WorstPoint& end : ends) {
+    const bool is_there = std::any_of(worst.begin(), worst.end(), [&](const WorstPoint& point) {
+      return point.distance == end.distance;
+    });
+    if (!is_there) worst.back() = end;
+  }
   return worst;
 }
 
@@ -187,7 +200,7 @@ BallFigures measure_ball(ArtefactPoints points, const Sphere& start, const Rig* 
     ball.size_mm = {2 * ball.sphere.radius - *options.diameter_mm,
                     2 * ball.trimmed.radius - *options.diameter_mm};
   }
-  ball.worst = worst_points(all, from(ball.trimmed));
+  ball.worst = worst_points(all, from(ball.sphere));
   ball.coverage = sphere_coverage(
       all, {ball.trimmed.center, options.diameter_mm.value_or(2 * ball.trimmed.radius) / 2});
   ball.z = z_scores(ball.points, rig, [&](const Vec3& point, const std::optional<Vec3>& center) {
@@ -356,7 +369,7 @@ PlateFigures measure_plate(const ArtefactPoints& given, const Rig* rig,
   };
   plate.flatness_mm = {range(all, from(plate.plane)),
                        range(all, from(plate.trimmed), &trimmed->kept)};
-  plate.worst = worst_points(all, from(plate.trimmed));
+  plate.worst = worst_points(all, from(plate.plane));
   std::vector<Vec3> kept;
   for (const std::size_t i : trimmed->kept) kept.push_back(all[i]);
   plate.rectangle = smallest_rectangle(kept, plate.trimmed);

@@ -30,7 +30,7 @@ struct TwoFigures {
 /// One of the points that decide a figure.
 struct WorstPoint {
   std::size_t index = 0;  ///< in the position's points
-  double distance = 0;    ///< signed, from the fit to the points that remain; mm
+  double distance = 0;    ///< signed, from the fit to all points; mm
 };
 
 /// A direction from a ball's centre in which something else is: a stem, the bar.
@@ -60,7 +60,7 @@ struct BallFigures {
   Sphere trimmed;                     ///< the same of the points that remain
   TwoFigures form_mm;                 ///< PF
   std::optional<TwoFigures> size_mm;  ///< PS; with a calibrated diameter
-  std::vector<WorstPoint> worst;      ///< the first ten
+  std::vector<WorstPoint> worst;      ///< ten: greatest minus least distance is form_mm.all
   std::optional<ZScores> z;           ///< against the trimmed sphere
 };
 
@@ -77,11 +77,11 @@ struct PlateFigures {
   std::size_t removed = 0;
   double coverage = 0;  ///< share of the plate within 1 % of its diagonal of a point
   PlateRectangle rectangle;
-  PlaneSurface surface;    ///< in the plate's plane, also beyond the stated sides
-  Plane plane;             ///< least squares, all points
-  Plane trimmed;           ///< of the points that remain
-  TwoFigures flatness_mm;  ///< F
-  std::vector<WorstPoint> worst;
+  PlaneSurface surface;           ///< in the plate's plane, also beyond the stated sides
+  Plane plane;                    ///< least squares, all points
+  Plane trimmed;                  ///< of the points that remain
+  TwoFigures flatness_mm;         ///< F
+  std::vector<WorstPoint> worst;  ///< as of a ball
   std::optional<ZScores> z;
 };
 
@@ -107,12 +107,13 @@ struct PlateFigures {
 [[nodiscard]] std::vector<std::string> artefact_warnings(const PlateFigures& plate,
                                                          const ArtefactOptions& options);
 
-/// All positions of one artefact; one of the lists is filled.
+/// All positions of one artefact; one of the lists of figures is filled.
 struct ArtefactTest {
   ArtefactOptions options;
   std::vector<BallFigures> spheres;
   std::vector<BallBarFigures> ball_bars;
   std::vector<PlateFigures> plates;
+  std::vector<LackingPosition> lacking = {};  ///< which no figure is of
 };
 
 /// Every position and the worst of all. Keys: docs/figures.md.

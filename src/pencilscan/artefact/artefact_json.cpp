@@ -145,6 +145,8 @@ Json artefact_json(const ArtefactTest& test) {
   add_positions(json, test.spheres, options);
   add_positions(json, test.ball_bars, options);
   add_positions(json, test.plates, options);
+  for (const LackingPosition& position : test.lacking)
+    json["without_result"].push_back({{"folder", position.folder.string()}, {"why", position.why}});
   Worst worst;
   for (const Json& position : json["positions"]) worst.take(position);
   json["worst"] = worst.worst;

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "pencilscan/core/error.h"
+#include "pencilscan/io/frame_failure.h"
 #include "pencilscan/io/ply.h"
 
 namespace pencilscan {
@@ -64,21 +65,36 @@ ArtefactPoints ArtefactPoints::subset(const std::vector<std::size_t>& indices) c
   return part;
 }
 
-std::vector<fs::path> artefact_files(const fs::path& path, FrameSurface surface) {
-  const char* name = surface == FrameSurface::kMesh ? "mesh_measured.ply" : "points.ply";
+ArtefactFiles artefact_files(const fs::path& path, FrameSurface surface) {
+  const std::string name = surface == FrameSurface::kMesh ? "mesh_measured.ply" : "points.ply";
   if (!fs::exists(path)) throw InputError(path.string(), "", "", "no such file or folder");
-  if (!fs::is_directory(path)) return {path};
-  if (fs::exists(path / name)) return {path / name};
-  std::vector<fs::path> files;
-  for (const auto& entry : fs::directory_iterator(path)) {
-    if (fs::exists(entry.path() / name)) files.push_back(entry.path() / name);
+  if (!fs::is_directory(path)) return {{path}, {}};
+  ArtefactFiles found;
+  bool has_failure = false;
+  const auto visit = [&](const fs::path& folder) {
+    if (fs::exists(folder / name)) {
+      found.files.push_back(folder / name);
+    } else if (const auto failure = read_failure(folder)) {
+      found.lacking.push_back({folder, failure->reason});
+      has_failure = true;
+    } else if (fs::exists(folder / "input.json")) {
+      found.lacking.push_back({folder, "it holds no " + name});
+    } else {
+      return false;
+    }
+    return true;
+  };
+  if (!visit(path)) {
+    std::vector<fs::path> folders;
+    for (const auto& entry : fs::directory_iterator(path)) folders.push_back(entry.path());
+    std::sort(folders.begin(), folders.end());
+    for (const fs::path& folder : folders) visit(folder);
   }
-  if (files.empty()) {
+  if (found.files.empty() && !has_failure) {
     throw InputError(path.string(), "", "",
-                     "must be a PLY file, or hold " + std::string(name) + " or frames with it");
+                     "must be a PLY file, or hold " + name + " or frames with it");
   }
-  std::sort(files.begin(), files.end());
-  return files;
+  return found;
 }
 
 ArtefactPoints read_artefact_points(const fs::path& path) {

@@ -37,10 +37,22 @@ struct ArtefactPoints {
 /// Which file of a frame's results to measure.
 enum class FrameSurface { kPoints, kMesh };  ///< points.ply, mesh_measured.ply
 
-/// The files that an argument names: a PLY file; the results of a frame; or an output folder, one
-/// position per frame. InputError when it holds none.
-[[nodiscard]] std::vector<std::filesystem::path> artefact_files(const std::filesystem::path& path,
-                                                                FrameSurface surface);
+/// A position that was to be measured and has no result: a frame that failed.
+struct LackingPosition {
+  std::filesystem::path folder;
+  std::string why;
+};
+
+/// The positions that an argument names.
+struct ArtefactFiles {
+  std::vector<std::filesystem::path> files;
+  std::vector<LackingPosition> lacking;
+};
+
+/// A PLY file; the results of a frame; or an output folder, one position per frame. A frame's
+/// folder with failure.json, or with input.json and no result, is a position that lacks. InputError
+/// where there is neither a result nor a failure.
+[[nodiscard]] ArtefactFiles artefact_files(const std::filesystem::path& path, FrameSurface surface);
 
 /// Vertices of any PLY file, of points or a mesh. InputError when it is none or has no vertex with
 /// a finite position.

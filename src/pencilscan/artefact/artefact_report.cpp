@@ -51,15 +51,18 @@ std::string row(const std::vector<std::string>& cells, const char* tag = "td") {
 }
 
 constexpr const char* kStyle = R"(<style>
-:root{color-scheme:light dark;--ink:#1b2530;--paper:#fff;--soft:#f3f6f8;--rule:#d5dde3}
-@media(prefers-color-scheme:dark){:root{--ink:#dce4ea;--paper:#12181e;--soft:#1b242c;--rule:#36424c}}
+:root{color-scheme:light dark;--ink:#1b2530;--paper:#fff;--soft:#f3f6f8;--rule:#d5dde3;--warn:#9a5b00;--warn-ground:#fff4e0}
+@media(prefers-color-scheme:dark){:root{--ink:#dce4ea;--paper:#12181e;--soft:#1b242c;--rule:#36424c;--warn:#f2b34c;--warn-ground:#2b2314}}
 body{font:15px/1.45 system-ui,sans-serif;max-width:70em;margin:2em auto;padding:0 1em;color:var(--ink);background:var(--paper)}
-h1{margin-bottom:.2em}h2{margin-top:2em}.wide{overflow-x:auto}
+h1{margin-bottom:.2em}h2{margin-top:2em;overflow-wrap:anywhere}.wide{overflow-x:auto;margin:1em 0}
 table{border-collapse:collapse;font-size:13px;font-variant-numeric:tabular-nums}
 td,th{border-bottom:1px solid var(--rule);padding:.25em .6em;text-align:right}
-td:first-child,th:first-child{text-align:left}tr.worst td{font-weight:600}
+td:first-child,th:first-child{text-align:left;padding-left:0;min-width:7em;overflow-wrap:anywhere}tr.worst td{font-weight:600}
 .plots{display:flex;flex-wrap:wrap;gap:1.5em}figure{margin:0}figcaption{font-size:13px;max-width:30em}
-dt{font-weight:600}dd{margin:0 0 .5em 1em}svg{background:var(--soft)}svg text{fill:var(--ink)}
+.warnings{list-style:none;margin:1em 0;padding:0;display:grid;gap:.5em}
+.warnings li{border-left:4px solid var(--warn);border-radius:6px;background:var(--warn-ground);padding:.5em .8em;overflow-wrap:anywhere}
+.warnings p{margin:.15em 0 0}
+dt{font-weight:600}dd{margin:0 0 .5em 1em}svg{background:var(--soft);max-width:100%;height:auto}svg text{fill:var(--ink)}
 </style>)";
 
 /// Blue inwards, red outwards, pale in between.
@@ -81,6 +84,7 @@ std::string map_svg(const ResidualMap& map, double half_range, const std::string
   constexpr int kCell = 5;
   const int width = kCell * map.columns, height = kCell * map.rows;
   std::string svg = "<figure><svg width='" + std::to_string(width) + "' height='" +
+                    std::to_string(height) + "' viewBox='0 0 " + std::to_string(width) + " " +
                     std::to_string(height) + "' role='img' shape-rendering='crispEdges'>";
   for (int y = 0; y < map.rows; ++y) {
     for (int x = 0; x < map.columns; ++x) {
@@ -98,7 +102,7 @@ std::string histogram_svg(const Histogram& histogram) {
   std::size_t most = 1;
   for (const std::size_t count : histogram.counts) most = std::max(most, count);
   const double step = kWidth / static_cast<double>(histogram.counts.size());
-  std::string svg = "<figure><svg width='320' height='180' role='img'>";
+  std::string svg = "<figure><svg width='320' height='180' viewBox='0 0 320 180' role='img'>";
   for (std::size_t i = 0; i < histogram.counts.size(); ++i) {
     const double h = kHeight * static_cast<double>(histogram.counts[i]) / static_cast<double>(most);
     svg += "<rect x='" + number(static_cast<double>(i) * step, 1) + "' y='" +
@@ -226,6 +230,11 @@ std::string positions_table(const ArtefactTest& test) {
   return html + "</table></div>";
 }
 
+/// ", and 1 without a result".
+std::string with_lacking(std::size_t count) {
+  return count == 0 ? "" : ", and " + std::to_string(count) + " without a result";
+}
+
 /// "Worst of all positions: PF 0.1234, PF trimmed 0.0456, ..."
 std::string worst_line(const nlohmann::ordered_json& json) {
   std::string html = "<p><strong>Worst of all positions:</strong> ";
@@ -242,16 +251,25 @@ std::string worst_line(const nlohmann::ordered_json& json) {
   return html + ".</p>";
 }
 
-std::string warning_lines(const nlohmann::ordered_json& json) {
+/// One box: what it is about, and a sentence.
+std::string warning_box(const std::string& about, const std::string& text) {
+  return "<li><strong>" + escaped(about) + "</strong><p>" + escaped(text) + ".</p></li>\n";
+}
+
+std::string warning_boxes(const nlohmann::ordered_json& json,
+                          const std::vector<LackingPosition>& lacking) {
   std::string html;
+  for (const LackingPosition& position : lacking) {
+    html += warning_box("No result: " + position.folder.string(),
+                        position.why + "; no figure is of this position");
+  }
   for (const auto& position : json["positions"]) {
     if (!position.contains("warnings")) continue;
     for (const auto& warning : position["warnings"]) {
-      html += "<p><strong>Warning:</strong> " + escaped(position["file"].get<std::string>()) +
-              ": " + escaped(warning.get<std::string>()) + ".</p>";
+      html += warning_box(position["file"].get<std::string>(), warning.get<std::string>());
     }
   }
-  return html;
+  return html.empty() ? html : "<ul class='warnings'>" + html + "</ul>";
 }
 
 constexpr const char* kLegend = R"(<dl>
@@ -281,11 +299,11 @@ std::string artefact_html(const ArtefactTest& test, const std::string& program) 
   const ArtefactOptions& o = test.options;
   if (o.diameter_mm) html += "Calibrated diameter " + number(*o.diameter_mm, 4) + " mm. ";
   if (o.length_mm) html += "Calibrated distance " + number(*o.length_mm, 4) + " mm. ";
-  html += std::to_string(positions) +
-          (positions == 1 ? " position." : " positions; the worst counts.") +
-          " All figures in mm.</p>" + positions_table(test);
+  html += std::to_string(positions) + (positions == 1 ? " position" : " positions") +
+          with_lacking(test.lacking.size()) + (positions == 1 ? "." : "; the worst counts.") +
+          " All figures in mm.</p>";
   const nlohmann::ordered_json json = artefact_json(test);
-  html += worst_line(json) + warning_lines(json) + kLegend;
+  html += warning_boxes(json, test.lacking) + positions_table(test) + worst_line(json) + kLegend;
   for (const BallFigures& ball : test.spheres)
     html += "<h2>" + escaped(ball.points.source) + "</h2>" + ball_part(ball);
   for (const BallBarFigures& bar : test.ball_bars) {

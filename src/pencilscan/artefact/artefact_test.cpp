@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <numbers>
@@ -40,6 +41,9 @@ ArtefactPoints as_points(std::vector<Vec3> points) {
   return result;
 }
 
+std::vector<Vec3> plate_points(double thickness, const RigidTransform& world_from_plate,
+                               std::uint64_t seed);
+
 constexpr int kMany = 20'000;  // dense enough for whole coverage: 1 % of the diameter apart
 
 TEST(ArtefactSphere, FormIsTheRangeOfKnownDeviations) {
@@ -70,6 +74,42 @@ TEST(ArtefactSphere, OnePointDecidesTheFormUntilItIsRemoved) {
   EXPECT_EQ(ball.worst.front().index, 777U);
   EXPECT_NEAR(ball.worst.front().distance, 100, 0.1);
   EXPECT_FALSE(ball.size_mm);
+}
+
+/// Greatest minus least distance of the points that a table of worst points shows.
+double range_of(const std::vector<WorstPoint>& worst) {
+  const auto [least, greatest] = std::minmax_element(
+      worst.begin(), worst.end(),
+      [](const WorstPoint& a, const WorstPoint& b) { return a.distance < b.distance; });
+  return greatest->distance - least->distance;
+}
+
+TEST(ArtefactFigures, AreTheRangeOfTheWorstPoints) {
+  Random random(18);
+  std::vector<Vec3> ball;
+  // Far points on one side only, more than the table holds, which draw the sphere to them.
+  add_ball(ball, {{0, 0, 700}, 20}, 2000,
+           [&](int i) { return i % 100 == 0 ? 3 : random.uniform(-0.01, 0.01); });
+  const BallFigures sphere = measure_sphere(as_points(ball), nullptr, {});
+  EXPECT_EQ(sphere.worst.size(), 10U);
+  EXPECT_DOUBLE_EQ(range_of(sphere.worst), sphere.form_mm.all);
+  std::vector<Vec3> plate = plate_points(0, RigidTransform(), 18);
+  for (int i = 0; i < 20; ++i) plate.push_back({5.0 * i, 50, 7});
+  const PlateFigures plane = measure_plate(as_points(plate), nullptr, {});
+  EXPECT_DOUBLE_EQ(range_of(plane.worst), plane.flatness_mm.all);
+}
+
+TEST(ArtefactSphere, LittleCoverageIsTold) {
+  std::vector<Vec3> points;
+  add_ball(points, {{0, 0, 0}, 10}, 2 * kMany, [](int) { return 0.0; });
+  const auto warnings_above = [&](double z) {
+    std::vector<Vec3> cap;
+    for (const Vec3& point : points)
+      if (point.z() > z) cap.push_back(point);
+    return artefact_warnings(measure_sphere(as_points(cap), nullptr, {}), {});
+  };
+  EXPECT_THAT(warnings_above(4), ::testing::IsEmpty());  // 30 %
+  EXPECT_THAT(warnings_above(8), ::testing::ElementsAre(HasSubstr("of the ball has points")));
 }
 
 TEST(ArtefactSphere, CoverageIsTheShareOfTheBallThatHasPoints) {
@@ -433,12 +473,48 @@ TEST(ArtefactFiles, AnOutputFolderIsOnePositionPerFrame) {
   const TemporaryFolder folder("artefact_folder");
   for (const char* frame : {"000001", "000000"})
     write_points(folder.path() / frame / "points.ply", {MeasuredPoint{}});
-  const auto files = artefact_files(folder.path(), FrameSurface::kPoints);
+  const auto files = artefact_files(folder.path(), FrameSurface::kPoints).files;
   ASSERT_EQ(files.size(), 2U);
   EXPECT_THAT(files[0].string(), HasSubstr("000000"));
-  EXPECT_EQ(artefact_files(files[0].parent_path(), FrameSurface::kPoints).size(), 1U);
+  EXPECT_EQ(artefact_files(files[0].parent_path(), FrameSurface::kPoints).files.size(), 1U);
   EXPECT_THROW((void)artefact_files(folder.path(), FrameSurface::kMesh), InputError);
   EXPECT_THROW((void)artefact_files(folder.path() / "nothing", FrameSurface::kPoints), InputError);
+}
+
+TEST(ArtefactFiles, AFrameWithoutAResultIsAPositionThatLacks) {
+  const TemporaryFolder folder("artefact_lacking");
+  const auto& out = folder.path();
+  write_points(out / "000000" / "points.ply", {MeasuredPoint{}});
+  write_json(out / "000001" / "failure.json", {{"reason", "cam1: black"}});
+  write_json(out / "000002" / "input.json", {{"settings", "0"}});
+  write_text(out / "000003" / "failure.json", "{");
+  write_text(out / "notes" / "text.md", "");
+  const ArtefactFiles found = artefact_files(out, FrameSurface::kPoints);
+  EXPECT_EQ(found.files.size(), 1U);
+  ASSERT_EQ(found.lacking.size(), 3U);
+  EXPECT_EQ(found.lacking[0].folder, out / "000001");
+  EXPECT_EQ(found.lacking[0].why, "cam1: black");
+  EXPECT_EQ(found.lacking[1].why, "it holds no points.ply");
+  EXPECT_THAT(found.lacking[2].why, HasSubstr("does not say why"));
+  EXPECT_EQ(artefact_files(out / "000001", FrameSurface::kPoints).lacking.size(), 1U);
+  EXPECT_THROW((void)artefact_files(out / "000002", FrameSurface::kPoints), InputError);
+}
+
+TEST(ArtefactReport, NamesPositionsWithoutAResult) {
+  ArtefactTest test;
+  std::vector<Vec3> points;
+  add_ball(points, {{0, 0, 0}, 20}, 2000, [](int i) { return i % 2 == 0 ? 0.1 : -0.1; });
+  test.spheres.push_back(measure_sphere(as_points(points), nullptr, test.options));
+  EXPECT_FALSE(artefact_json(test).contains("without_result"));
+  test.lacking.push_back({"out/000002", "<black>"});
+  const nlohmann::ordered_json json = artefact_json(test);
+  EXPECT_EQ(json["positions"].size(), 1U);
+  EXPECT_EQ(json["without_result"][0]["folder"], "out/000002");
+  EXPECT_EQ(json["without_result"][0]["why"], "<black>");
+  const std::string html = artefact_html(test, "program");
+  for (const char* text :
+       {"1 position, and 1 without a result.", "No result: out/000002", "&lt;black&gt;"})
+    EXPECT_THAT(html, HasSubstr(text));
 }
 
 TEST(ArtefactReport, TheWorstPositionCounts) {

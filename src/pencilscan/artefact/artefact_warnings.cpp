@@ -17,6 +17,19 @@ std::vector<std::string> unit_warnings(const ArtefactPoints& points) {
       "from the stated ones says nothing"};
 }
 
+/// Of a ball less than what one camera sees of it at up to 60 degrees from head on, which is
+/// (1 - cos 60) / 2 of the whole.
+constexpr double kLittleCoverage = 0.25;
+
+void warn_of_coverage(double coverage, const std::string& what,
+                      std::vector<std::string>& warnings) {
+  if (coverage >= kLittleCoverage) return;
+  warnings.push_back("only " + formatted(100 * coverage, "%.3g") + " % of " + what +
+                     " has points near it, and less than " +
+                     formatted(100 * kLittleCoverage, "%.3g") +
+                     " % says little of the whole: measure it from more sides");
+}
+
 bool has_stated_size(const BallFigures& ball, double diameter_mm) {
   return std::abs(2 * ball.trimmed.radius - diameter_mm) <= kSizeTolerance * diameter_mm;
 }
@@ -48,7 +61,9 @@ std::string reason_of(const BallBarFigures& bar, const ArtefactOptions& options,
 }  // namespace
 
 std::vector<std::string> artefact_warnings(const BallFigures& ball, const ArtefactOptions&) {
-  return unit_warnings(ball.points);
+  std::vector<std::string> warnings = unit_warnings(ball.points);
+  warn_of_coverage(ball.coverage, "the ball", warnings);
+  return warnings;
 }
 
 std::vector<std::string> artefact_warnings(const BallBarFigures& bar,
@@ -58,6 +73,8 @@ std::vector<std::string> artefact_warnings(const BallBarFigures& bar,
     warnings.push_back(std::to_string(bar.between) +
                        " points lie between the balls; if that is the bar, give --bar-diameter");
   }
+  for (std::size_t b = 0; b < bar.balls.size(); ++b)
+    warn_of_coverage(bar.balls[b].coverage, "ball " + std::to_string(b + 1), warnings);
   if (!options.length_mm || !bar.balls.front().points.unit_known) return warnings;
   const double factor = bar.distance_mm.trimmed / *options.length_mm;
   if (std::abs(factor - 1) <= kSizeTolerance) return warnings;
@@ -72,15 +89,19 @@ std::vector<std::string> artefact_warnings(const PlateFigures& plate,
                                            const ArtefactOptions& options) {
   // A tenth of both sides, which no scale of a scanner is off by, is a fifth of the area.
   constexpr double kNoticed = (1 + kSizeTolerance) * (1 + kSizeTolerance);
+  std::vector<std::string> warnings = unit_warnings(plate.points);
+  warn_of_coverage(plate.coverage, "the plate", warnings);
   if (!options.plate_length_mm || !options.plate_width_mm || !plate.points.unit_known)
-    return unit_warnings(plate.points);
+    return warnings;
   const double stated = *options.plate_length_mm * *options.plate_width_mm;
-  if (plate.surface.area_mm2 <= kNoticed * stated) return {};
-  return {"the plate's surface is " + formatted(plate.surface.length_mm, "%.4g") + " x " +
-          formatted(plate.surface.width_mm, "%.4g") + " mm large, and --length and --width say " +
-          formatted(std::max(*options.plate_length_mm, *options.plate_width_mm), "%.6g") + " x " +
-          formatted(std::min(*options.plate_length_mm, *options.plate_width_mm), "%.6g") +
-          " mm: are they this plate's?"};
+  if (plate.surface.area_mm2 <= kNoticed * stated) return warnings;
+  warnings.push_back(
+      "the plate's surface is " + formatted(plate.surface.length_mm, "%.4g") + " x " +
+      formatted(plate.surface.width_mm, "%.4g") + " mm large, and --length and --width say " +
+      formatted(std::max(*options.plate_length_mm, *options.plate_width_mm), "%.6g") + " x " +
+      formatted(std::min(*options.plate_length_mm, *options.plate_width_mm), "%.6g") +
+      " mm: are they this plate's?");
+  return warnings;
 }
 
 }  // namespace pencilscan

@@ -124,6 +124,21 @@ void print_worst(const nlohmann::ordered_json& worst) {
               worst["points"].get<std::size_t>());
 }
 
+void print_lacking(const std::vector<LackingPosition>& lacking) {
+  if (lacking.empty()) return;
+  std::printf("\nwithout a result, and in none of these figures:\n");
+  for (const LackingPosition& position : lacking)
+    std::printf("  %s: %s\n", position.folder.c_str(), position.why.c_str());
+}
+
+/// Of all positions that were asked for. StageError where not one has a result.
+void require_a_result(const std::vector<fs::path>& files,
+                      const std::vector<LackingPosition>& lacking) {
+  if (!files.empty()) return;
+  throw StageError("no position has a result; " + lacking.front().folder.string() + ": " +
+                   lacking.front().why);
+}
+
 constexpr const char* kLegend = R"(
 All in mm, after the manner of VDI/VDE 2634 part 3 and ISO 10360-13.
   PF        form: greatest minus least distance of the points to their least-squares sphere
@@ -157,16 +172,30 @@ void run_artefact(ArtefactCommand command) {
     refuse_existing("--report", command.report_path, command.overwrite);
   const FrameSurface surface =
       command.surface == "mesh" ? FrameSurface::kMesh : FrameSurface::kPoints;
-  for (const std::string& argument : command.files)
-    for (const fs::path& file : artefact_files(argument, surface)) measure(command, file, test);
+  std::vector<fs::path> files;
+  for (const std::string& argument : command.files) {
+    const ArtefactFiles found = artefact_files(argument, surface);
+    files.insert(files.end(), found.files.begin(), found.files.end());
+    test.lacking.insert(test.lacking.end(), found.lacking.begin(), found.lacking.end());
+  }
+  require_a_result(files, test.lacking);
+  for (const LackingPosition& position : test.lacking)
+    warn_of(position.folder.string() + " has no result: " + position.why);
+  for (const fs::path& file : files) measure(command, file, test);
   const nlohmann::ordered_json json = artefact_json(test);
   print_table(test);
   print_worst(json["worst"]);
+  print_lacking(test.lacking);
   std::printf("%s", kLegend);
   std::fflush(stdout);
   if (!command.common.json_path.empty()) write_json(command.common.json_path, json);
   if (!command.report_path.empty())
     write_text(command.report_path, artefact_html(test, "pencilscan " PENCILSCAN_VERSION));
+  if (!test.lacking.empty()) {
+    throw StageError(std::to_string(test.lacking.size()) + " of " +
+                     std::to_string(files.size() + test.lacking.size()) +
+                     " positions have no result: the figures are those of the others");
+  }
 }
 
 CLI::Option* add_positive(CLI::App& command, const char* flag, std::optional<double>& value,
