@@ -6,7 +6,7 @@
 #include "pencilscan/core/error.h"
 #include "pencilscan/io/file.h"
 #include "pencilscan/page/experiment_pictures.h"
-#include "pencilscan/page/fault.h"
+#include "pencilscan/page/flaw.h"
 #include "pencilscan/page/result_files.h"
 #include "pencilscan/page/result_folder.h"
 #include "pencilscan/page/result_reader.h"
@@ -53,7 +53,7 @@ ordered_json table_json(const std::string& file, const TextTable& table) {
           {"total", table.rows.size()}};
 }
 
-void add_tables(const ExperimentFolder& folder, const FaultNote& note, ordered_json& page) {
+void add_tables(const ExperimentFolder& folder, const FlawNote& note, ordered_json& page) {
   page["tables"] = ordered_json::array();
   bool markdown = false;
   bool values = false;
@@ -64,22 +64,22 @@ void add_tables(const ExperimentFolder& folder, const FaultNote& note, ordered_j
       for (const TextTable& table : read_tables(file)) {
         page["tables"].push_back(table_json(name, table));
         if (table.rows.empty())
-          note(name, "the table has no rows: was the script stopped?", Fault::kNote);
+          note(name, "the table has no rows: was the script stopped?", Flaw::kNote);
       }
     } catch (const std::exception& error) {
-      note(name, std::string("unreadable: ") + error.what(), Fault::kUnreadable);
+      note(name, std::string("unreadable: ") + error.what(), Flaw::kUnreadable);
     }
   }
   if (!markdown) {
     note("table.md",
          "not in the folder: the script writes it at its end (--resume goes on where it stopped)",
-         Fault::kMissing);
+         Flaw::kMissing);
   }
-  if (!values) note("results.csv", "not in the folder: no values of single runs", Fault::kMissing);
+  if (!values) note("results.csv", "not in the folder: no values of single runs", Flaw::kMissing);
 }
 
 /// Title, words and setting, where experiment.json states them.
-void add_about(const ExperimentFolder& folder, const FaultNote& note, ordered_json& page) {
+void add_about(const ExperimentFolder& folder, const FlawNote& note, ordered_json& page) {
   const fs::path file = folder.root / "experiment.json";
   if (!is_file(file)) return;
   try {
@@ -89,11 +89,11 @@ void add_about(const ExperimentFolder& folder, const FaultNote& note, ordered_js
         page[key] = about[key];
     }
   } catch (const std::exception& error) {
-    note("experiment.json", std::string("unreadable: ") + error.what(), Fault::kUnreadable);
+    note("experiment.json", std::string("unreadable: ") + error.what(), Flaw::kUnreadable);
   }
 }
 
-void add_commands(const ExperimentFolder& folder, const FaultNote& note, ordered_json& page) {
+void add_commands(const ExperimentFolder& folder, const FlawNote& note, ordered_json& page) {
   const fs::path file = folder.root / "commands.log";
   page["commands"] = ordered_json::array();
   if (!is_file(file)) return;
@@ -106,7 +106,7 @@ void add_commands(const ExperimentFolder& folder, const FaultNote& note, ordered
     }
     page["commands_total"] = count;
   } catch (const std::exception& error) {
-    note("commands.log", std::string("unreadable: ") + error.what(), Fault::kUnreadable);
+    note("commands.log", std::string("unreadable: ") + error.what(), Flaw::kUnreadable);
   }
 }
 
@@ -161,7 +161,7 @@ ExperimentPage read_experiment(const ExperimentFolder& folder, const ExperimentD
   ExperimentPage page;
   page.json = {{"folder", folder_name(folder.root)}};
   ordered_json missing = ordered_json::array();
-  const FaultNote note = [&](const std::string& what, const std::string& why, Fault kind) {
+  const FlawNote note = [&](const std::string& what, const std::string& why, Flaw kind) {
     std::string reason = why;
     const std::string place = folder.root.string() + "/";  // the page need not say where it lay
     const std::size_t at = reason.find(place);

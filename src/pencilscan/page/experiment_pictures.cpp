@@ -129,7 +129,7 @@ class Album {
   Album(const ExperimentFolder& folder, const ExperimentDetail& detail, ExperimentPage& page)
       : folder_(folder), detail_(detail), page_(page) {}
 
-  void add(const std::vector<const ExperimentPicture*>& pictures, const FaultNote& note) {
+  void add(const std::vector<const ExperimentPicture*>& pictures, const FlawNote& note) {
     std::vector<Shown> shown(pictures.size());
     parallel_for(pictures.size(),
                  [&](std::size_t i) { shown[i] = read_shown(*pictures[i], detail_); });
@@ -140,16 +140,16 @@ class Album {
   }
 
  private:
-  void add_one(const ExperimentPicture& picture, Shown& shown, const FaultNote& note) {
+  void add_one(const ExperimentPicture& picture, Shown& shown, const FlawNote& note) {
     const std::string name = fs::relative(picture.file, folder_.root).generic_string();
-    if (!shown.broken.empty()) return note(name, shown.broken, Fault::kUnreadable);
+    if (!shown.broken.empty()) return note(name, shown.broken, Flaw::kUnreadable);
     const std::size_t bytes = embedded(shown.bytes.size());
     if (bytes > room()) {
       const auto megabytes = static_cast<double>(bytes) / 1e6;
       std::array<char, 80> text{};
       std::snprintf(text.data(), text.size(), "left out: its %.1f MB do not fit (--max-size)",
                     megabytes);
-      return note(name, text.data(), Fault::kNote);
+      return note(name, text.data(), Flaw::kNote);
     }
     used_ += bytes;
     nlohmann::ordered_json entry = {{"file", name},
@@ -215,7 +215,7 @@ std::optional<Kind> picture_kind(const fs::path& file) {
 }
 
 void add_pictures(const ExperimentFolder& folder, const ExperimentDetail& detail,
-                  const FaultNote& note, ExperimentPage& page) {
+                  const FlawNote& note, ExperimentPage& page) {
   page.json["pictures"] = nlohmann::ordered_json::array();
   std::vector<const ExperimentPicture*> own;
   std::vector<const ExperimentPicture*> gallery;
@@ -231,7 +231,7 @@ void add_pictures(const ExperimentFolder& folder, const ExperimentDetail& detail
          std::to_string(gallery.size() - shown.size()) + " of its " +
              std::to_string(gallery.size()) +
              " pictures are left out: they do not fit (--max-size)",
-         Fault::kNote);
+         Flaw::kNote);
   }
 }
 

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "pencilscan/page/experiment.h"
-#include "pencilscan/page/fault.h"
+#include "pencilscan/page/flaw.h"
 
 namespace pencilscan {
 
@@ -13,7 +13,7 @@ namespace pencilscan {
 /// of folders of pictures, as many as fit are taken, evenly picked (001_a.png and 001_b.png
 /// together). note: is told what cannot be shown, and why.
 void add_pictures(const ExperimentFolder& folder, const ExperimentDetail& detail,
-                  const FaultNote& note, ExperimentPage& page);
+                  const FlawNote& note, ExperimentPage& page);
 
 /// What kind of picture a file is, by its ending and first bytes; nothing for other files.
 [[nodiscard]] std::optional<ExperimentPicture::Kind> picture_kind(

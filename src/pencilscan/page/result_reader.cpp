@@ -52,12 +52,12 @@ ResultReader::ResultReader(ResultEntry entry, std::shared_ptr<const Rig> rig, co
       detail_(detail),
       files_(std::move(entry), rig_.get(), detail.max_faces,
              [this](const std::string& file, const std::string& why) {
-               note(file, why, Fault::kUnreadable);
+               note(file, why, Flaw::kUnreadable);
              }) {
   note_missing_files();
 }
 
-void ResultReader::note(const std::string& what, const std::string& why, Fault kind) {
+void ResultReader::note(const std::string& what, const std::string& why, Flaw kind) {
   const bool known = std::any_of(missing_.begin(), missing_.end(),
                                  [&](const Missing& m) { return m.what == what; });
   if (!known) missing_.push_back({what, why, kind});
@@ -74,11 +74,11 @@ void ResultReader::note_missing_files() {
   if (rig_ == nullptr)
     note("the devices",
          "no readable devices.json or rig.json beside the results; name the rig with --rig",
-         Fault::kMissing);
+         Flaw::kMissing);
   if (is_scan()) return;
   const auto need = [&](const char* file, const char* consequence) {
     if (!is_file(files_.entry().folder / file))
-      note(file, std::string("not in the folder: ") + consequence, Fault::kMissing);
+      note(file, std::string("not in the folder: ") + consequence, Flaw::kMissing);
   };
   need("report.json", "no counts and warnings");
   need("points.ply", "no measured points");
@@ -100,7 +100,7 @@ void ResultReader::note_missing_files() {
     note("pictures",
          "no picture of " + without +
              ": reconstructed with --no-pictures? --frames names the captured images",
-         Fault::kMissing);
+         Flaw::kMissing);
   }
 }
 
@@ -145,7 +145,7 @@ std::optional<std::string> ResultReader::part(const std::string& name) {
   try {
     return make_part(name);
   } catch (const std::exception& error) {
-    note(name, error.what(), Fault::kUnreadable);
+    note(name, error.what(), Flaw::kUnreadable);
     return std::nullopt;
   }
 }
@@ -237,7 +237,7 @@ bool ResultReader::is_truth(const RayScene& truth) {
   const auto warning = truth_warning(truth, positions);
   if (warning) {
     note(files_.entry().truth.string(), *warning + "; figures against it are left out",
-         Fault::kDoubtful);
+         Flaw::kDoubtful);
   }
   return !warning;
 }
@@ -254,7 +254,7 @@ ordered_json ResultReader::details() {
   const RayScene* truth = files_.truth();
   const bool has_truth = truth != nullptr && is_truth(*truth);
   for (const Missing& m : missing_) {  // `view` makes its index before it knows
-    if (m.kind == Fault::kDoubtful)
+    if (m.kind == Flaw::kDoubtful)
       result["doubts"].push_back({{"what", m.what}, {"why", m.why}, {"kind", to_string(m.kind)}});
   }
   if (!detail_.shape_only) result["histograms"] = histograms(has_truth);

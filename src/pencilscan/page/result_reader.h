@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "pencilscan/page/fault.h"
+#include "pencilscan/page/flaw.h"
 #include "pencilscan/page/result_files.h"
 #include "pencilscan/page/result_folder.h"
 #include "pencilscan/rig/rig.h"
@@ -47,7 +47,7 @@ class ResultReader {
   struct Missing {
     std::string what;
     std::string why;
-    Fault kind = Fault::kMissing;
+    Flaw kind = Flaw::kMissing;
   };
   [[nodiscard]] std::vector<Missing> missing() const;
   /// The same for the page: what, why, kind.
@@ -60,7 +60,7 @@ class ResultReader {
   [[nodiscard]] nlohmann::ordered_json histograms(bool has_truth);
   /// Notes a true mesh that can hardly be that of the result; false then.
   [[nodiscard]] bool is_truth(const RayScene& truth);
-  void note(const std::string& what, const std::string& why, Fault kind);
+  void note(const std::string& what, const std::string& why, Flaw kind);
   void note_missing_files();
 
   std::shared_ptr<const Rig> rig_;

@@ -33,7 +33,7 @@ std::size_t unnamed_points(const GridGraph& graph, const Labeling& labeling, std
 
 }  // namespace
 
-NamingDoubt::NamingDoubt(const Rig& rig) : rig_(rig), devices_(device_count(rig)), colors_(rig) {}
+NamingDoubt::NamingDoubt(const Rig& rig) : rig_(&rig), devices_(device_count(rig)), colors_(rig) {}
 
 void NamingDoubt::add(const std::vector<ColorFamily>& families, std::span<const GridGraph> graphs,
                       const Labeling& labeling) {
@@ -43,12 +43,12 @@ void NamingDoubt::add(const std::vector<ColorFamily>& families, std::span<const 
     devices_[c].add(telling_points(labeling, c));
     for (const LabeledRun& run : labeling.runs[c]) {
       const auto p = static_cast<std::size_t>(run.label.pattern.projector);
-      devices_[rig_.cameras.size() + p].named += static_cast<std::size_t>(run.end - run.begin);
+      devices_[rig_->cameras.size() + p].named += static_cast<std::size_t>(run.end - run.begin);
     }
     for (std::size_t f = 0; f < families.size(); ++f) {
       const std::size_t unnamed = unnamed_points(graph, labeling, f);
       for (const std::size_t p : projectors_of(families[f]))
-        devices_[rig_.cameras.size() + p].unnamed += unnamed;
+        devices_[rig_->cameras.size() + p].unnamed += unnamed;
     }
   }
 }
@@ -57,7 +57,7 @@ std::string NamingDoubt::denied() const {
   std::string names;
   for (const ShownColors& shown : colors_.shown()) {
     if (shown.deny())
-      add_name(names, rig_.projectors[static_cast<std::size_t>(shown.pattern.projector)].name);
+      add_name(names, rig_->projectors[static_cast<std::size_t>(shown.pattern.projector)].name);
   }
   return names;
 }
@@ -65,10 +65,10 @@ std::string NamingDoubt::denied() const {
 std::string NamingDoubt::unnamed() const {
   // What has no name in a projector's colours may be of any projector that has them.
   std::vector<std::size_t> sharing(devices_.size(), 1);
-  for (const ColorFamily& family : color_families(rig_)) {
+  for (const ColorFamily& family : color_families(*rig_)) {
     const std::vector<std::size_t> projectors = projectors_of(family);
     for (const std::size_t p : projectors) {
-      std::size_t& most = sharing[rig_.cameras.size() + p];
+      std::size_t& most = sharing[rig_->cameras.size() + p];
       most = std::max(most, projectors.size());
     }
   }
@@ -79,8 +79,8 @@ std::string NamingDoubt::unnamed() const {
       continue;
     add_name(text,
              "only " + formatted(100 * points.named_share(), "%.0f") + " % of the curves " +
-                 (d < rig_.cameras.size() ? "of camera " : "in the colours of projector ") +
-                 device_at(rig_, d).name + " have a name",
+                 (d < rig_->cameras.size() ? "of camera " : "in the colours of projector ") +
+                 device_at(*rig_, d).name + " have a name",
              "; ");
   }
   return text;

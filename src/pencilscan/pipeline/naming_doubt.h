@@ -26,9 +26,11 @@ class NamingDoubt {
   [[nodiscard]] std::string unnamed() const;
   /// Both.
   [[nodiscard]] std::string text() const;
+  /// Of a camera, or in the colours of a projector.
+  [[nodiscard]] const TellingPoints& telling(std::size_t device) const { return devices_[device]; }
 
  private:
-  const Rig& rig_;
+  const Rig* rig_;
   std::vector<TellingPoints> devices_;  ///< cameras, then projectors: in the colours of each
   ShownColorCount colors_;
 };

@@ -21,6 +21,7 @@
 #include "pencilscan/evaluation/truth_scene.h"
 #include "pencilscan/io/file.h"
 #include "pencilscan/pipeline/pipeline_fixture.h"
+#include "pencilscan/pipeline/rig_fit.h"
 #include "pencilscan/pipeline/rig_refinement.h"
 #include "pencilscan/pipeline/sequence.h"
 #include "pencilscan/rig/device_list.h"
@@ -325,6 +326,34 @@ TEST_F(PipelineTest, RefinementFindsTheTolerancesThatNameMost) {
   ASSERT_TRUE(found.report.refined) << found.report.reason;
   const auto points = triangulate(found.rig, seen.graphs, found.labelings.front());
   EXPECT_LT(label_figures(truth, points, judge_points(truth, points)).wrong.value(), 0.002);
+}
+
+/// The rig with a projector turned so that its lines lie `lines` further.
+Rig turned(Rig rig, std::size_t p, double lines) {
+  Projector& projector = rig.projectors[p];
+  const LinePattern& pattern = projector.patterns.front();
+  const double way_px = lines * pattern.pitch_px;
+  PoseCorrection turn;
+  turn.rotation_px = pattern.axis == Axis::kColumn ? Vec3(0, way_px, 0) : Vec3(-way_px, 0, 0);
+  projector.device_from_world = corrected_pose(projector, turn);
+  return rig;
+}
+
+TEST_F(PipelineTest, AProjectorThatIsWholeLinesOffIsPutBackByItsColors) {
+  const PointResult seen = detect_frame(*rig_, *frame_);
+  const FrameCurves curves{seen.families, seen.graphs};
+  const TruthScene truth(ball(), *rig_);
+  for (const double lines : {1.8, 2.7}) {
+    const Rig wrong = turned(*rig_, 1, lines);
+    const RigRefinement found = refine_rig_on_frames(wrong, {&curves, 1});
+    ASSERT_TRUE(found.report.refined) << lines << ": " << found.report.reason;
+    const auto points = triangulate(found.rig, seen.graphs, found.labelings.front());
+    EXPECT_GT(points.size(), 1000U);
+    EXPECT_LT(label_figures(truth, points, judge_points(truth, points)).wrong.value(), 0.01)
+        << lines;
+    EXPECT_NE(check_rig_on_frames(wrong, {&curves, 1}).verdict, RigVerdict::kFits) << lines;
+  }
+  EXPECT_EQ(check_rig_on_frames(*rig_, {&curves, 1}).verdict, RigVerdict::kFits);
 }
 
 }  // namespace

@@ -109,7 +109,8 @@ std::string verdict_text(const RigFit& fit) {
             add_name(untold,
                      full_name(device) + " (" + std::to_string(device.crossings.crossings) + ")");
         }
-        return "too few crossings of labelled lines to judge " + untold + "; of all, " + misses;
+        return "too few labelled lines, and crossings of them, to judge " + untold + "; of all, " +
+               misses;
       }
       return "only " + std::to_string(fit.before.crossings) +
              " crossings of labelled lines: too few to tell";
@@ -173,7 +174,7 @@ RigFit check_rig_on_frames(const Rig& stated, std::span<const FrameCurves> frame
   for (std::size_t d = 0; d < device_count(rig); ++d) {
     fit.devices.push_back({device_at(rig, d).name, d >= rig.cameras.size(), per_device[d],
                            found.alone[d].shift_px, found.alone[d].sigma_px, false,
-                           are_enough(per_device[d]), 0, 0});
+                           are_enough(per_device[d]) || named.doubt.telling(d).are_enough(), 0, 0});
   }
   fit.put_back = stated;
   for (const DeviceMove& move : found.moved) {

@@ -33,7 +33,7 @@ SeenColor seen_color(const float* code, int colors) {
 
 }  // namespace
 
-ShownColorCount::ShownColorCount(const Rig& rig) : rig_(rig) {
+ShownColorCount::ShownColorCount(const Rig& rig) : rig_(&rig) {
   for (std::size_t p = 0; p < rig.projectors.size(); ++p) {
     for (std::size_t k = 0; k < rig.projectors[p].patterns.size(); ++k) {
       const PatternRef ref{static_cast<int>(p), static_cast<int>(k)};
@@ -44,7 +44,7 @@ ShownColorCount::ShownColorCount(const Rig& rig) : rig_(rig) {
 }
 
 const LinePattern& ShownColorCount::pattern(PatternRef ref) const {
-  return rig_.projectors[static_cast<std::size_t>(ref.projector)]
+  return rig_->projectors[static_cast<std::size_t>(ref.projector)]
       .patterns[static_cast<std::size_t>(ref.pattern)];
 }
 

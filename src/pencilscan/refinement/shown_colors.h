@@ -53,7 +53,7 @@ class ShownColorCount {
   };
   [[nodiscard]] const LinePattern& pattern(PatternRef ref) const;
 
-  const Rig& rig_;
+  const Rig* rig_;
   std::vector<Count> counts_;
 };
 

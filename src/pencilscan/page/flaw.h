@@ -6,7 +6,7 @@
 namespace pencilscan {
 
 /// How a part of a result or an experiment is not as it should be.
-enum class Fault {
+enum class Flaw {
   kMissing,
   kUnreadable,
   kDoubtful,  ///< it is there, and can hardly be what it is taken for
@@ -14,21 +14,21 @@ enum class Fault {
 };
 
 /// The word for the page.
-[[nodiscard]] inline const char* to_string(Fault fault) {
-  switch (fault) {
-    case Fault::kMissing:
+[[nodiscard]] inline const char* to_string(Flaw flaw) {
+  switch (flaw) {
+    case Flaw::kMissing:
       return "missing";
-    case Fault::kUnreadable:
+    case Flaw::kUnreadable:
       return "unreadable";
-    case Fault::kDoubtful:
+    case Flaw::kDoubtful:
       return "doubtful";
-    case Fault::kNote:
+    case Flaw::kNote:
       return "note";
   }
   return "unknown";
 }
 
 /// Is told what is not as it should be, and why.
-using FaultNote = std::function<void(const std::string& what, const std::string& why, Fault kind)>;
+using FlawNote = std::function<void(const std::string& what, const std::string& why, Flaw kind)>;
 
 }  // namespace pencilscan
