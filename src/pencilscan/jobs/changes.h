@@ -14,7 +14,9 @@ namespace pencilscan {
 /// is out by chance in 1 / chance sequences. From P(|z| > T) <= 2 exp(-T^2 / 2) follows T = sqrt(2
 /// ln(2 values / chance)): 5.6 for 36,000. So is one that differs by less than `smallest`, whatever
 /// the spread: no one would act on it. Three values out in a row on one side are a change, fewer
-/// are outliers. After a change the median starts anew.
+/// are outliers. After a change the median starts anew. Until it is known, three values in a row
+/// that fit the values before the change and not those from there are a change back. A step among
+/// the first values is looked for backwards from the fifteenth: it needs three values before it.
 struct ChangeOptions {
   double smallest = 0;  ///< difference that counts at all, in the unit of the values; > 0
   std::size_t values =

@@ -104,24 +104,70 @@ std::string quantity(const std::string& kind) {
 }
 
 /// What a change of one figure of one device, or of that figure in all cameras, usually comes from.
-std::string usual_cause(const std::string& kind, bool up, bool all) {
+/// `lines_too`: the light on lines rose as well.
+std::string usual_cause(const std::string& kind, bool up, bool all, bool lines_too) {
   if (kind == "width")
     return up ? (all ? "motion, or a screen out of focus" : "out of focus") : "sharper";
   if (kind == "height")
     return up ? "more light on the lines"
               : (all ? "less light of the projectors"
                      : "less light: aperture, exposure, or something before it");
+  if (kind == "level" && lines_too) return "more light, the projectors' too";
   if (kind == "level") return up ? "light from elsewhere: a lamp" : "less light";
   if (kind == "labelled") return up ? "better again" : "lines are lost";
   if (kind == "projector") return up ? "on again" : "off, covered or turned away";
   return up ? "" : "agrees again";
 }
 
+constexpr std::size_t kFramesOfChange = 3;  // as find_changes() asks for
+
+/// Median over the known ones of `count` frames, from `first` on.
+template <class Row>
+double median_of_done(Row first, Row last, std::size_t count, const Reading& reading) {
+  std::vector<double> values;
+  for (; first != last && values.size() < count; ++first) {
+    const double value =
+        first->status.state == FrameState::kDone ? reading(*first) : kUnknownFigure;
+    if (std::isfinite(value)) values.push_back(value);
+  }
+  return values.empty() ? kUnknownFigure : upper_median(std::move(values));
+}
+
+/// Medians over the frames before row `at`, and over `frames_after` from there on.
+std::pair<double, double> before_and_after(std::span<const FrameRow> rows, std::size_t at,
+                                           std::size_t frames_after, const Reading& reading) {
+  const auto here = rows.begin() + static_cast<std::ptrdiff_t>(at);
+  return {median_of_done(std::make_reverse_iterator(here), rows.rend(), kFramesOfChange, reading),
+          median_of_done(here, rows.end(), frames_after, reading)};
+}
+
+/// True where a projector's points or the height of a camera's lines rose at row `at`: more light
+/// then came from the projectors.
+bool lines_got_light(std::span<const FrameRow> rows, const SequenceDevices& devices,
+                     std::size_t at) {
+  const auto rises = [&](double smallest, const Reading& reading) {
+    const auto [before, after] = before_and_after(
+        rows, at, kFramesOfChange, [&](const FrameRow& row) { return finite_log(reading(row)); });
+    return after - before > smallest;  // false where one is unknown
+  };
+  for (std::size_t c = 0; c < devices.cameras.size(); ++c) {
+    if (rises(kHeight, [c](const FrameRow& row) { return row.cameras[c].line_height; }))
+      return true;
+  }
+  for (std::size_t p = 0; p < devices.projectors.size(); ++p) {
+    if (rises(kPoints, [p](const FrameRow& row) { return row.projector_points[p] + 1; }))
+      return true;
+  }
+  return false;
+}
+
 SequenceEvent event_of(std::span<const FrameRow> rows, const SequenceDevices& devices,
                        const Found& found) {
   const Change& change = found.change;
   const std::string& kind = found.series->kind;
-  const std::string cause = usual_cause(kind, change.after > change.before, false);
+  const bool up = change.after > change.before;
+  const bool lines_too = kind == "level" && up && lines_got_light(rows, devices, change.at);
+  const std::string cause = usual_cause(kind, up, false, lines_too);
   return {rows[change.at].name,
           kind,
           bare_name(devices, found.series->device),
@@ -132,16 +178,20 @@ SequenceEvent event_of(std::span<const FrameRow> rows, const SequenceDevices& de
 }
 
 /// The same change in most cameras at once is one event, of none of them.
-SequenceEvent event_of_all(std::span<const FrameRow> rows, const std::vector<Found>& together) {
+SequenceEvent event_of_all(std::span<const FrameRow> rows, const SequenceDevices& devices,
+                           const std::vector<Found>& together) {
   const Change& change = together[together.size() / 2].change;
   const std::string& kind = together.front().series->kind;
-  return {rows[together.front().change.at].name,
+  const std::size_t first = together.front().change.at;
+  const bool up = change.after > change.before;
+  const bool lines_too = kind == "level" && up && lines_got_light(rows, devices, first);
+  return {rows[first].name,
           kind,
           "",
           change.before,
           change.after,
           std::to_string(together.size()) + " cameras: " + quantity(kind) + from_to(change) + " (" +
-              usual_cause(kind, change.after > change.before, true) + ")"};
+              usual_cause(kind, up, true, lines_too) + ")"};
 }
 
 bool is_shift(const Found& found) { return found.series->kind == kShift; }
@@ -152,12 +202,17 @@ bool of_crossings(const Found& found) {
   return is_shift(found) || found.series->kind == "crossings";
 }
 
+/// Crossings meet again as they should.
+bool agrees_again(const Found& found) {
+  return is_shift(found) ? std::abs(found.change.after) < kShiftPx : !rises(found);
+}
+
 double size_of(const Found& found) { return std::abs(found.change.after - found.change.before); }
 
-/// Which device made crossings miss each other. One camera alone, be it that its crossings miss or
-/// that its picture is shifted: that one, since a crossing's disagreement is that of one camera
-/// with two projectors. Several: the projector whose crossings suffer most, if there is one; of two
-/// projectors every crossing is of both.
+/// Which device made crossings miss each other, or meet again. One camera alone, be it that its
+/// crossings miss or that its picture is shifted: that one, since a crossing's disagreement is that
+/// of one camera with two projectors. Several: the projector whose crossings suffer most, if there
+/// is one; of two projectors every crossing is of both.
 SequenceEvent bump(std::span<const FrameRow> rows, const SequenceDevices& devices,
                    std::vector<Found> together) {
   constexpr double kClearly = 1.3;  // a projector over the next one
@@ -186,31 +241,21 @@ SequenceEvent bump(std::span<const FrameRow> rows, const SequenceDevices& device
                       : one_projector ? *projectors.front()
                                       : together.front();
   SequenceEvent event{rows[first].name, "crossings", "", most.change.before, most.change.after, ""};
+  const bool is_back = std::all_of(together.begin(), together.end(), agrees_again);
   if (one_camera || one_projector) {
     event.device = bare_name(devices, most.series->device);
-    event.text = name_of(devices, most.series->device) + " moved";
+    event.text = name_of(devices, most.series->device) +
+                 (is_back ? " is again where the rig has it" : " moved");
   } else {
-    event.text = "devices moved, which one these figures do not tell";
+    event.text = is_back ? "devices are again where the rig has them"
+                         : "devices moved, which one these figures do not tell";
   }
   event.text += is_shift(most) ? ": crossing lines meet when its picture is shifted by "
                                : ": crossing lines miss each other by ";
-  event.text += from_to(most.change) +
-                " (px); rig check --frames says more, --refine-rig corrects the frames from here";
+  event.text += from_to(most.change) + " (px)";
+  if (!is_back)
+    event.text += "; rig check --frames says more, --refine-rig corrects the frames from here";
   return event;
-}
-
-constexpr std::size_t kFramesOfChange = 3;  // as find_changes() asks for
-
-/// Median over the known ones of `count` frames, from `first` on.
-template <class Row>
-double median_of_done(Row first, Row last, std::size_t count, const Reading& reading) {
-  std::vector<double> values;
-  for (; first != last && values.size() < count; ++first) {
-    const double value =
-        first->status.state == FrameState::kDone ? reading(*first) : kUnknownFigure;
-    if (std::isfinite(value)) values.push_back(value);
-  }
-  return values.empty() ? kUnknownFigure : upper_median(std::move(values));
 }
 
 /// Whether what is watched beside a figure rose or fell with it at row `at`: from the frames before
@@ -218,16 +263,10 @@ double median_of_done(Row first, Row last, std::size_t count, const Reading& rea
 bool is_confirmed(std::span<const FrameRow> rows, const Series& series, std::size_t at,
                   std::size_t frames_after) {
   if (!series.beside) return true;
-  const auto here = rows.begin() + static_cast<std::ptrdiff_t>(at);
-  const auto from_to = [&](const Reading& reading) {
-    return std::pair(
-        median_of_done(std::make_reverse_iterator(here), rows.rend(), kFramesOfChange, reading),
-        median_of_done(here, rows.end(), frames_after, reading));
-  };
-  const auto [before, after] =
-      from_to([&](const FrameRow& row) { return finite_log(series.beside(row)); });
+  const auto [before, after] = before_and_after(
+      rows, at, frames_after, [&](const FrameRow& row) { return finite_log(series.beside(row)); });
   if (!std::isfinite(before) || !std::isfinite(after)) return true;
-  const auto [own_before, own_after] = from_to(series.value);
+  const auto [own_before, own_after] = before_and_after(rows, at, frames_after, series.value);
   return (after > before) == (own_after > own_before) && std::abs(after - before) > series.smallest;
 }
 
@@ -261,17 +300,23 @@ std::vector<Found> find_all(std::span<const FrameRow> rows, const SequenceDevice
 }
 
 /// Takes out of `found` what changed in the same figure and direction within a few frames of the
-/// first one.
+/// first one, and before one of these figures changes again.
 std::vector<Found> take_together(std::vector<Found>& found) {
   constexpr std::size_t kFramesApart = 5;
   const Found first = found.front();
+  const auto goes_with = [&](const Found& f) {
+    const bool is_kind = f.series->kind == first.series->kind && rises(f) == rises(first);
+    return is_kind || (of_crossings(f) && of_crossings(first) && (is_shift(f) || is_shift(first)));
+  };
+  std::size_t end = first.change.at + kFramesApart + 1;
+  std::set<const Series*> changed;
+  for (const Found& f : found) {
+    if (goes_with(f) && !changed.insert(f.series).second) end = std::min(end, f.change.at);
+  }
   std::vector<Found> together;
   std::vector<Found> rest;
   for (const Found& f : found) {
-    const bool is_kind = f.series->kind == first.series->kind && rises(f) == rises(first);
-    const bool same =
-        (is_kind || (of_crossings(f) && of_crossings(first) && (is_shift(f) || is_shift(first)))) &&
-        f.change.at <= first.change.at + kFramesApart;
+    const bool same = goes_with(f) && f.change.at < end;
     (same ? together : rest).push_back(f);
   }
   found = std::move(rest);
@@ -314,7 +359,7 @@ WatchReport watch_sequence(std::span<const FrameRow> rows, const SequenceDevices
       report.events.push_back(bump(rows, devices, together));
     } else if (first.series->kind != "projector" && together.size() > 1 &&
                2 * together.size() > devices.cameras.size()) {
-      report.events.push_back(event_of_all(rows, together));
+      report.events.push_back(event_of_all(rows, devices, together));
     } else {
       for (const Found& f : together) report.events.push_back(event_of(rows, devices, f));
     }

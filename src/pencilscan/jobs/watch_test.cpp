@@ -4,73 +4,18 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <numbers>
 
 #include "pencilscan/core/random.h"
-#include "pencilscan/jobs/changes.h"
 
 namespace pencilscan {
 namespace {
 
-using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::Not;
 using ::testing::SizeIs;
 
 constexpr std::size_t kFrames = 300;
-
-std::vector<double> noise(double sigma, std::uint64_t seed) {
-  Random random(seed);
-  std::vector<double> values;
-  for (std::size_t k = 0; k < kFrames; ++k) values.push_back(1 + random.normal(0, sigma));
-  return values;
-}
-
-/// A turning object: once round in five seconds.
-double slow_wave(std::size_t k) {
-  return 0.3 * std::sin(2 * std::numbers::pi * static_cast<double>(k) / 125);
-}
-
-TEST(Changes, NoiseAndSlowMotionAreNone) {
-  std::size_t alarms = 0;
-  for (std::uint64_t seed = 1; seed <= 100; ++seed) {
-    std::vector<double> values = noise(0.02, seed);
-    alarms += find_changes(values, {0.01, 100 * kFrames}).changes.size();
-    for (std::size_t k = 0; k < kFrames; ++k) values[k] += slow_wave(k);
-    alarms += find_changes(values, {0.01, 100 * kFrames}).changes.size();
-  }
-  EXPECT_EQ(alarms, 0U);
-}
-
-TEST(Changes, AStepIsFoundWhereItIs) {
-  for (std::uint64_t seed = 1; seed <= 50; ++seed) {
-    std::vector<double> values = noise(0.02, seed);
-    for (std::size_t k = 0; k < kFrames; ++k) values[k] += k >= 200 ? 0.3 : 0;
-    const ChangeReport report = find_changes(values, {0.05, 20 * kFrames});
-    ASSERT_THAT(report.changes, SizeIs(1));
-    EXPECT_EQ(report.changes[0].at, 200U);
-    EXPECT_NEAR(report.changes[0].before, 1, 0.03);
-    EXPECT_NEAR(report.changes[0].after, 1.3, 0.06);
-    EXPECT_GT(report.changes[0].spreads, 5);
-  }
-}
-
-TEST(Changes, WhatReturnsIsAnOutlierAndUnknownValuesAreNothing) {
-  std::vector<double> values = noise(0.02, 3);
-  values[100] = 2;
-  values[150] = values[151] = 0;
-  for (std::size_t k = 170; k < 200; ++k) values[k] = kUnknownFigure;
-  const ChangeReport report = find_changes(values, {0.05, kFrames});
-  EXPECT_THAT(report.changes, IsEmpty());
-  EXPECT_THAT(report.outliers, ElementsAre(100, 150, 151));
-}
-
-TEST(Changes, SmallerThanWhatCountsIsNone) {
-  std::vector<double> values(kFrames, 1.0);
-  for (std::size_t k = 100; k < kFrames; ++k) values[k] = 1.04;
-  EXPECT_THAT(find_changes(values, {0.05, kFrames}).changes, IsEmpty());
-  EXPECT_THAT(find_changes(values, {0.03, kFrames}).changes, SizeIs(1));
-}
 
 /// Three cameras and three projectors that see the same thing frame after frame.
 class Watch : public ::testing::Test {
@@ -193,6 +138,58 @@ TEST_F(Watch, FocusLampAndProjectorAreToldApart) {
   EXPECT_THAT(found[1].text, HasSubstr("lamp"));
   EXPECT_EQ(found[2].device, "proj0");
   EXPECT_THAT(found[2].text, HasSubstr("off, covered"));
+}
+
+TEST_F(Watch, ALampOfThreeFramesEnds) {
+  for (const std::size_t k : {30U, 31U, 32U})
+    for (CameraRow& camera : rows_[k].cameras) camera.image_level *= 2;
+  const auto found = events();
+  ASSERT_THAT(found, SizeIs(2));
+  EXPECT_EQ(found[0].frame, "30");
+  EXPECT_THAT(found[0].text, HasSubstr("a lamp"));
+  EXPECT_EQ(found[1].frame, "33");
+  EXPECT_THAT(found[1].text, HasSubstr("less light"));
+}
+
+TEST_F(Watch, ACameraThatIsPutBackSoonIsBack) {
+  Random random(3);
+  for (FrameRow& row : rows_) {
+    for (CameraRow& camera : row.cameras) {
+      camera.shift_x_px = random.normal(0, 0.02);
+      camera.shift_y_px = random.normal(0, 0.02);
+    }
+  }
+  for (std::size_t k = 30; k < 34; ++k) {
+    rows_[k].cameras[1].shift_x_px += 0.5;
+    rows_[k].cameras[1].shift_y_px -= 0.5;
+    rows_[k].device_crossing_px[1] += 0.4;
+  }
+  const auto found = events();
+  ASSERT_THAT(found, SizeIs(2));
+  EXPECT_EQ(found[0].frame, "30");
+  EXPECT_THAT(found[0].text, HasSubstr("camera cam1 moved"));
+  EXPECT_EQ(found[1].frame, "34");
+  EXPECT_EQ(found[1].device, "cam1");
+  EXPECT_THAT(found[1].text, HasSubstr("is again where the rig has it"));
+}
+
+TEST_F(Watch, AProjectorThatComesOnAgainIsNoLamp) {
+  for (std::size_t k = 100; k < 150; ++k) {
+    rows_[k].projector_points[0] = 2;
+    for (CameraRow& camera : rows_[k].cameras) camera.image_level *= 0.7;
+  }
+  const auto found = events();
+  ASSERT_THAT(found, SizeIs(4));
+  EXPECT_EQ(found[2].kind, "level");
+  EXPECT_EQ(found[2].frame, "150");
+  EXPECT_THAT(found[2].text, HasSubstr("more light, the projectors' too"));
+  EXPECT_EQ(found[3].device, "proj0");
+  for (const SequenceEvent& event : found) EXPECT_THAT(event.text, Not(HasSubstr("lamp")));
+}
+
+TEST_F(Watch, CrossingsThatComeBackAfterTheyWereTooFewAreNoMotion) {
+  for (std::size_t k = 100; k < 150; ++k) rows_[k].device_crossing_px[1] = kUnknownFigure;
+  EXPECT_THAT(events(), IsEmpty());
 }
 
 TEST_F(Watch, ACameraThatHangsIsNamed) {

@@ -1,0 +1,146 @@
+#include "pencilscan/jobs/changes.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "pencilscan/core/random.h"
+
+namespace pencilscan {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
+using ::testing::SizeIs;
+
+constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+constexpr std::size_t kFrames = 300;
+
+std::vector<double> noise(double sigma, std::uint64_t seed) {
+  Random random(seed);
+  std::vector<double> values;
+  for (std::size_t k = 0; k < kFrames; ++k) values.push_back(1 + random.normal(0, sigma));
+  return values;
+}
+
+/// A turning object: once round in five seconds.
+double slow_wave(std::size_t k) {
+  return 0.3 * std::sin(2 * std::numbers::pi * static_cast<double>(k) / 125);
+}
+
+TEST(Changes, NoiseAndSlowMotionAreNone) {
+  std::size_t alarms = 0;
+  for (std::uint64_t seed = 1; seed <= 100; ++seed) {
+    std::vector<double> values = noise(0.02, seed);
+    alarms += find_changes(values, {0.01, 100 * kFrames}).changes.size();
+    for (std::size_t k = 0; k < kFrames; ++k) values[k] += slow_wave(k);
+    alarms += find_changes(values, {0.01, 100 * kFrames}).changes.size();
+  }
+  EXPECT_EQ(alarms, 0U);
+}
+
+TEST(Changes, AStepIsFoundWhereItIs) {
+  for (std::uint64_t seed = 1; seed <= 50; ++seed) {
+    std::vector<double> values = noise(0.02, seed);
+    for (std::size_t k = 0; k < kFrames; ++k) values[k] += k >= 200 ? 0.3 : 0;
+    const ChangeReport report = find_changes(values, {0.05, 20 * kFrames});
+    ASSERT_THAT(report.changes, SizeIs(1));
+    EXPECT_EQ(report.changes[0].at, 200U);
+    EXPECT_NEAR(report.changes[0].before, 1, 0.03);
+    EXPECT_NEAR(report.changes[0].after, 1.3, 0.06);
+    EXPECT_GT(report.changes[0].spreads, 5);
+  }
+}
+
+TEST(Changes, WhatReturnsIsAnOutlierAndUnknownValuesAreNothing) {
+  std::vector<double> values = noise(0.02, 3);
+  values[100] = 2;
+  values[150] = values[151] = 0;
+  for (std::size_t k = 170; k < 200; ++k) values[k] = kUnknown;
+  const ChangeReport report = find_changes(values, {0.05, kFrames});
+  EXPECT_THAT(report.changes, IsEmpty());
+  EXPECT_THAT(report.outliers, ElementsAre(100, 150, 151));
+}
+
+TEST(Changes, SmallerThanWhatCountsIsNone) {
+  std::vector<double> values(kFrames, 1.0);
+  for (std::size_t k = 100; k < kFrames; ++k) values[k] = 1.04;
+  EXPECT_THAT(find_changes(values, {0.05, kFrames}).changes, IsEmpty());
+  EXPECT_THAT(find_changes(values, {0.03, kFrames}).changes, SizeIs(1));
+}
+
+/// A step of `size` in the frames from `first` to before `end`.
+std::vector<double> with_step(std::size_t first, std::size_t end, double size, std::uint64_t seed) {
+  std::vector<double> values = noise(0.02, seed);
+  for (std::size_t k = first; k < end; ++k) values[k] += size;
+  return values;
+}
+
+std::vector<std::size_t> places(const ChangeReport& report) {
+  std::vector<std::size_t> result;
+  for (const Change& change : report.changes) result.push_back(change.at);
+  return result;
+}
+
+TEST(Changes, AShortOneEndsWhereItEnds) {
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    for (std::size_t frames = 3; frames <= 12; ++frames) {
+      const ChangeReport report =
+          find_changes(with_step(30, 30 + frames, 0.3, seed), {0.05, 20 * kFrames});
+      ASSERT_THAT(places(report), ElementsAre(30, 30 + frames)) << seed;
+      EXPECT_THAT(report.outliers, IsEmpty());
+      EXPECT_NEAR(report.changes[1].before, 1.3, 0.06);
+      EXPECT_NEAR(report.changes[1].after, 1, 0.06);
+    }
+  }
+}
+
+TEST(Changes, ALampThatBlinksIsSaidEachTime) {
+  std::vector<double> values = noise(0.02, 1);
+  std::vector<std::size_t> expected;
+  for (std::size_t k = 30; k < 60; k += 3) {
+    expected.push_back(k);
+    if ((k / 3) % 2 != 0) continue;
+    for (std::size_t i = k; i < k + 3; ++i) values[i] += 0.3;
+  }
+  EXPECT_EQ(places(find_changes(values, {0.05, 20 * kFrames})), expected);
+}
+
+TEST(Changes, AStepThatIsHardlySeenHasNoReturn) {
+  for (std::uint64_t seed = 1; seed <= 200; ++seed) {
+    for (const double size : {0.12, 0.14, 0.16}) {  // 6 to 8 deviations; 5.3 are out
+      const ChangeReport report =
+          find_changes(with_step(100, kFrames, size, seed), {0.05, 20 * kFrames});
+      EXPECT_LE(report.changes.size(), 1U) << seed;
+    }
+  }
+}
+
+TEST(Changes, OneInTheFirstFramesIsFoundWhereItIs) {
+  for (std::uint64_t seed = 1; seed <= 50; ++seed) {
+    for (std::size_t at = 3; at <= 20; ++at) {
+      const ChangeReport report =
+          find_changes(with_step(at, kFrames, 0.3, seed), {0.05, 20 * kFrames});
+      ASSERT_THAT(places(report), ElementsAre(at)) << seed;
+      EXPECT_NEAR(report.changes[0].before, 1, 0.06);
+      EXPECT_NEAR(report.changes[0].after, 1.3, 0.06);
+      EXPECT_GT(report.changes[0].spreads, 5);
+    }
+  }
+  // It returns within the first frames.
+  EXPECT_THAT(places(find_changes(with_step(4, 8, 0.3, 1), {0.05, 20 * kFrames})),
+              ElementsAre(4, 8));
+}
+
+TEST(Changes, AShortCleanSeriesHasNone) {
+  for (std::uint64_t seed = 1; seed <= 2000; ++seed) {
+    const std::vector<double> values = noise(0.02, seed);
+    EXPECT_THAT(find_changes(std::span(values).first(60), {0.01, 60 * 40}).changes, IsEmpty());
+  }
+}
+
+}  // namespace
+}  // namespace pencilscan
