@@ -3,6 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <limits>
+#include <map>
+#include <tuple>
+#include <utility>
 
 #include "pencilscan/core/median.h"
 
@@ -126,21 +130,101 @@ double drift_ppm(const Track& track, const std::vector<double>& lead) {
   return 1e6 * (lead.back() - lead.front()) / span;
 }
 
+/// When each camera begins its next picture after each shot; shots are in order of time.
+std::vector<double> next_times(const std::vector<Shot>& shots, std::size_t cameras) {
+  std::vector<double> next(cameras, std::numeric_limits<double>::infinity());
+  std::vector<double> result(shots.size());
+  for (std::size_t i = shots.size(); i-- > 0;) {
+    result[i] = next[shots[i].camera];
+    next[shots[i].camera] = shots[i].time_ns;
+  }
+  return result;
+}
+
 /// Shots in order of time fall into sets: a set ends where the next shot is half a period after its
-/// first one, or of a camera that it holds already.
-std::vector<std::vector<Shot>> fall_into_sets(std::vector<Shot> shots, double period) {
+/// first one, of a camera that it holds already, or nearer to the next picture of a camera of it.
+std::vector<std::vector<Shot>> fall_into_sets(std::vector<Shot> shots, std::size_t cameras,
+                                              double period) {
   std::sort(shots.begin(), shots.end(), [](const Shot& a, const Shot& b) {
     return std::tie(a.time_ns, a.camera) < std::tie(b.time_ns, b.camera);
   });
+  const std::vector<double> next = next_times(shots, cameras);
   std::vector<std::vector<Shot>> sets;
-  for (const Shot& shot : shots) {
-    const bool fits = !sets.empty() && shot.time_ns - sets.back().front().time_ns < period / 2 &&
-                      std::none_of(sets.back().begin(), sets.back().end(),
-                                   [&](const Shot& other) { return other.camera == shot.camera; });
-    if (!fits) sets.emplace_back();
+  std::size_t first = 0;
+  for (std::size_t i = 0; i < shots.size(); ++i) {
+    const Shot& shot = shots[i];
+    bool fits = !sets.empty() && shot.time_ns - shots[first].time_ns < period / 2;
+    for (std::size_t k = first; fits && k < i; ++k) {
+      fits = shots[k].camera != shot.camera &&
+             shot.time_ns - shots[k].time_ns <= next[k] - shot.time_ns;
+    }
+    if (!fits) {
+      sets.emplace_back();
+      first = i;
+    }
     sets.back().push_back(shot);
   }
   return sets;
+}
+
+/// Where the widest step between the shots of a set is: the first shot after it.
+std::size_t widest_step(const std::vector<Shot>& set) {
+  std::size_t widest = 1;
+  for (std::size_t i = 2; i < set.size(); ++i) {
+    if (set[i].time_ns - set[i - 1].time_ns > set[widest].time_ns - set[widest - 1].time_ns)
+      widest = i;
+  }
+  return widest;
+}
+
+/// The cameras of each half of a set, in order; nothing where it is one moment (frame_sets.h).
+using Halves = std::pair<std::vector<std::size_t>, std::vector<std::size_t>>;
+std::optional<Halves> halves_of(const std::vector<Shot>& set, double period) {
+  constexpr std::size_t kPair = 2;  // cameras that see one moment
+  if (set.size() < 2 * kPair) return std::nullopt;
+  const std::size_t step = widest_step(set);
+  if (set[step].time_ns - set[step - 1].time_ns <= period / 4) return std::nullopt;
+  if (step < kPair || set.size() - step < kPair) return std::nullopt;
+  Halves halves;
+  for (std::size_t i = 0; i < set.size(); ++i)
+    (i < step ? halves.first : halves.second).push_back(set[i].camera);
+  std::sort(halves.first.begin(), halves.first.end());
+  std::sort(halves.second.begin(), halves.second.end());
+  return halves;
+}
+
+/// Sets of cameras that take turns, most of which have the same two halves, become two each.
+void split_turns(std::vector<std::vector<Shot>>& sets, double period) {
+  std::map<Halves, std::size_t> counts;
+  for (const std::vector<Shot>& set : sets) {
+    if (const auto halves = halves_of(set, period)) ++counts[*halves];
+  }
+  const auto most =
+      std::max_element(counts.begin(), counts.end(),
+                       [](const auto& a, const auto& b) { return a.second < b.second; });
+  if (most == counts.end() || 2 * most->second <= sets.size()) return;
+  std::vector<std::vector<Shot>> result;
+  for (std::vector<Shot>& set : sets) {
+    // One that lacks pictures is split where its widest step is as well.
+    const std::size_t step = set.size() > 1 ? widest_step(set) : 0;
+    if (step == 0 || set[step].time_ns - set[step - 1].time_ns <= period / 4) {
+      result.push_back(std::move(set));
+      continue;
+    }
+    const auto middle = set.begin() + static_cast<std::ptrdiff_t>(step);
+    result.emplace_back(set.begin(), middle);
+    result.emplace_back(middle, set.end());
+  }
+  sets = std::move(result);
+}
+
+/// Median step from set to set, of two at a time: those of cameras that take turns need not be
+/// even. `fallback` where there are fewer.
+double period_of_sets(const std::vector<std::vector<Shot>>& sets, double fallback) {
+  std::vector<double> steps;
+  for (std::size_t k = 2; k < sets.size(); ++k)
+    steps.push_back((sets[k].front().time_ns - sets[k - 2].front().time_ns) / 2);
+  return steps.empty() ? fallback : upper_median(std::move(steps));
 }
 
 /// The row that all shots of each set share, increasing; nothing where that is not so.
@@ -248,13 +332,73 @@ std::vector<Shot> common_clock(std::span<const ShotTimes> cameras, FrameSets& re
   return shots;
 }
 
-/// Moments that no camera has, by the time between sets.
+/// Moments that no camera has, by the time between sets. Of rows that are the moments, those
+/// without a time between two are no gap: they are sets.
 void name_gaps(const std::vector<std::vector<Shot>>& sets, FrameSets& result) {
   for (std::size_t k = 1; k < sets.size(); ++k) {
     const double step = (sets[k].front().time_ns - sets[k - 1].front().time_ns) / result.period_ns;
-    const long missing = std::lround(step) - 1;
-    if (missing > 0) result.gaps.emplace_back(k, static_cast<std::size_t>(missing));
+    const std::size_t at = result.by_row ? sets[k].front().row : k;
+    const std::size_t before = result.by_row ? sets[k - 1].front().row : k - 1;
+    const long missing = std::lround(step) - static_cast<long>(at - before);
+    if (missing > 0) result.gaps.emplace_back(at, static_cast<std::size_t>(missing));
   }
+}
+
+/// The sets between those of the timed rows before and after `rows`, if they are as many and hold
+/// nothing of camera c.
+std::vector<std::size_t> sets_for(const FrameSets& result, std::size_t c,
+                                  std::optional<std::size_t> before,
+                                  std::optional<std::size_t> after, std::size_t rows) {
+  std::vector<std::size_t> between;
+  if (!before || !after || *after <= *before || *after - *before - 1 != rows) return between;
+  for (std::size_t k = *before + 1; k < *after; ++k) {
+    if (result.sets[k].rows[c]) return {};
+    between.push_back(k);
+  }
+  return between;
+}
+
+/// Gives the pictures of camera c that have no time stamp to the sets between those of the timed
+/// ones around them, or leaves them out. `set_of`: the sets of its timed rows.
+void place_untimed(const ShotTimes& camera, std::size_t c,
+                   const std::vector<std::optional<std::size_t>>& set_of, FrameSets& result) {
+  std::vector<std::size_t>& left_out = result.clocks[c].left_out;
+  std::optional<std::size_t> before;
+  std::vector<std::size_t> untimed;
+  const auto place = [&](std::optional<std::size_t> after) {
+    const std::vector<std::size_t> sets = sets_for(result, c, before, after, untimed.size());
+    if (sets.empty()) left_out.insert(left_out.end(), untimed.begin(), untimed.end());
+    for (std::size_t i = 0; i < sets.size(); ++i) result.sets[sets[i]].rows[c] = untimed[i];
+    untimed.clear();
+  };
+  for (std::size_t row = 0; row < camera.valid.size(); ++row) {
+    if (set_of[row]) {
+      place(set_of[row]);
+      before = set_of[row];
+    } else if (camera.valid[row] != 0) {
+      untimed.push_back(row);
+    }
+  }
+  place(std::nullopt);
+}
+
+/// Set k is what was taken at one time.
+void take_moments(std::span<const ShotTimes> cameras, const std::vector<std::vector<Shot>>& sets,
+                  FrameSets& result) {
+  result.by_row = false;
+  std::vector<std::vector<std::optional<std::size_t>>> set_of(cameras.size());
+  for (std::size_t c = 0; c < cameras.size(); ++c) set_of[c].resize(cameras[c].valid.size());
+  for (const std::vector<Shot>& shots : sets) {
+    for (const Shot& shot : shots) set_of[shot.camera][shot.row] = result.sets.size();
+    FrameSet& set = result.sets.emplace_back();
+    set.rows.resize(cameras.size());
+    set.offset_ns.resize(cameras.size(), 0);
+    for (const Shot& shot : shots) {
+      if (cameras[shot.camera].valid[shot.row] != 0) set.rows[shot.camera] = shot.row;
+    }
+    note_offsets(shots, set);
+  }
+  for (std::size_t c = 0; c < cameras.size(); ++c) place_untimed(cameras[c], c, set_of[c], result);
 }
 
 }  // namespace
@@ -263,24 +407,17 @@ FrameSets group_frames(std::span<const ShotTimes> cameras) {
   FrameSets result;
   result.clocks.resize(cameras.size());
   std::vector<Shot> shots_in_time = common_clock(cameras, result);
-  const std::vector<std::vector<Shot>> sets =
-      fall_into_sets(std::move(shots_in_time), result.period_ns);
+  std::vector<std::vector<Shot>> sets =
+      fall_into_sets(std::move(shots_in_time), cameras.size(), result.period_ns);
+  split_turns(sets, result.period_ns);
+  result.period_ns = period_of_sets(sets, result.period_ns);
   if (sets.empty() || are_rows(sets)) {
     take_rows(cameras, result);
     for (const std::vector<Shot>& set : sets) note_offsets(set, result.sets[set.front().row]);
   } else {
-    result.by_row = false;
-    for (const std::vector<Shot>& shots : sets) {
-      FrameSet& set = result.sets.emplace_back();
-      set.rows.resize(cameras.size());
-      set.offset_ns.resize(cameras.size(), 0);
-      for (const Shot& shot : shots) {
-        if (cameras[shot.camera].valid[shot.row] != 0) set.rows[shot.camera] = shot.row;
-      }
-      note_offsets(shots, set);
-    }
-    name_gaps(sets, result);
+    take_moments(cameras, sets, result);
   }
+  name_gaps(sets, result);
   name_dropped_and_late(cameras, result);
   return result;
 }

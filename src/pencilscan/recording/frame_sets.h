@@ -29,6 +29,8 @@ struct CameraClock {
   double limit_ns = 0;               ///< a picture is late from here on; 0: unknown
   std::vector<std::size_t> dropped;  ///< sets without its picture
   std::vector<std::size_t> late;     ///< sets where its picture is of another moment
+  /// Rows whose picture is in no set: it has no time stamp, and the rows do not tell its moment.
+  std::vector<std::size_t> left_out;
 };
 
 /// Which pictures show one moment.
@@ -36,7 +38,7 @@ struct FrameSets {
   std::vector<FrameSet> sets;
   std::vector<CameraClock> clocks;  ///< one per camera
   bool by_row = true;               ///< set k is row k of every camera
-  double period_ns = 0;             ///< from set to set; 0: unknown
+  double period_ns = 0;             ///< median from set to set; 0: unknown
   /// Sets before which moments are missing in all cameras, and how many.
   std::vector<std::pair<std::size_t, std::size_t>> gaps;
 };
@@ -50,8 +52,18 @@ struct ShotTimes {
 };
 
 /// Pictures belong together by their time stamps, not by their numbers: a camera that drops one
-/// counts on. Two are of one moment when they began less than half a period apart, because another
-/// moment is nearer otherwise.
+/// counts on. Two are of one moment when they began less than half a period apart, and when the
+/// camera of the first has no next picture that is nearer to the other's: another moment is nearer
+/// otherwise.
+///
+/// Cameras may take turns: those of one half lie between those of the other half. So a recording
+/// where a period P holds the same two groups again and again, of two cameras at least each, more
+/// than P / 4 apart, has two moments a period, one for each group: moments follow each other P / 2
+/// apart then, and what is more than half of that apart is of two. One camera alone on its side is
+/// late, since it sees nothing that another one sees at that moment.
+///
+/// A picture without a time stamp between timed ones of its camera is of the moment between theirs
+/// where there are as many as pictures; else it is left out.
 ///
 /// Clocks that do not count from the same moment (the recording says so, or they were hardly ever
 /// running at once) are shifted onto each other: of all lags in

@@ -114,6 +114,96 @@ TEST(FrameSets, WhatAllCamerasMissIsAGap) {
   EXPECT_THAT(sets.gaps, ElementsAre(std::pair<std::size_t, std::size_t>(20, 2)));
 }
 
+TEST(FrameSets, WhatAllCamerasMissIsAGapOfRowsToo) {
+  Trigger trigger;
+  for (Trigger::Of& camera : trigger.cameras) camera.dropped = {20, 21, 50, 51, 52};
+  std::vector<ShotTimes> shots = trigger.shots();
+  FrameSets sets = group_frames(shots);
+  EXPECT_TRUE(sets.by_row);
+  EXPECT_THAT(sets.gaps, ElementsAre(std::pair<std::size_t, std::size_t>(20, 2),
+                                     std::pair<std::size_t, std::size_t>(48, 3)));
+  // Of the three, two are rows without pictures.
+  for (ShotTimes& camera : shots) {
+    camera.times_ns.insert(camera.times_ns.begin() + 48, 2, kUnknownTime);
+    camera.valid.insert(camera.valid.begin() + 48, 2, 0);
+  }
+  sets = group_frames(shots);
+  EXPECT_TRUE(sets.by_row);
+  EXPECT_THAT(sets.gaps, ElementsAre(std::pair<std::size_t, std::size_t>(20, 2),
+                                     std::pair<std::size_t, std::size_t>(50, 1)));
+}
+
+TEST(FrameSets, PicturesWithoutATimeStampAreOfTheMomentBetweenTheirNeighbours) {
+  Trigger trigger;
+  trigger.cameras[0].dropped = {10};  // rows are not the moments
+  std::vector<ShotTimes> shots = trigger.shots();
+  const auto forget = [&](std::size_t camera, std::size_t row) {
+    shots[camera].times_ns[row] = kUnknownTime;
+  };
+  forget(0, 30);  // moment 31
+  forget(1, 100);
+  forget(1, 101);
+  forget(2, 299);  // nothing tells whether it is of the last moment
+  FrameSets sets = group_frames(shots);
+  EXPECT_FALSE(sets.by_row);
+  EXPECT_EQ(sets.sets[31].rows[0], 30U);
+  EXPECT_EQ(sets.sets[100].rows[1], 100U);
+  EXPECT_EQ(sets.sets[101].rows[1], 101U);
+  EXPECT_EQ(trigger.mixed(sets), 0U);
+  EXPECT_THAT(sets.clocks[0].dropped, ElementsAre(10));
+  EXPECT_THAT(sets.clocks[1].dropped, IsEmpty());
+  EXPECT_THAT(sets.clocks[1].left_out, IsEmpty());
+  EXPECT_THAT(sets.clocks[2].left_out, ElementsAre(299));
+  EXPECT_THAT(sets.clocks[2].dropped, ElementsAre(299));
+  // One picture for two moments.
+  forget(0, 9);
+  sets = group_frames(shots);
+  EXPECT_THAT(sets.clocks[0].left_out, ElementsAre(9));
+  EXPECT_THAT(sets.clocks[0].dropped, ElementsAre(9, 10));
+}
+
+TEST(FrameSets, CamerasThatTakeTurnsAreOfTwoMoments) {
+  for (const double phase : {0.3, 0.494, 0.506}) {
+    Trigger trigger;
+    trigger.cameras.resize(4);
+    for (const std::size_t c : {2U, 3U}) trigger.cameras[c].phase_ns = phase * kPeriod;
+    trigger.cameras[1].dropped = {20};
+    trigger.cameras[3].dropped = {40};
+    const FrameSets sets = group_frames(trigger.shots());
+    ASSERT_EQ(sets.sets.size(), 600U) << phase;
+    EXPECT_EQ(trigger.mixed(sets), 0U);
+    for (std::size_t k = 0; k < 600; ++k) {
+      EXPECT_EQ(sets.sets[k].rows[0].has_value(), k % 2 == 0);
+      EXPECT_EQ(sets.sets[k].rows[2].has_value(), k % 2 == 1);
+      EXPECT_LT(sets.sets[k].spread_ns, 3e5);
+    }
+    EXPECT_THAT(sets.clocks[2].late, IsEmpty());
+    EXPECT_THAT(sets.gaps, IsEmpty());
+  }
+}
+
+// Camera 0 takes two pictures while the others take one, in turns.
+TEST(FrameSets, APictureIsOfTheNearestMomentOfAFasterCamera) {
+  std::vector<ShotTimes> cameras(3);
+  const std::vector<double> first = {0, 0.5e6, 39.5e6};
+  for (std::size_t c = 0; c < 3; ++c) {
+    const double period = c == 0 ? 40e6 : 80e6;
+    for (std::size_t k = 0; k < (c == 0 ? 100U : 50U); ++k) {
+      cameras[c].times_ns.push_back(
+          std::llround(1e12 + first[c] + period * static_cast<double>(k)));
+      cameras[c].valid.push_back(1);
+    }
+  }
+  const FrameSets sets = group_frames(cameras);
+  ASSERT_EQ(sets.sets.size(), 100U);
+  EXPECT_NEAR(sets.period_ns, 40e6, 1e6);
+  for (std::size_t k = 0; k < 100; ++k) {
+    EXPECT_EQ(sets.sets[k].rows[0], k);
+    EXPECT_EQ(sets.sets[k].rows[1].has_value(), k % 2 == 0);
+    EXPECT_EQ(sets.sets[k].rows[2].has_value(), k % 2 == 1);
+  }
+}
+
 TEST(FrameSets, ClocksWithAStartOfTheirOwnAreShiftedOntoEachOther) {
   Trigger trigger;
   trigger.cameras[1].shift_ns = 7200e9;
