@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <sstream>
 #include <system_error>
 
@@ -116,18 +117,53 @@ std::vector<std::string> words(const std::string& line) {
   return result;
 }
 
-/// Time stamps by frame name and camera. Empty cells are unknown.
-std::map<std::string, std::map<std::string, std::int64_t>> read_times(const fs::path& file) {
-  std::map<std::string, std::map<std::string, std::int64_t>> times;
+/// Time stamps by frame name and camera.
+using Times = std::map<std::string, std::map<std::string, std::int64_t>>;
+
+/// "000012, 000020 and 5 more".
+std::string name_list(const std::vector<std::string>& names) {
+  constexpr std::size_t kShown = 8;
+  std::string text;
+  for (std::size_t i = 0; i < std::min(names.size(), kShown); ++i)
+    text += (i == 0 ? "" : ", ") + names[i];
+  if (names.size() > kShown) text += " and " + std::to_string(names.size() - kShown) + " more";
+  return text;
+}
+
+/// The cameras of the columns. InputError where one has no pictures, or stands twice.
+std::vector<std::string> read_header(const fs::path& file, const std::string& line,
+                                     const std::vector<std::string>& cameras) {
+  std::vector<std::string> header = words(line);
+  if (header.size() < 2 || header[0] != "frame")
+    throw InputError(file.string(), "line 1", line, "must be frame,<camera>,<camera>,...");
+  for (auto column = header.begin() + 1; column != header.end(); ++column) {
+    if (std::find(cameras.begin(), cameras.end(), *column) == cameras.end()) {
+      throw InputError(file.string(), "line 1", *column,
+                       "must be a camera that has pictures (" + name_list(cameras) + ")");
+    }
+    if (std::find(header.begin() + 1, column, *column) != column)
+      throw InputError(file.string(), "line 1", *column, "must stand once");
+  }
+  return header;
+}
+
+/// Empty cells are unknown.
+Times read_times(const fs::path& file, const std::vector<std::string>& cameras) {
+  Times times;
+  std::map<std::string, int> line_of;
   std::istringstream lines(read_file(file));
   std::string line;
   std::getline(lines, line);
-  const std::vector<std::string> header = words(line);
-  if (header.size() < 2 || header[0] != "frame")
-    throw InputError(file.string(), "line 1", line, "must be frame,<camera>,<camera>,...");
+  const std::vector<std::string> header = read_header(file, line, cameras);
   for (int number = 2; std::getline(lines, line); ++number) {
     const std::vector<std::string> cells = words(line);
     if (cells.empty()) continue;
+    const auto [first, is_new] = line_of.emplace(cells[0], number);
+    if (!is_new) {
+      throw InputError(
+          file.string(), "line " + std::to_string(number), cells[0],
+          "must stand once; it stands in line " + std::to_string(first->second) + " as well");
+    }
     for (std::size_t c = 1; c < cells.size() && c < header.size(); ++c) {
       std::int64_t time = kUnknownTime;
       const char* const end = cells[c].data() + cells[c].size();
@@ -140,6 +176,57 @@ std::map<std::string, std::map<std::string, std::int64_t>> read_times(const fs::
     }
   }
   return times;
+}
+
+std::int64_t time_of(const Times& times, const std::string& frame, const std::string& camera) {
+  const auto row = times.find(frame);
+  if (row == times.end()) return kUnknownTime;
+  const auto cell = row->second.find(camera);
+  return cell == row->second.end() ? kUnknownTime : cell->second;
+}
+
+/// "3 (000012, 000020, 000021)".
+std::string counted(const std::vector<std::string>& names) {
+  return std::to_string(names.size()) + " (" + name_list(names) + ")";
+}
+
+/// Warns of time stamps and pictures without the other. InputError where no row is of a frame.
+std::vector<std::string> unmatched(const fs::path& file, const Times& times,
+                                   const FoundFrames& found) {
+  std::set<std::string> frames(found.names.begin(), found.names.end());
+  frames.erase("");  // of rows without a folder
+  std::vector<std::string> rows;
+  for (const auto& [name, cells] : times) {
+    if (!frames.contains(name)) rows.push_back(name);
+  }
+  if (!times.empty() && rows.size() == times.size()) {
+    throw InputError(file.string(), "frame", rows.front(),
+                     "must be the name of a frame folder, such as " + found.names.back());
+  }
+  std::vector<std::string> warnings;
+  if (!rows.empty())
+    warnings.push_back(file.string() + ": rows of no frame folder: " + counted(rows));
+  for (const auto& [camera, pictures] : found.cameras) {
+    std::vector<std::string> untimed;
+    for (const auto& [row, picture] : pictures) {
+      if (time_of(times, found.names[row], camera) == kUnknownTime)
+        untimed.push_back(found.names[row]);
+    }
+    if (!untimed.empty())
+      warnings.push_back(file.string() + ": pictures of camera " + camera +
+                         " without a time stamp: " + counted(untimed));
+  }
+  return warnings;
+}
+
+/// True where unpacking writes times.
+bool has_times(const Recording& recording, const FrameSets& sets) {
+  for (const FrameSet& set : sets.sets) {
+    for (std::size_t c = 0; c < set.rows.size(); ++c) {
+      if (set.rows[c] && recording.timestamp_ns(*set.rows[c], c) != kUnknownTime) return true;
+    }
+  }
+  return false;
 }
 
 /// True where unpacking writes a picture of this row.
@@ -159,7 +246,7 @@ void refuse_what_would_stay(const Recording& recording, const FrameSets& sets,
                      "must not stay: it would be taken for a part of this recording; remove it, or "
                      "name a new folder");
   };
-  if (sets.period_ns <= 0 && fs::exists(out / kTimesFile)) refuse(out / kTimesFile);
+  if (!has_times(recording, sets) && fs::exists(out / kTimesFile)) refuse(out / kTimesFile);
   std::map<std::string, std::size_t> frames;
   for (std::size_t k = 0; k < sets.sets.size(); ++k) frames[six_digits(k)] = k;
   for (const auto& entry : fs::directory_iterator(out)) {
@@ -179,6 +266,20 @@ void refuse_what_would_stay(const Recording& recording, const FrameSets& sets,
 }
 
 }  // namespace
+
+std::vector<std::string> left_out_warnings(const Recording& recording, const FrameSets& sets) {
+  std::vector<std::string> warnings;
+  for (std::size_t c = 0; c < sets.clocks.size(); ++c) {
+    std::vector<std::string> rows;
+    for (const std::size_t row : sets.clocks[c].left_out) rows.push_back(six_digits(row));
+    if (rows.empty()) continue;
+    warnings.push_back("pictures of camera " + recording.cameras()[c].name +
+                       " in no frame, since they have no time stamp and nothing else tells their "
+                       "moment: " +
+                       counted(rows));
+  }
+  return warnings;
+}
 
 std::vector<std::string> frame_folder_names(const fs::path& folder) {
   if (!fs::is_directory(folder))
@@ -211,7 +312,6 @@ PackReport pack_recording(const fs::path& frames, const fs::path& out, const Pac
   const FoundFrames found = find_pictures(frames);
   fs::path times_file = options.times;
   if (times_file.empty() && fs::exists(frames / kTimesFile)) times_file = frames / kTimesFile;
-  const auto times = times_file.empty() ? decltype(read_times({}))() : read_times(times_file);
   PackReport report;
   report.frames = found.names.size();
   std::vector<RecordedCamera> cameras;
@@ -223,6 +323,11 @@ PackReport pack_recording(const fs::path& frames, const fs::path& out, const Pac
     report.pictures += pictures.size();
   }
   report.missing = report.frames * cameras.size() - report.pictures;
+  Times times;
+  if (!times_file.empty()) {
+    times = read_times(times_file, report.cameras);
+    report.warnings = unmatched(times_file, times, found);
+  }
   // A film is a Zarr group, too.
   const bool replaces =
       options.overwrite && Recording::is_one(out) && read_zarr_group(out).contains("cameras");
@@ -234,12 +339,8 @@ PackReport pack_recording(const fs::path& frames, const fs::path& out, const Pac
   std::atomic<std::size_t> written{0};
   parallel_for(cameras.size(), [&](std::size_t c) {
     for (const auto& [row, file] : *files[c]) {
-      std::int64_t time = kUnknownTime;
-      if (const auto of = times.find(found.names[row]); of != times.end()) {
-        const auto own = of->second.find(cameras[c].name);
-        if (own != of->second.end()) time = own->second;
-      }
-      writer.write(row, c, read_like(cameras[c], file), time);
+      writer.write(row, c, read_like(cameras[c], file),
+                   time_of(times, found.names[row], cameras[c].name));
       const std::size_t done = ++written;
       if (progress && c == 0)
         progress("packing", static_cast<double>(done) / static_cast<double>(report.pictures));
@@ -247,6 +348,7 @@ PackReport pack_recording(const fs::path& frames, const fs::path& out, const Pac
   });
   writer.close();
   making.publish();
+  if (progress) progress("packing", 1);
   return report;
 }
 
@@ -273,7 +375,8 @@ PackReport unpack_recording(const Recording& recording, const FrameSets& sets, c
   });
   report.pictures = pictures;
   report.missing = report.frames * cameras - report.pictures;
-  if (sets.period_ns <= 0) return report;
+  report.warnings = left_out_warnings(recording, sets);
+  if (!has_times(recording, sets)) return report;
   std::string table = "frame";
   for (const RecordedCamera& camera : recording.cameras()) table += "," + camera.name;
   for (std::size_t k = 0; k < sets.sets.size(); ++k) {

@@ -16,6 +16,7 @@ struct PackReport {
   std::vector<std::string> cameras;
   std::size_t pictures = 0;
   std::size_t missing = 0;  ///< pictures of a frame that are not there
+  std::vector<std::string> warnings;
 };
 
 struct PackOptions {
@@ -27,8 +28,10 @@ struct PackOptions {
 
 /// Makes a recording of image folders (`frames/<frame>/<camera>.png` and so on), pixels as stored.
 /// Folders of six digits keep their number as their row, so that a gap stays a gap. InputError for
-/// pictures that are damaged or of another size or type than the camera's others. The recording is
-/// made in `<out>.partial` and appears whole; an earlier one stays until then.
+/// pictures that are damaged or of another size or type than the camera's others, and for time
+/// stamps of other cameras, of a frame that stands twice, or of none of the frames. Warns of
+/// pictures and time stamps that found no partner. The recording is made in `<out>.partial` and
+/// appears whole; an earlier one stays until then.
 PackReport pack_recording(const std::filesystem::path& frames, const std::filesystem::path& out,
                           const PackOptions& options = {}, const Progress& progress = {});
 
@@ -36,6 +39,10 @@ PackReport pack_recording(const std::filesystem::path& frames, const std::filesy
 /// InputError where `out` holds pictures or times that would stay, and be taken for this set's.
 PackReport unpack_recording(const Recording& recording, const FrameSets& sets,
                             const std::filesystem::path& out, const Progress& progress = {});
+
+/// Says which pictures are in no frame, a sentence a camera (CameraClock::left_out).
+[[nodiscard]] std::vector<std::string> left_out_warnings(const Recording& recording,
+                                                         const FrameSets& sets);
 
 /// The frame folders below `folder` in their order: by number where all names are digits, else by
 /// name; not those whose names begin with a dot. InputError when there is none.

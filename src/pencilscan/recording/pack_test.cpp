@@ -165,6 +165,74 @@ TEST_F(Pack, PicturesThatWouldStayAmongUnpackedOnesAreNamed) {
               HasSubstr("timestamps.csv: must not stay"));
 }
 
+TEST_F(Pack, TheTimesOfOneRowComeBack) {
+  put("000000/cam0.png", CV_8UC1, 3);
+  put("000000/cam1.png", CV_8UC1, 4);
+  const std::string table = "frame,cam0,cam1\n000000,100,110\n";
+  write_text(frames() / "timestamps.csv", table);
+  pack_recording(frames(), packed());
+  const Recording recording = Recording::open(packed());
+  const fs::path out = temporary_.path() / "out";
+  unpack_recording(recording, group_frames(recording), out);
+  EXPECT_EQ(read_file(out / "timestamps.csv"), table);
+  unpack_recording(recording, group_frames(recording), out);  // it is written anew
+}
+
+TEST_F(Pack, TimeStampsAndPicturesWithoutAPartnerAreSaid) {
+  for (const char* frame : {"000000", "000001"}) {
+    for (const char* camera : {"cam0", "cam1"})
+      put(std::string(frame) + "/" + camera + ".png", CV_8UC1, 3);
+  }
+  const auto with = [&](const std::string& times) {
+    fs::remove_all(packed());
+    write_text(frames() / "timestamps.csv", times);
+    return error_of([&] { pack_recording(frames(), packed()); });
+  };
+  EXPECT_THAT(with("frame,Cam0,cam1\n000000,1,2\n"),
+              AllOf(HasSubstr("timestamps.csv"), HasSubstr("line 1"), HasSubstr("Cam0"),
+                    HasSubstr("must be a camera that has pictures (cam0, cam1)")));
+  EXPECT_THAT(with("frame,cam0,cam0\n000000,1,2\n"), HasSubstr("must stand once"));
+  EXPECT_THAT(with("frame,cam0,cam1\n000000,1,2\n000000,3,4\n"),
+              AllOf(HasSubstr("line 3"), HasSubstr("000000"),
+                    HasSubstr("must stand once; it stands in line 2")));
+  EXPECT_THAT(with("frame,cam0,cam1\n0,1,2\n1,3,4\n"),
+              AllOf(HasSubstr("must be the name of a frame folder, such as 000001")));
+  EXPECT_FALSE(fs::exists(packed()));
+  write_text(frames() / "timestamps.csv", "frame,cam0,cam1\n000000,1,2\n000001,3,\n000002,5,6\n");
+  EXPECT_THAT(pack_recording(frames(), packed()).warnings,
+              ElementsAre(HasSubstr("rows of no frame folder: 1 (000002)"),
+                          HasSubstr("pictures of camera cam1 without a time stamp: 1 (000001)")));
+}
+
+TEST_F(Pack, PicturesThatAreInNoFrameAreSaid) {
+  for (std::size_t k = 0; k < 6; ++k) {
+    for (const char* camera : {"cam0", "cam1", "cam2"}) {
+      if (k < 5 || std::string(camera) != "cam1")
+        put(six_digits(k) + "/" + camera + ".png", CV_8UC1, static_cast<int>(k));
+    }
+  }
+  // cam1 dropped the moment 200; nothing tells whether its last picture is of the last moment.
+  write_text(frames() / "timestamps.csv",
+             "frame,cam0,cam1,cam2\n000000,1000,1000,1000\n000001,1100,1100,1100\n"
+             "000002,1200,1300,1200\n000003,1300,1400,1300\n000004,1400,,1400\n"
+             "000005,1500,,1500\n");
+  pack_recording(frames(), packed());
+  const Recording recording = Recording::open(packed());
+  EXPECT_THAT(
+      unpack_recording(recording, group_frames(recording), temporary_.path() / "out").warnings,
+      ElementsAre(AllOf(HasSubstr("camera cam1"), HasSubstr("1 (000004)"))));
+}
+
+TEST_F(Pack, ProgressEndsAtTheEnd) {
+  for (std::size_t k = 0; k < 3; ++k) {
+    put(six_digits(k) + "/cam0.png", CV_8UC1, 3);
+    put(six_digits(k) + "/cam1.png", CV_8UC1, 3);
+  }
+  double last = 0;
+  pack_recording(frames(), packed(), {}, [&](std::string_view, double share) { last = share; });
+  EXPECT_EQ(last, 1);
+}
+
 TEST_F(Pack, ATimeStampThatIsNoWholeNumberIsRefused) {
   put("000000/cam0.png", CV_8UC1, 3);
   const auto with = [&](const std::string& time) {
