@@ -17,12 +17,12 @@ using ::testing::IsEmpty;
 using ::testing::SizeIs;
 
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
-constexpr std::size_t kFrames = 300;
+constexpr std::size_t kValues = 300;
 
 std::vector<double> noise(double sigma, std::uint64_t seed) {
   Random random(seed);
   std::vector<double> values;
-  for (std::size_t k = 0; k < kFrames; ++k) values.push_back(1 + random.normal(0, sigma));
+  for (std::size_t k = 0; k < kValues; ++k) values.push_back(1 + random.normal(0, sigma));
   return values;
 }
 
@@ -35,9 +35,9 @@ TEST(Changes, NoiseAndSlowMotionAreNone) {
   std::size_t alarms = 0;
   for (std::uint64_t seed = 1; seed <= 100; ++seed) {
     std::vector<double> values = noise(0.02, seed);
-    alarms += find_changes(values, {0.01, 100 * kFrames}).changes.size();
-    for (std::size_t k = 0; k < kFrames; ++k) values[k] += slow_wave(k);
-    alarms += find_changes(values, {0.01, 100 * kFrames}).changes.size();
+    alarms += find_changes(values, {0.01, 100 * kValues}).changes.size();
+    for (std::size_t k = 0; k < kValues; ++k) values[k] += slow_wave(k);
+    alarms += find_changes(values, {0.01, 100 * kValues}).changes.size();
   }
   EXPECT_EQ(alarms, 0U);
 }
@@ -45,8 +45,8 @@ TEST(Changes, NoiseAndSlowMotionAreNone) {
 TEST(Changes, AStepIsFoundWhereItIs) {
   for (std::uint64_t seed = 1; seed <= 50; ++seed) {
     std::vector<double> values = noise(0.02, seed);
-    for (std::size_t k = 0; k < kFrames; ++k) values[k] += k >= 200 ? 0.3 : 0;
-    const ChangeReport report = find_changes(values, {0.05, 20 * kFrames});
+    for (std::size_t k = 0; k < kValues; ++k) values[k] += k >= 200 ? 0.3 : 0;
+    const ChangeReport report = find_changes(values, {0.05, 20 * kValues});
     ASSERT_THAT(report.changes, SizeIs(1));
     EXPECT_EQ(report.changes[0].at, 200U);
     EXPECT_NEAR(report.changes[0].before, 1, 0.03);
@@ -60,16 +60,16 @@ TEST(Changes, WhatReturnsIsAnOutlierAndUnknownValuesAreNothing) {
   values[100] = 2;
   values[150] = values[151] = 0;
   for (std::size_t k = 170; k < 200; ++k) values[k] = kUnknown;
-  const ChangeReport report = find_changes(values, {0.05, kFrames});
+  const ChangeReport report = find_changes(values, {0.05, kValues});
   EXPECT_THAT(report.changes, IsEmpty());
   EXPECT_THAT(report.outliers, ElementsAre(100, 150, 151));
 }
 
 TEST(Changes, SmallerThanWhatCountsIsNone) {
-  std::vector<double> values(kFrames, 1.0);
-  for (std::size_t k = 100; k < kFrames; ++k) values[k] = 1.04;
-  EXPECT_THAT(find_changes(values, {0.05, kFrames}).changes, IsEmpty());
-  EXPECT_THAT(find_changes(values, {0.03, kFrames}).changes, SizeIs(1));
+  std::vector<double> values(kValues, 1.0);
+  for (std::size_t k = 100; k < kValues; ++k) values[k] = 1.04;
+  EXPECT_THAT(find_changes(values, {0.05, kValues}).changes, IsEmpty());
+  EXPECT_THAT(find_changes(values, {0.03, kValues}).changes, SizeIs(1));
 }
 
 /// A step of `size` in the frames from `first` to before `end`.
@@ -89,7 +89,7 @@ TEST(Changes, AShortOneEndsWhereItEnds) {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     for (std::size_t frames = 3; frames <= 12; ++frames) {
       const ChangeReport report =
-          find_changes(with_step(30, 30 + frames, 0.3, seed), {0.05, 20 * kFrames});
+          find_changes(with_step(30, 30 + frames, 0.3, seed), {0.05, 20 * kValues});
       ASSERT_THAT(places(report), ElementsAre(30, 30 + frames)) << seed;
       EXPECT_THAT(report.outliers, IsEmpty());
       EXPECT_NEAR(report.changes[1].before, 1.3, 0.06);
@@ -106,14 +106,14 @@ TEST(Changes, ALampThatBlinksIsSaidEachTime) {
     if ((k / 3) % 2 != 0) continue;
     for (std::size_t i = k; i < k + 3; ++i) values[i] += 0.3;
   }
-  EXPECT_EQ(places(find_changes(values, {0.05, 20 * kFrames})), expected);
+  EXPECT_EQ(places(find_changes(values, {0.05, 20 * kValues})), expected);
 }
 
 TEST(Changes, AStepThatIsHardlySeenHasNoReturn) {
   for (std::uint64_t seed = 1; seed <= 200; ++seed) {
     for (const double size : {0.12, 0.14, 0.16}) {  // 6 to 8 deviations; 5.3 are out
       const ChangeReport report =
-          find_changes(with_step(100, kFrames, size, seed), {0.05, 20 * kFrames});
+          find_changes(with_step(100, kValues, size, seed), {0.05, 20 * kValues});
       EXPECT_LE(report.changes.size(), 1U) << seed;
     }
   }
@@ -123,7 +123,7 @@ TEST(Changes, OneInTheFirstFramesIsFoundWhereItIs) {
   for (std::uint64_t seed = 1; seed <= 50; ++seed) {
     for (std::size_t at = 3; at <= 20; ++at) {
       const ChangeReport report =
-          find_changes(with_step(at, kFrames, 0.3, seed), {0.05, 20 * kFrames});
+          find_changes(with_step(at, kValues, 0.3, seed), {0.05, 20 * kValues});
       ASSERT_THAT(places(report), ElementsAre(at)) << seed;
       EXPECT_NEAR(report.changes[0].before, 1, 0.06);
       EXPECT_NEAR(report.changes[0].after, 1.3, 0.06);
@@ -131,7 +131,7 @@ TEST(Changes, OneInTheFirstFramesIsFoundWhereItIs) {
     }
   }
   // It returns within the first frames.
-  EXPECT_THAT(places(find_changes(with_step(4, 8, 0.3, 1), {0.05, 20 * kFrames})),
+  EXPECT_THAT(places(find_changes(with_step(4, 8, 0.3, 1), {0.05, 20 * kValues})),
               ElementsAre(4, 8));
 }
 
