@@ -107,8 +107,10 @@ class ProgressDisplay {
     prepare_last_line((terminal_ ? "\r\033[K" : "") + std::string("pencilscan: interrupted at ") +
                       std::string(what) + if_interrupted_ + "\n");
     const Clock::duration interval = terminal_ ? Clock::duration(kBarInterval) : kLineInterval;
-    if (!is_new && now - shown_ < interval && !(terminal_ && share >= 1)) return;
+    const bool is_end = share >= 1 && (terminal_ || shown_share_ < 1);
+    if (!is_new && now - shown_ < interval && !is_end) return;
     shown_ = now;
+    shown_share_ = share;
     show(line, share);
   }
 
@@ -150,6 +152,7 @@ class ProgressDisplay {
   std::string if_interrupted_;
   bool terminal_ = ::isatty(STDERR_FILENO) == 1;
   Clock::time_point shown_ = Clock::now();
+  double shown_share_ = 0;
   std::string stage_;
   Clock::time_point begin_ = Clock::now();
   Clock::time_point told_ = Clock::now();

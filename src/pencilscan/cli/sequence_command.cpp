@@ -33,6 +33,7 @@ void print_packed(const CommonOptions& common, const PackReport& report, const s
   figures["pictures"] = report.pictures;
   figures["pictures_missing"] = report.missing;
   figures["out"] = out;
+  for (const std::string& warning : report.warnings) warn_of(warning);
   print_figures(common, figures);
 }
 
@@ -126,6 +127,7 @@ Json camera_figures(const RecordedCamera& camera, const CameraClock& clock) {
                       std::to_string(camera.bit_depth) + " bit";
   if (camera.exposure_us > 0) figures["exposure_us"] = camera.exposure_us;
   figures["missing"] = clock.dropped.size();
+  if (!clock.left_out.empty()) figures["left_out"] = clock.left_out.size();
   if (!clock.timed) return figures;
   figures["late"] = clock.late.size();
   figures["clock_shift_ms"] = clock.shift_ns / 1e6;
@@ -150,6 +152,7 @@ void say_what_is_wrong(const Recording& recording, const FrameSets& sets) {
     if (!clock.shared)
       warn_of(who + ": its clock counts from another moment; it was shifted onto the others'");
   }
+  for (const std::string& warning : left_out_warnings(recording, sets)) warn_of(warning);
   for (const auto& [before, count] : sets.gaps)
     warn_of("before frame " + six_digits(before) + " " + std::to_string(count) +
             " moments are missing in all cameras");

@@ -82,6 +82,7 @@ void report_sequence(const CommonOptions& common, const fs::path& out) {
   const SequenceSummary summary = summarize_sequence(out);
   write_summary(out, summary);
   say_holes(summary);
+  warn_of(strays_warning(out, read_run_inputs(out).frames));
   for (const SequenceEvent& event : summary.watch.events)
     warn_of("from frame " + event.frame + ": " + event.text);
   print_figures(common, summary_figures(out, summary));
@@ -271,8 +272,9 @@ void run_finish(const FinishCommand& command) {
                      "must hold the job.json that sequence submit writes");
   Job job = read_job(command.out);
   move_job(job, command.out);
-  const std::vector<std::size_t> tasks =
-      tasks_with_holes(summarize_sequence(command.out), job.tasks);
+  const SequenceSummary summary = summarize_sequence(command.out);
+  warn_of(not_run_again(summary));
+  const std::vector<std::size_t> tasks = tasks_with_holes(summary, job.tasks);
   if (tasks.empty()) return report_sequence(command.common, command.out);
   if (job.kind == JobKind::kSlurm) return hand_to_slurm(command.common, job, tasks, command.rounds);
   if (command.rounds > 0)

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -30,6 +31,10 @@ struct SequenceSummary {
 
 /// `out`/sequence.csv: one row a frame; `out`/sequence.json: the same with holes and events.
 void write_summary(const std::filesystem::path& out, const SequenceSummary& summary);
+
+/// Says of which frames the pictures are at fault, so that running them again as they were helps
+/// nothing, and what to do where they were repaired since.
+[[nodiscard]] std::optional<std::string> not_run_again(const SequenceSummary& summary);
 
 /// The tasks of `tasks` (task i does shard i/tasks) that hold a hole which may be filled.
 [[nodiscard]] std::vector<std::size_t> tasks_with_holes(const SequenceSummary& summary,

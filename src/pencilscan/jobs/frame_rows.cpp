@@ -9,6 +9,7 @@
 #include "pencilscan/core/median.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/io/file.h"
+#include "pencilscan/refinement/crossing_tracks.h"
 #include "pencilscan/report/labelled_share.h"
 
 namespace pencilscan {
@@ -31,6 +32,14 @@ const json& named_entry(const json& object, const char* list, const std::string&
     if (entry.is_object() && entry.value("name", "") == name) return entry;
   }
   return none;
+}
+
+/// The median disagreement of a device's crossings; unknown where they are too few.
+double device_crossing(const json& crossings, const std::string& name) {
+  const json& entry = named_entry(crossings, "devices", name);
+  CrossingDisagreement of_device;
+  of_device.crossings = entry.value("crossings", std::size_t{0});
+  return are_enough(of_device) ? figure(entry, "median_px") : kUnknownFigure;
 }
 
 double share(double part, double whole) { return whole > 0 ? part / whole : kUnknownFigure; }
@@ -81,12 +90,12 @@ void read_report(const json& report, const SequenceDevices& devices, FrameRow& r
     }
     const double pixels = figure(entry, "saturated_pixels");
     if (std::isfinite(pixels)) saturated += pixels;
-    row.device_crossing_px.push_back(figure(named_entry(crossings, "devices", name), "median_px"));
+    row.device_crossing_px.push_back(device_crossing(crossings, name));
   }
   const json by_projector = report.value("points_by_projector", json::object());
   for (const std::string& name : devices.projectors) {
     row.projector_points.push_back(figure(by_projector, name.c_str()));
-    row.device_crossing_px.push_back(figure(named_entry(crossings, "devices", name), "median_px"));
+    row.device_crossing_px.push_back(device_crossing(crossings, name));
   }
   row.labelled_share = labelled_share(report).value_or(kUnknownFigure);
   row.saturated_pixels = saturated;

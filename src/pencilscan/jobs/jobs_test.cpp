@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <fstream>
 #include <functional>
 #include <nlohmann/json.hpp>
@@ -19,6 +20,7 @@ namespace pencilscan {
 namespace {
 
 namespace fs = std::filesystem;
+using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
@@ -220,7 +222,10 @@ class Finish : public Jobs {
                    "saturated_pixels": 3, "time_offset_us": -12.5, "late": true},
                   {"name": "cam1", "curve_points": 0, "labelled_curve_points": 0}],
       "crossing_disagreement": {"median_px": 0.1, "expected_px": 0.09,
-        "devices": [{"name": "cam0", "median_px": 0.11}]},
+        "devices": [{"name": "cam0", "crossings": 30, "median_px": 0.11},
+                    {"name": "cam1", "crossings": 0, "median_px": 0.0},
+                    {"name": "proj0", "crossings": 29, "median_px": 0.4},
+                    {"name": "proj1", "crossings": 29, "median_px": null}]},
       "surface": {"vertices": 10, "measured_share": 0.8}, "warnings": ["one, two"]})",
                Durability::kProcess);
     folder.publish();
@@ -241,8 +246,12 @@ TEST_F(Finish, HolesHaveTheirReasonsAndTheirTasks) {
   EXPECT_EQ(summary.holes[2].reason, "was not made");
   EXPECT_EQ(summary.holes[3].state, "other");
   EXPECT_THAT(tasks_with_holes(summary, 3), ElementsAre(0, 1, 2));
+  EXPECT_THAT(not_run_again(summary).value(),
+              AllOf(HasSubstr("not run again: f1007;"), HasSubstr("with --overwrite")));
   summary.holes.erase(summary.holes.begin() + 1);
   EXPECT_THAT(tasks_with_holes(summary, 3), ElementsAre(1, 2));
+  summary.holes.erase(summary.holes.begin());
+  EXPECT_FALSE(not_run_again(summary));
   Job job = job_of("", 3);
   write_job(job);
   write_text(task_log(job.out, 1), "first\nslurmstepd: error: out of memory\n");
@@ -265,6 +274,21 @@ TEST_F(Finish, TheTableHasARowAFrame) {
   EXPECT_EQ(json["table"][0]["cam0.crossing_px"], 0.11);
   EXPECT_EQ(json["table"][0]["late"][0], "cam0");
   EXPECT_EQ(json["holes"][2]["frame"], "f1060");
+}
+
+// Earlier results have a median of 0 px where there is no crossing.
+TEST_F(Finish, FewCrossingsSayNothingOfADevice) {
+  const std::vector<double> px = summarize_sequence(out()).rows[0].device_crossing_px;
+  EXPECT_EQ(px[0], 0.11);
+  for (const std::size_t d : {1U, 2U, 3U}) EXPECT_TRUE(std::isnan(px[d])) << d;
+}
+
+TEST_F(Finish, ResultsOfFramesThatTheInputHasNotAreNamed) {
+  EXPECT_FALSE(strays_warning(out(), inputs_.frames));
+  fs::create_directories(out() / "notes");
+  const std::vector<std::string> fewer(inputs_.frames.begin(), inputs_.frames.end() - 2);
+  EXPECT_THAT(strays_warning(out(), fewer).value(),
+              AllOf(HasSubstr(": f1118, f1119;"), HasSubstr("remove their folders")));
 }
 
 TEST_F(Finish, ABrokenReportIsSaidAndOtherFoldersAreRefused) {

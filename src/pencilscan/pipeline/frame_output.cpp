@@ -35,14 +35,18 @@ double level_of(const Camera& camera, const cv::Mat& stored) {
   return sum / image.channels();
 }
 
-/// How far the crossings of each device miss each other.
+/// How far the crossings of each device miss each other; null where they are too few to tell.
 ordered_json device_reports(const Rig& rig, const std::vector<CrossingDisagreement>& devices) {
   ordered_json reports = ordered_json::array();
   for (std::size_t d = 0; d < devices.size(); ++d) {
     reports.push_back({{"name", device_at(rig, d).name},
                        {"crossings", devices[d].crossings},
-                       {"median_px", number(devices[d].median_px)},
-                       {"expected_px", number(devices[d].expected_px)}});
+                       {"median_px", nullptr},
+                       {"expected_px", nullptr}});
+    if (are_enough(devices[d])) {
+      reports.back()["median_px"] = number(devices[d].median_px);
+      reports.back()["expected_px"] = number(devices[d].expected_px);
+    }
     if (const auto& shift = devices[d].shift_px)
       reports.back()["shift_px"] = {number(shift->x()), number(shift->y())};
   }

@@ -27,6 +27,8 @@ class FrameSource {
   [[nodiscard]] const std::vector<std::string>& names() const { return names_; }
   /// Cameras, by name, that have pictures here and are not of the rig; sorted.
   [[nodiscard]] const std::vector<std::string>& strangers() const { return strangers_; }
+  /// Pictures of a recording that are in no frame: a sentence a camera.
+  [[nodiscard]] const std::vector<std::string>& left_out() const { return left_out_; }
   /// False of a recording that was cut off, or goes on: frames may lack at its end.
   [[nodiscard]] bool is_closed() const { return closed_; }
   /// The pictures of a frame. InputError for a broken one or, of image folders, one of another size
@@ -53,6 +55,7 @@ class FrameSource {
   std::shared_ptr<const Storage> storage_;
   std::vector<std::string> names_;
   std::vector<std::string> strangers_;
+  std::vector<std::string> left_out_;
   bool closed_ = true;
   std::shared_ptr<const FrameSource> plain_;
   std::vector<std::size_t> plain_of_;  ///< frame of plain_

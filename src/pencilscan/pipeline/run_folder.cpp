@@ -5,11 +5,13 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cerrno>
 #include <cstring>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <utility>
 
 #include "pencilscan/core/error.h"
@@ -230,6 +232,28 @@ void check_replaceable(const fs::path& out, const std::string& frame) {
   if (FolderImages(out / frame).stems().empty()) return;
   throw InputError("--out", "", out.string(),
                    "holds pictures in " + frame + ", which no result does: they are not replaced");
+}
+
+std::optional<std::string> strays_warning(const fs::path& out,
+                                          const std::vector<std::string>& frames) {
+  constexpr std::size_t kShown = 8;
+  const std::set<std::string> known(frames.begin(), frames.end());
+  std::vector<std::string> strays;
+  std::error_code ignored;
+  for (const auto& entry : fs::directory_iterator(out)) {
+    const std::string name = entry.path().filename().string();
+    if (!name.starts_with('.') && !known.contains(name) &&
+        fs::exists(entry.path() / kFrameInputFile, ignored))
+      strays.push_back(name);
+  }
+  if (strays.empty()) return std::nullopt;
+  std::sort(strays.begin(), strays.end());
+  std::string names;
+  for (std::size_t i = 0; i < std::min(strays.size(), kShown); ++i)
+    names += (i == 0 ? "" : ", ") + strays[i];
+  if (strays.size() > kShown) names += " and " + std::to_string(strays.size() - kShown) + " more";
+  return out.string() + " holds results of frames that the input does not have: " + names +
+         "; report takes them in, so remove their folders or name a new output folder";
 }
 
 void remove_abandoned(const fs::path& out) {

@@ -87,6 +87,10 @@ void write_failure(const std::filesystem::path& out, const std::string& frame,
 /// themselves, when `out` is their folder.
 void check_replaceable(const std::filesystem::path& out, const std::string& frame);
 
+/// Warns of results in `out` of frames that are none of `frames`: an earlier input had more.
+[[nodiscard]] std::optional<std::string> strays_warning(const std::filesystem::path& out,
+                                                        const std::vector<std::string>& frames);
+
 /// Removes what programs left behind that were killed while making a frame; not what one is making
 /// now.
 void remove_abandoned(const std::filesystem::path& out);

@@ -326,6 +326,9 @@ SequenceOutcome reconstruct_sequence(const fs::path& rig_path, const fs::path& f
   result.warnings = repetitions(rig, frames, own, images);
   if (auto warning = strangers_warning(frames)) result.warnings.push_back(std::move(*warning));
   if (auto warning = open_recording_warning(frames)) result.warnings.push_back(std::move(*warning));
+  for (const std::string& warning : frames.left_out()) result.warnings.push_back(warning);
+  if (auto warning = strays_warning(out, inputs.frames))
+    result.warnings.push_back(std::move(*warning));
   if (options.output.refine_rig)
     rig = refined_rig(rig, frames, out, options, progress, result.refinement.emplace());
   // The rig in use, so that the output can be looked at without its input.
