@@ -156,8 +156,8 @@ void Tester::judge_flicker(std::size_t projector, ProjectorTiming& timing,
   const double period = 1000 / refresh(projector);
   faults.push_back(
       {"flicker", screen_.projectors()[projector].name,
-       "its white changes by " + formatted(100 * timing.flicker, "%.2g %%") +
-           " from picture to picture in " + cameras_.group().name(worst),
+       "its white changes by " + percent_text(timing.flicker) + " from picture to picture in " +
+           cameras_.group().name(worst),
        "set exposures to a whole multiple of its period: " + formatted(period, "%.2f, ") +
            formatted(2 * period, "%.2f or ") + formatted(3 * period, "%.2f ms")});
 }
@@ -335,14 +335,14 @@ void judge_exposures(const LiveCameras& cameras, const ProjectorScreen& screen,
       report.faults.push_back({"blind", group.name(c), "sees no projector's light",
                                "lens cap? exposure long enough? does it look at the object?"});
     else if (saturated > 0.01)
-      report.faults.push_back({"saturated", group.name(c),
-                               formatted(100 * saturated, "%.2g %%") +
-                                   " of what one projector lights is at the end of its range",
-                               "half the exposure, close the iris, or less gain"});
+      report.faults.push_back(
+          {"saturated", group.name(c),
+           percent_text(saturated) + " of what one projector lights is at the end of its range",
+           "half the exposure, close the iris, or less gain"});
     else if (brightest < 0.2)
       report.faults.push_back(
           {"dim", group.name(c),
-           "the brightest white is " + formatted(100 * brightest, "%.2g %%") + " of its range",
+           "the brightest white is " + percent_text(brightest) + " of its range",
            "longer exposure, open the iris, or more gain"});
   }
 }

@@ -18,6 +18,7 @@
 
 #include "pencilscan/core/cancellation.h"
 #include "pencilscan/core/error.h"
+#include "pencilscan/core/formatted.h"
 #include "pencilscan/core/lanes.h"
 #include "pencilscan/core/memory.h"
 #include "pencilscan/core/parallel.h"
@@ -25,6 +26,13 @@
 
 namespace pencilscan {
 namespace {
+
+TEST(Formatted, PercentagesAreWholeNumbersFromTenUp) {
+  const std::vector<std::pair<double, std::string>> texts{
+      {1, "100 %"},      {0.997, "100 %"},   {0.384, "38 %"},   {0.0996, "10 %"},
+      {0.0424, "4.2 %"}, {0.0004, "0.04 %"}, {-0.384, "-38 %"}, {0, "0 %"}};
+  for (const auto& [share, text] : texts) EXPECT_EQ(percent_text(share), text);
+}
 
 TEST(ParallelFor, VisitsEveryIndexOnceForAnyThreadCount) {
   for (const int threads : {1, 2, 4}) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstdio>
 #include <string>
 
@@ -11,6 +12,11 @@ namespace pencilscan {
   std::array<char, 48> text{};
   std::snprintf(text.data(), text.size(), format, value);
   return text.data();
+}
+
+/// A share as "0.42 %", "4.2 %" or "38 %": two digits below 10, whole numbers from there on.
+[[nodiscard]] inline std::string percent_text(double share) {
+  return formatted(100 * share, std::abs(100 * share) < 9.95 ? "%.2g %%" : "%.0f %%");
 }
 
 }  // namespace pencilscan

@@ -39,7 +39,7 @@ std::optional<ShownDifference> compare_shown(const cv::Mat& shown, const cv::Mat
   constexpr double kWhole = 0.98;
   result.kind = of_panel < kWhole ? "covered" : "other";
   result.sentence =
-      formatted(100 * result.share, "%.2g %%") + " of its pixels are not what was drawn" +
+      percent_text(result.share) + " of its pixels are not what was drawn" +
       (of_panel < kWhole ? ", all within columns " + std::to_string(result.where.x) + " to " +
                                std::to_string(result.where.x + result.where.width - 1) + ", rows " +
                                std::to_string(result.where.y) + " to " +
