@@ -1,12 +1,16 @@
 #include "pencilscan/capture/camera_group.h"
 
+#include <algorithm>
 #include <condition_variable>
 #include <deque>
+#include <exception>
 #include <future>
 #include <mutex>
 #include <thread>
 
 #include "pencilscan/core/check.h"
+#include "pencilscan/core/error.h"
+#include "pencilscan/core/formatted.h"
 
 namespace pencilscan {
 namespace {
@@ -16,6 +20,8 @@ namespace {
 constexpr Seconds kTurn{0.002};
 /// The same where nothing is triggered by us.
 constexpr Seconds kLongTurn{0.05};
+/// How long one is waited for that did not answer before.
+constexpr double kShortAnswer = 1;
 
 }  // namespace
 
@@ -29,13 +35,20 @@ struct CameraGroup::Member {
   std::deque<std::packaged_task<void()>> calls;
   bool delivering = false;  ///< touched by the camera's thread alone
   bool ending = false;
+  bool ended = false;  ///< the thread touches nothing any more
+  std::condition_variable end;
+  Sink sink;
   std::string trouble;
   std::string dead;
+  std::string silent;  ///< set while it does not answer
   std::thread thread;
 
-  void run(const Sink& sink, std::size_t index);
-  /// Runs on the camera's thread, and waits; what it throws is thrown here.
-  void call(std::function<void()> body);
+  void run(std::size_t index);
+  /// Runs on the camera's thread, and waits; what it throws is thrown here. False when it does not
+  /// answer in time: `body` may run later, and owns what it uses.
+  [[nodiscard]] bool call(std::function<void()> body, double longest_s);
+  /// Waits until the thread is at its end; false when it does not come to it.
+  [[nodiscard]] bool has_ended(double longest_s);
   /// Runs on the camera's thread, some time soon.
   void post(std::function<void()> body);
   void note(std::string& where, const std::string& text) {
@@ -52,18 +65,31 @@ void CameraGroup::Member::post(std::function<void()> body) {
   changed.notify_one();
 }
 
-void CameraGroup::Member::call(std::function<void()> body) {
+bool CameraGroup::Member::call(std::function<void()> body, double longest_s) {
   std::packaged_task<void()> task(std::move(body));
   auto done = task.get_future();
   {
     const std::lock_guard lock(mutex);
+    if (!silent.empty()) longest_s = std::min(longest_s, kShortAnswer);
     calls.push_back(std::move(task));
   }
   changed.notify_one();
+  if (done.wait_for(Seconds(longest_s)) != std::future_status::ready) {
+    const std::lock_guard lock(mutex);
+    if (silent.empty()) silent = "it did not answer for " + formatted(longest_s) + " s";
+    return false;
+  }
   done.get();
+  return true;
 }
 
-void CameraGroup::Member::run(const Sink& sink, std::size_t index) {
+bool CameraGroup::Member::has_ended(double longest_s) {
+  std::unique_lock lock(mutex);
+  if (!silent.empty()) longest_s = std::min(longest_s, kShortAnswer);
+  return end.wait_for(lock, Seconds(longest_s), [&] { return ended; });
+}
+
+void CameraGroup::Member::run(std::size_t index) {
   std::unique_lock lock(mutex);
   while (!ending) {
     if (!calls.empty()) {
@@ -72,6 +98,7 @@ void CameraGroup::Member::run(const Sink& sink, std::size_t index) {
       lock.unlock();
       next();
       lock.lock();
+      silent.clear();
       continue;
     }
     if (!delivering) {
@@ -85,7 +112,11 @@ void CameraGroup::Member::run(const Sink& sink, std::size_t index) {
     try {
       frame = device->next(turn);
       lost = device->trouble();
-      if (frame && sink) sink(index, std::move(*frame));
+      lock.lock();
+      // Whoever gave up waiting for this camera has taken the sink away.
+      const Sink deliver = sink;
+      lock.unlock();
+      if (frame && deliver) deliver(index, std::move(*frame));
     } catch (const std::exception& error) {
       lost = error.what();
     }
@@ -94,29 +125,39 @@ void CameraGroup::Member::run(const Sink& sink, std::size_t index) {
     // A camera that is gone answers at once: no reason to ask all the time.
     if (!lost.empty()) changed.wait_for(lock, kLongTurn, [&] { return ending || !calls.empty(); });
   }
+  ended = true;
+  end.notify_all();
 }
 
-CameraGroup::CameraGroup(std::vector<NamedCamera> cameras) {
+CameraGroup::CameraGroup(std::vector<NamedCamera> cameras, double longest_answer_s)
+    : longest_answer_s_(longest_answer_s) {
   for (NamedCamera& camera : cameras) {
-    auto member = std::make_unique<Member>();
+    auto member = std::make_shared<Member>();
     member->name = std::move(camera.name);
     member->device = std::move(camera.device);
     members_.push_back(std::move(member));
   }
   for (std::size_t c = 0; c < members_.size(); ++c)
-    members_[c]->thread = std::thread([this, c] { members_[c]->run(sink_, c); });
+    members_[c]->thread = std::thread([member = members_[c], c] { member->run(c); });
 }
 
 CameraGroup::~CameraGroup() {
   for (auto& member : members_) {
     const std::lock_guard lock(member->mutex);
     member->ending = true;
+    member->sink = nullptr;
     member->changed.notify_one();
   }
-  for (auto& member : members_) member->thread.join();
   // Settings are put back by all cameras at once: some take their time.
   std::vector<std::thread> closing;
-  for (auto& member : members_) closing.emplace_back([&member] { member->device.reset(); });
+  for (auto& member : members_) {
+    if (member->has_ended(longest_answer_s_)) {
+      member->thread.join();
+      closing.emplace_back([&member] { member->device.reset(); });
+    } else {
+      member->thread.detach();
+    }
+  }
   for (std::thread& thread : closing) thread.join();
 }
 
@@ -133,22 +174,31 @@ bool CameraGroup::running() const { return running_; }
 
 void CameraGroup::configure(std::size_t camera, const CameraSettings& settings) {
   Member& member = *members_[camera];
-  member.call([&] {
+  const auto body = [&member, settings] {
     if (member.delivering) member.device->stop();
-    const CameraSettings made = member.device->configure(settings);
-    {
+    std::exception_ptr refusal;
+    try {
+      const CameraSettings made = member.device->configure(settings);
       const std::lock_guard lock(member.mutex);
       member.settings = made;
+    } catch (...) {
+      refusal = std::current_exception();
     }
     if (member.delivering) member.device->start();
-  });
+    if (refusal) std::rethrow_exception(refusal);
+  };
+  if (!member.call(body, longest_answer_s_))
+    throw StageError(member.name + ": the camera does not answer to its settings");
 }
 
 void CameraGroup::start(Sink sink) {
   PENCILSCAN_CHECK(!running_);
   running_ = true;
-  sink_ = std::move(sink);
   for (auto& member : members_) {
+    {
+      const std::lock_guard lock(member->mutex);
+      member->sink = sink;
+    }
     member->post([&m = *member] {
       try {
         m.device->start();
@@ -159,7 +209,7 @@ void CameraGroup::start(Sink sink) {
       }
     });
   }
-  for (auto& member : members_) member->call([] {});
+  for (auto& member : members_) static_cast<void>(member->call([] {}, longest_answer_s_));
 }
 
 void CameraGroup::stop() {
@@ -175,8 +225,11 @@ void CameraGroup::stop() {
       }
     });
   }
-  for (auto& member : members_) member->call([] {});
-  sink_ = nullptr;
+  for (auto& member : members_) static_cast<void>(member->call([] {}, longest_answer_s_));
+  for (auto& member : members_) {
+    const std::lock_guard lock(member->mutex);
+    member->sink = nullptr;
+  }
 }
 
 void CameraGroup::trigger() {
@@ -195,8 +248,9 @@ std::vector<Fault> CameraGroup::faults() const {
   std::vector<Fault> faults;
   for (const auto& member : members_) {
     const std::lock_guard lock(member->mutex);
-    if (!member->dead.empty())
-      faults.push_back({"dead", member->name, member->dead,
+    const std::string& dead = member->silent.empty() ? member->dead : member->silent;
+    if (!dead.empty())
+      faults.push_back({"dead", member->name, dead,
                         "check its power and its cable; other programs that hold it"});
     else if (!member->trouble.empty())
       faults.push_back({"trouble", member->name, member->trouble, ""});

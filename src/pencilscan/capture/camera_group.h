@@ -20,8 +20,13 @@ struct NamedCamera {
 /// run.
 class CameraGroup {
  public:
-  explicit CameraGroup(std::vector<NamedCamera> cameras);
-  /// Stops, and closes the cameras: their settings are put back.
+  /// How long a camera may take to answer, s: longer than the half minute that a command camera may
+  /// take for one picture.
+  static constexpr double kLongestAnswer = 40;
+
+  explicit CameraGroup(std::vector<NamedCamera> cameras, double longest_answer_s = kLongestAnswer);
+  /// Stops, and closes the cameras: their settings are put back. One that does not answer is left
+  /// as it is.
   ~CameraGroup();
   CameraGroup(const CameraGroup&) = delete;
   CameraGroup& operator=(const CameraGroup&) = delete;
@@ -31,8 +36,8 @@ class CameraGroup {
   [[nodiscard]] const CameraInfo& info(std::size_t camera) const;
   /// What configure() made of the settings.
   [[nodiscard]] CameraSettings settings(std::size_t camera) const;
-  /// Stops this camera for it where it runs, and starts it again. InputError as of
-  /// CameraDevice::configure().
+  /// Stops this camera for it where it runs, and starts it again, also where it refuses. InputError
+  /// as of CameraDevice::configure(); StageError when it does not answer in time.
   void configure(std::size_t camera, const CameraSettings& settings);
 
   /// Called from the camera's own thread with every picture, whole or not.
@@ -43,13 +48,15 @@ class CameraGroup {
   /// Asks all cameras for a picture now (software trigger), each from its own thread.
   void trigger();
 
-  /// Cameras that cannot be reached ("dead"), that fail to start or to be triggered ("trouble").
+  /// Cameras that cannot be reached, or do not answer in time ("dead"), that fail to start or to be
+  /// triggered ("trouble").
   [[nodiscard]] std::vector<Fault> faults() const;
 
  private:
   struct Member;
-  std::vector<std::unique_ptr<Member>> members_;
-  Sink sink_;
+  /// Shared with the camera's thread: one that does not answer outlives the group.
+  std::vector<std::shared_ptr<Member>> members_;
+  double longest_answer_s_;
   bool running_ = false;
 };
 

@@ -1,9 +1,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <fstream>
+#include <future>
+#include <memory>
 #include <thread>
 
+#include "pencilscan/capture/camera_group.h"
 #include "pencilscan/capture/file_cameras.h"
 #include "pencilscan/capture/sensor_pixels.h"
 #include "pencilscan/core/error.h"
@@ -50,6 +54,72 @@ CameraSettings small_picture() {
   settings.width = 8;
   settings.height = 6;
   return settings;
+}
+
+/// A camera that hangs in configure() until it is let go, or refuses.
+class StubbornCamera final : public CameraDevice {
+ public:
+  struct State {
+    std::promise<void> let_go;
+    std::atomic<bool> hangs = false;
+    std::atomic<bool> refuses = false;
+    std::atomic<bool> runs = false;
+    std::promise<void> closed;
+  };
+  explicit StubbornCamera(std::shared_ptr<State> state) : state_(std::move(state)) {}
+  ~StubbornCamera() override { state_->closed.set_value(); }
+  const CameraInfo& info() const override { return info_; }
+  CameraSettings configure(const CameraSettings& settings) override {
+    if (state_->hangs) state_->let_go.get_future().wait();
+    if (state_->refuses) throw InputError("camera", "gain", "", "must be less");
+    return settings;
+  }
+  void start() override { state_->runs = true; }
+  void stop() override { state_->runs = false; }
+  void trigger() override {}
+  std::optional<CameraFrame> next(Seconds patience) override {
+    std::this_thread::sleep_for(patience);
+    return std::nullopt;
+  }
+
+ private:
+  std::shared_ptr<State> state_;
+  CameraInfo info_;
+};
+
+std::vector<NamedCamera> stubborn(const std::shared_ptr<StubbornCamera::State>& state) {
+  std::vector<NamedCamera> cameras;
+  cameras.push_back({"cam0", std::make_unique<StubbornCamera>(state)});
+  return cameras;
+}
+
+TEST(CameraGroup, ACameraThatDoesNotAnswerIsNamedAndLeft) {
+  const auto state = std::make_shared<StubbornCamera::State>();
+  {
+    CameraGroup group(stubborn(state), 0.2);
+    group.configure(0, {});
+    group.start([](std::size_t, const CameraFrame&) {});
+    EXPECT_TRUE(group.faults().empty());
+    state->hangs = true;
+    EXPECT_THROW(group.configure(0, {}), StageError);
+    ASSERT_EQ(group.faults().size(), 1U);
+    EXPECT_EQ(group.faults()[0].kind, "dead");
+    EXPECT_EQ(to_string(group.faults()[0]), "cam0: it did not answer for 0.2 s");
+    group.stop();
+  }
+  auto closed = state->closed.get_future();
+  EXPECT_EQ(closed.wait_for(Seconds(0)), std::future_status::timeout);  // it still hangs
+  state->let_go.set_value();
+  EXPECT_EQ(closed.wait_for(Seconds(10)), std::future_status::ready);
+}
+
+TEST(CameraGroup, ACameraThatRefusesGoesOn) {
+  const auto state = std::make_shared<StubbornCamera::State>();
+  CameraGroup group(stubborn(state));
+  group.start([](std::size_t, const CameraFrame&) {});
+  state->refuses = true;
+  EXPECT_THROW(group.configure(0, {}), InputError);
+  EXPECT_TRUE(state->runs);
 }
 
 TEST(FolderCamera, GivesNewPicturesOnceWholeInOrder) {
