@@ -12,6 +12,7 @@
 #include "pencilscan/capture/aravis_features.h"
 #include "pencilscan/capture/sensor_pixels.h"
 #include "pencilscan/core/error.h"
+#include "pencilscan/core/formatted.h"
 #include "pencilscan/core/host_clock.h"
 
 namespace pencilscan {
@@ -140,6 +141,15 @@ void AravisCamera::set_picture(const CameraSettings& settings, CameraSettings& r
 void AravisCamera::set_exposure(const CameraSettings& settings, CameraSettings& result) {
   Failure failure;
   if (settings.exposure_us) {
+    double least = 0;
+    double most = 0;
+    arv_camera_get_exposure_time_bounds(camera_.get(), &least, &most, failure.out());
+    // Aravis itself sends what is out of them, cut to the register's bits.
+    if (!failure.failed() && least < most &&
+        (*settings.exposure_us < least || *settings.exposure_us > most))
+      refuse("exposure", formatted(*settings.exposure_us, "%.0f us"),
+             "must be " + formatted(least, "%.0f") + " to " + formatted(most, "%.0f us") +
+                 ", which the camera can");
     arv_camera_set_exposure_time(camera_.get(), *settings.exposure_us, failure.out());
     if (failure.failed())
       refuse("exposure", std::to_string(*settings.exposure_us) + " us", failure.text());

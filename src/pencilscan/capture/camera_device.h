@@ -50,6 +50,10 @@ enum class Trigger {
 [[nodiscard]] std::optional<Trigger> trigger_from_text(const std::string& text);
 [[nodiscard]] std::string to_string(Trigger trigger);
 
+/// Exposures above are a slip: projectors are seen in a fiftieth of a second, and whoever looks at
+/// the page waits for the picture.
+inline constexpr double kLongestExposureMs = 10'000;
+
 /// What is asked of a camera; what is not stated stays as it is.
 struct CameraSettings {
   int width = 0;   ///< px; 0: as it is

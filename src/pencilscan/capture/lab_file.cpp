@@ -7,6 +7,7 @@
 #include "pencilscan/capture/file_cameras.h"
 #include "pencilscan/capture/v4l2_camera.h"
 #include "pencilscan/core/error.h"
+#include "pencilscan/core/formatted.h"
 #include "pencilscan/io/file.h"
 #include "pencilscan/rig/json_field.h"
 
@@ -49,7 +50,11 @@ LabCamera parse_camera(const JsonField& field, const fs::path& base) {
       camera.device = kFolderDevice + (base / *folder).string();
     }
   }
-  if (field.has("exposure_ms")) camera.exposure_ms = field.at("exposure_ms").positive();
+  if (field.has("exposure_ms")) {
+    camera.exposure_ms = field.at("exposure_ms").positive();
+    if (*camera.exposure_ms > kLongestExposureMs)
+      field.at("exposure_ms").fail("must be at most " + formatted(kLongestExposureMs, "%.0f"));
+  }
   if (field.has("gain")) camera.gain = field.at("gain").number();
   if (field.has("pixel_format")) camera.pixel_format = field.at("pixel_format").text();
   return camera;

@@ -60,6 +60,9 @@ TEST_F(LabFile, MistakesAreNamed) {
   bad["rate_hz"] = 0;
   EXPECT_THAT(complaint(bad), HasSubstr("rate_hz"));
   bad = good;
+  bad["cameras"]["cam0"]["exposure_ms"] = 100000000.0;
+  EXPECT_THAT(complaint(bad), HasSubstr("cameras.cam0.exposure_ms = 100000000.0: must be at most"));
+  bad = good;
   bad["colour"] = 1;
   EXPECT_THAT(complaint(bad), HasSubstr("colour = 1: unknown key"));
 }
