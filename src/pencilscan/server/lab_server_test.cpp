@@ -59,6 +59,7 @@ TEST_F(LabPage, ShowsThePageItsStatusAndPictures) {
   ASSERT_TRUE(page);
   EXPECT_EQ(page->status, 200);
   EXPECT_THAT(page->body, HasSubstr("<title>Laboratory"));
+  EXPECT_THAT(page->body, HasSubstr("rel=\"icon\" href=\"data:,\""));  // asks for no /favicon.ico
   EXPECT_THAT(page->get_header_value("Content-Security-Policy"), HasSubstr("default-src 'none'"));
   EXPECT_EQ(client_.Get((root_ + "status").c_str())->body,
             "{\"poses\":3,\"folder\":\"\xef\xbf\xbd\"}");  // U+FFFD for what is not UTF-8
