@@ -89,7 +89,12 @@ void run(const Setting& setting) {
   options.seconds = setting.seconds;
   const double busy = cpu_seconds();
   live->start();
-  const RecordReport report = record(*live, setting.out, options);
+  Rig rig;  // raw pictures stay raw
+  for (std::size_t c = 0; c < live->group().size(); ++c) {
+    rig.cameras.emplace_back().name = live->group().name(c);
+    rig.cameras.back().mosaic = Mosaic::from_name("RGGB");
+  }
+  const RecordReport report = record(*live, rig, setting.out, options);
   live->stop();
   const double processors = (cpu_seconds() - busy) / report.seconds;
   CameraTally all;

@@ -75,11 +75,21 @@ class GigE : public ::testing::Test {
     return live;
   }
 
+  /// A rig of these cameras, whose pictures are raw.
+  static Rig rig_of(const LiveCameras& live) {
+    Rig rig;
+    for (std::size_t c = 0; c < live.group().size(); ++c) {
+      rig.cameras.emplace_back().name = live.group().name(c);
+      rig.cameras.back().mosaic = Mosaic::from_name("RGGB");
+    }
+    return rig;
+  }
+
   [[nodiscard]] RecordReport record_frames(LiveCameras& live, std::size_t frames,
                                            RecordOptions options = {}) const {
     options.frames = frames;
     live.start();
-    return record(live, temporary_.path() / "frames", options);
+    return record(live, rig_of(live), temporary_.path() / "frames", options);
   }
 
   TemporaryFolder temporary_{::testing::UnitTest::GetInstance()->current_test_info()->name()};
@@ -147,6 +157,14 @@ TEST_F(GigE, WhatTheCameraRefusesIsNamed) {
     FAIL();
   } catch (const InputError& error) {
     EXPECT_THAT(error.what(), HasSubstr("size"));
+  }
+  bad = settings();
+  bad.exposure_us = 1e11;  // more than 32 bits hold
+  try {
+    camera->configure(bad);
+    FAIL();
+  } catch (const InputError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("exposure = 100000000000 us: must be"));
   }
   EXPECT_THROW((void)open_aravis_camera("Aravis-Fake-PS9"), StageError);
 }
@@ -236,11 +254,12 @@ TEST_F(GigE, APulledCableIsNamed) {
   live->start();
   RecordOptions options;
   options.seconds = 5;
-  const RecordReport report =
-      record(*live, temporary_.path() / "frames", options, [&](const RecordReport& so_far) {
-        if (so_far.frames >= 5 && cameras_.size() == 2) cameras_.pop_back();
-        return true;
-      });
+  const RecordReport report = record(*live, rig_of(*live), temporary_.path() / "frames", options,
+                                     [&](const RecordReport& so_far) {
+                                       if (so_far.frames >= 5 && cameras_.size() == 2)
+                                         cameras_.pop_back();
+                                       return true;
+                                     });
   EXPECT_TRUE(std::any_of(report.faults.begin(), report.faults.end(), [](const Fault& fault) {
     return fault.kind == "dead" && fault.device == "cam1";
   }));

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "pencilscan/capture/camera_picture.h"
 #include "pencilscan/capture/sensor_pixels.h"
+#include "pencilscan/core/check.h"
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/io/image.h"
@@ -23,14 +25,14 @@ std::string six_digits(std::size_t number) {
 bool is_zarr(const fs::path& out) { return out.extension() == ".zarr"; }
 
 /// What the camera's settings let expect of its pictures.
-RecordedCamera expected(const CameraGroup& cameras, std::size_t c) {
+RecordedCamera expected(const CameraGroup& cameras, std::size_t c, const Camera& described) {
   const CameraSettings settings = cameras.settings(c);
   const auto layout = layout_from_genicam(settings.pixel_format.value_or(""));
   RecordedCamera camera;
   camera.name = cameras.name(c);
   camera.width = settings.width;
   camera.height = settings.height;
-  camera.channels = layout ? layout->channels : 3;
+  camera.channels = channels_for_files(described, settings);
   camera.bit_depth = layout && layout->bits > 8 ? 16 : 8;
   camera.exposure_us = settings.exposure_us.value_or(0);
   return camera;
@@ -54,15 +56,16 @@ nlohmann::ordered_json attributes_of(const CameraGroup& cameras, bool shared_clo
 
 }  // namespace
 
-FrameWriter::FrameWriter(const CameraGroup& cameras, const fs::path& out, std::int64_t utc_ns,
-                         bool shared_clock)
-    : cameras_(cameras), out_(bare_folder(out)), utc_ns_(utc_ns) {
+FrameWriter::FrameWriter(const CameraGroup& cameras, const Rig& rig, const fs::path& out,
+                         std::int64_t utc_ns, bool shared_clock)
+    : cameras_(cameras), described_(rig.cameras), out_(bare_folder(out)), utc_ns_(utc_ns) {
+  PENCILSCAN_CHECK(rig.cameras.size() == cameras.size());
   if (fs::exists(out) && !(fs::is_directory(out) && fs::is_empty(out)))
     throw InputError("--out", "", out.string(), "must be new or an empty folder");
   if (is_zarr(out_)) {
     std::vector<RecordedCamera> recorded;
     for (std::size_t c = 0; c < cameras.size(); ++c) {
-      recorded.push_back(expected(cameras, c));
+      recorded.push_back(expected(cameras, c, described_[c]));
       types_.push_back(recorded.back().image_type());
       sizes_.emplace_back(recorded.back().width, recorded.back().height);
     }
@@ -114,17 +117,20 @@ void FrameWriter::write(const Row& row, std::size_t camera) {
   const auto& frame = row.item->frame.frames[camera];
   const std::int64_t time = row.item->times_ns[camera];
   const std::int64_t utc = time < 0 ? -1 : time + utc_ns_;
-  if (!zarr_) {
-    if (frame)
-      write_image(out_ / six_digits(row.number) / (cameras_.name(camera) + ".png"), frame->image);
+  if (!frame) {
+    if (zarr_) zarr_->write_missing(row.number, camera, utc);
     return;
   }
-  if (!frame) return zarr_->write_missing(row.number, camera, utc);
-  if (frame->image.type() != types_[camera] || frame->image.size() != sizes_[camera])
+  const cv::Mat picture = picture_for_files(described_[camera], *frame);
+  if (!zarr_) {
+    write_image(out_ / six_digits(row.number) / (cameras_.name(camera) + ".png"), picture);
+    return;
+  }
+  if (picture.type() != types_[camera] || picture.size() != sizes_[camera])
     throw StageError(cameras_.name(camera) +
                      ": its pictures are not of the size and format that "
                      "it was set to");
-  zarr_->write(row.number, camera, frame->image, utc);
+  zarr_->write(row.number, camera, picture, utc);
 }
 
 void FrameWriter::run(std::size_t worker) {

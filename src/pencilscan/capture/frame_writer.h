@@ -12,6 +12,7 @@
 
 #include "pencilscan/capture/camera_group.h"
 #include "pencilscan/capture/gathering.h"
+#include "pencilscan/rig/rig.h"
 
 namespace pencilscan {
 
@@ -20,10 +21,11 @@ class RecordingWriter;
 /// Writes frames to disk on threads of its own, in the order given.
 class FrameWriter {
  public:
-  /// `utc_ns`: what to add to a frame's times. `shared_clock`: time stamps of cameras can be
-  /// compared.
-  FrameWriter(const CameraGroup& cameras, const std::filesystem::path& out, std::int64_t utc_ns,
-              bool shared_clock);
+  /// `rig`: its cameras in the order of `cameras`; mosaics that it does not state are made colour
+  /// (picture_for_files()). `utc_ns`: what to add to a frame's times. `shared_clock`: time stamps
+  /// of cameras can be compared.
+  FrameWriter(const CameraGroup& cameras, const Rig& rig, const std::filesystem::path& out,
+              std::int64_t utc_ns, bool shared_clock);
   ~FrameWriter();
   FrameWriter(const FrameWriter&) = delete;
   FrameWriter& operator=(const FrameWriter&) = delete;
@@ -48,6 +50,7 @@ class FrameWriter {
   void rethrow();
 
   const CameraGroup& cameras_;
+  std::vector<Camera> described_;  ///< the rig's
   std::filesystem::path out_;
   std::int64_t utc_ns_;
   std::unique_ptr<RecordingWriter> zarr_;  ///< null: image folders

@@ -1,10 +1,11 @@
 #include "pencilscan/capture/gray_capture.h"
 
 #include <algorithm>
-#include <opencv2/imgproc.hpp>
 #include <set>
 #include <thread>
 
+#include "pencilscan/capture/camera_picture.h"
+#include "pencilscan/capture/capture_note.h"
 #include "pencilscan/capture/work_queue.h"
 #include "pencilscan/core/check.h"
 #include "pencilscan/core/error.h"
@@ -65,21 +66,28 @@ class ProjectorRun {
  public:
   ProjectorRun(LiveCameras& cameras, ProjectorScreen& screen, const fs::path& folder,
                std::size_t projector, const Rig& rig, const GrayCaptureOptions& options,
-               WorkQueue& work, GrayCaptureReport& report)
+               GrayCaptureReport& report)
       : cameras_(cameras),
         screen_(screen),
         rig_(rig),
         folder_(folder),
         projector_(projector),
         options_(options),
-        work_(work),
         report_(report),
+        faults_before_(report.faults.size()),
         shots_(shots_of(screen.projectors()[projector], options)),
         coarse_(shots_.size() + 1, std::vector<cv::Mat>(cameras.group().size())),
-        missing_in_a_row_(cameras.group().size(), 0) {}
+        missing_in_a_row_(cameras.group().size(), 0),
+        work_(static_cast<std::size_t>(thread_count())) {}
 
   /// False when `watch` asked to stop, or a camera is gone.
   bool run(const std::function<bool(double share)>& watch);
+  /// Waits until all pictures so far are written.
+  void finish() { work_.wait(); }
+  /// False where a fault makes the pictures useless.
+  [[nodiscard]] bool usable() const;
+  /// Something moved meanwhile.
+  [[nodiscard]] bool moved() const { return moved_; }
   /// Removes the folders of cameras that see nothing.
   void drop_unseen() const;
 
@@ -112,12 +120,14 @@ class ProjectorRun {
   const fs::path folder_;
   std::size_t projector_;
   const GrayCaptureOptions& options_;
-  WorkQueue& work_;
   GrayCaptureReport& report_;
+  std::size_t faults_before_;  ///< of other projectors
   std::vector<Shot> shots_;
   std::vector<std::vector<cv::Mat>> coarse_;  ///< [shot][camera]; empty: none came
   std::vector<int> missing_in_a_row_;         ///< per camera
   std::vector<LitView> views_;
+  bool moved_ = false;
+  WorkQueue work_;  ///< last: its threads use all of the above until they have ended
 };
 
 double ProjectorRun::delay_ms() const {
@@ -189,8 +199,10 @@ void ProjectorRun::note(std::size_t camera, std::size_t i, const std::string& wh
   if (!given_up) return;
   const std::string& projector = screen_.projectors()[projector_].name;
   const bool missing = coarse_[i][camera].empty();
-  for (const Fault& fault : report_.faults)
-    if (fault.device == name_of(camera) && fault.kind == (missing ? "missing" : "picture")) return;
+  for (std::size_t f = faults_before_; f < report_.faults.size(); ++f)
+    if (report_.faults[f].device == name_of(camera) &&
+        report_.faults[f].kind == (missing ? "missing" : "picture"))
+      return;
   report_.faults.push_back({missing ? "missing" : "picture", name_of(camera),
                             to_string(shot(i).picture) + " of " + projector + " after " +
                                 std::to_string(options_.retakes) + " more tries: " + why,
@@ -247,10 +259,11 @@ void ProjectorRun::judge_stillness() {
   for (std::size_t c = 0; c < views_.size(); ++c) {
     const cv::Mat& again = coarse_[shots_.size()][c];
     if (views_[c].share < kLeastSeen || again.empty()) continue;
-    const std::string why = white_again_trouble(coarse_[0][c], again, views_[c]);
-    if (why.empty()) continue;
+    const WhiteTrouble trouble = white_again_trouble(coarse_[0][c], again, views_[c]);
+    if (trouble.why.empty()) continue;
+    moved_ = moved_ || trouble.moved;
     report_.faults.push_back({"moved", name_of(c),
-                              "under " + screen_.projectors()[projector_].name + ": " + why,
+                              "under " + screen_.projectors()[projector_].name + ": " + trouble.why,
                               "take this pose again"});
   }
 }
@@ -290,27 +303,36 @@ bool ProjectorRun::run(const std::function<bool(double share)>& watch) {
   return true;
 }
 
+bool ProjectorRun::usable() const {
+  static const std::set<std::string> kUseless{"picture", "missing", "moved", "unseen"};
+  return std::none_of(report_.faults.begin() + static_cast<std::ptrdiff_t>(faults_before_),
+                      report_.faults.end(),
+                      [](const Fault& fault) { return kUseless.contains(fault.kind); });
+}
+
 void ProjectorRun::drop_unseen() const {
   for (std::size_t c = 0; c < views_.size(); ++c)
     if (views_[c].share < kLeastSeen) fs::remove_all(folder_ / name_of(c));
 }
 
+/// Where a projector's pictures are until they are complete.
+fs::path part_of(const fs::path& out, const std::string& projector) {
+  return out / ("." + projector + ".part");
+}
+
+/// Takes back the projectors before this one that are there, but for those of other programs.
+void refuse_earlier(const std::vector<Projector>& projectors, std::size_t before,
+                    const fs::path& out, GrayCaptureReport& report) {
+  for (std::size_t p = 0; p < before; ++p) {
+    const std::string& name = projectors[p].name;
+    if (!has_capture_note(out / name)) continue;
+    fs::remove_all(part_of(out, name));
+    fs::rename(out / name, part_of(out, name));
+    report.refused.push_back(name);
+  }
+}
+
 }  // namespace
-
-cv::Mat picture_for_files(const Camera& camera, const CameraFrame& frame) {
-  return camera.mosaic ? frame.image : picture_to_see(frame);
-}
-
-cv::Mat picture_to_see(const CameraFrame& frame) {
-  if (frame.mosaic.empty()) return frame.image;
-  const int code = frame.mosaic == "RGGB"   ? cv::COLOR_BayerRGGB2RGB
-                   : frame.mosaic == "BGGR" ? cv::COLOR_BayerBGGR2RGB
-                   : frame.mosaic == "GRBG" ? cv::COLOR_BayerGRBG2RGB
-                                            : cv::COLOR_BayerGBRG2RGB;
-  cv::Mat color;
-  cv::demosaicing(frame.image, color, code);
-  return color;
-}
 
 GrayCaptureReport capture_gray_codes(LiveCameras& cameras, ProjectorScreen& screen, const Rig& rig,
                                      const fs::path& out, const GrayCaptureOptions& options,
@@ -319,8 +341,12 @@ GrayCaptureReport capture_gray_codes(LiveCameras& cameras, ProjectorScreen& scre
   GrayCaptureReport report;
   const Stopwatch clock;
   const std::size_t projectors = screen.projectors().size();
+  const auto note_of = [&](std::size_t p) {
+    return capture_note(screen.projectors()[p], rig.cameras, options.inverses, options.solids);
+  };
+  for (std::size_t p = 0; p < projectors; ++p)
+    check_capture_note(out / screen.projectors()[p].name, note_of(p));
   report.views.assign(projectors, std::vector<LitView>(cameras.group().size()));
-  WorkQueue work(static_cast<std::size_t>(thread_count()));
   screen.show_all({});
   for (std::size_t p = 0; p < projectors; ++p) {
     const std::string& name = screen.projectors()[p].name;
@@ -328,24 +354,30 @@ GrayCaptureReport capture_gray_codes(LiveCameras& cameras, ProjectorScreen& scre
       ++report.resumed;
       continue;
     }
-    const fs::path part = out / ("." + name + ".part");
+    const fs::path part = part_of(out, name);
     fs::remove_all(part);
     fs::create_directories(part);
-    ProjectorRun run(cameras, screen, part, p, rig, options, work, report);
+    ProjectorRun run(cameras, screen, part, p, rig, options, report);
     const bool whole = run.run([&](double share) {
       return !watch ||
              watch(name, (static_cast<double>(p) + share) / static_cast<double>(projectors));
     });
-    work.wait();
     report.seconds = clock.seconds();
     if (!whole) {
+      run.finish();
       fs::remove_all(part);
       screen.show_all({});
       return report;
     }
     run.drop_unseen();
-    fs::rename(part, out / name);
-    if (done) done(p);
+    write_capture_note(part, note_of(p));
+    if (run.moved()) refuse_earlier(screen.projectors(), p, out, report);
+    if (run.usable()) {
+      fs::rename(part, out / name);
+      if (done) done(p);
+    } else {
+      report.refused.push_back(name);
+    }
   }
   for (Fault& fault : screen.check()) report.faults.push_back(std::move(fault));
   report.seconds = clock.seconds();

@@ -34,6 +34,8 @@ struct GrayCaptureReport {
   std::size_t pictures = 0;  ///< shown and taken, retakes too
   std::size_t retaken = 0;
   std::size_t resumed = 0;  ///< projectors that were there already
+  /// Projectors whose pictures cannot be used: the same capture takes them anew.
+  std::vector<std::string> refused;
   double seconds = 0;
   double waiting_seconds = 0;  ///< of them, for the projectors' delay and the cameras' pictures
   std::vector<PictureTrouble> troubles;
@@ -54,9 +56,13 @@ using ProjectorDone = std::function<void(std::size_t projector)>;
 ///
 /// Every pair of pattern and inverse is checked while the next picture is taken, in every camera;
 /// what fails is taken again. White is shown once more at the end, to see whether something moved.
-/// A projector's folder appears when it is complete, so that a capture that was stopped goes on
-/// where it was: existing projectors are kept. `rig`: names and sizes of the cameras, in the order
-/// of `cameras`.
+/// A projector's folder appears when it is complete and has no fault, so that a capture that was
+/// stopped goes on where it was: existing projectors are kept. Until then it is
+/// `out`/.<projector>.part, and stays there for a look when it is refused; the next capture takes
+/// it anew. What moved under one projector had another pose under those before it: these are
+/// refused, too, where capture.json says that they were taken so. `rig`: names and sizes of the
+/// cameras, in the order of `cameras`. InputError where the capture.json of a projector that is
+/// there already contradicts this capture; then nothing is shown.
 ///
 /// A camera that is gone, or gives no pictures any more, ends the capture; the next one goes on.
 /// Faults: picture (given up after the retakes), moved, missing (a camera gives no pictures), dead,
@@ -66,10 +72,5 @@ using ProjectorDone = std::function<void(std::size_t projector)>;
                                                    const GrayCaptureOptions& options,
                                                    const GrayCaptureWatch& watch = {},
                                                    const ProjectorDone& done = {});
-
-/// A picture to look at: its mosaic made colour.
-[[nodiscard]] cv::Mat picture_to_see(const CameraFrame& frame);
-/// A picture as `camera` expects it in files: its mosaic made colour, unless it has one.
-[[nodiscard]] cv::Mat picture_for_files(const Camera& camera, const CameraFrame& frame);
 
 }  // namespace pencilscan

@@ -8,6 +8,7 @@
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/host_clock.h"
 #include "pencilscan/core/random.h"
+#include "pencilscan/io/file.h"
 #include "pencilscan/io/image.h"
 #include "pencilscan/io/temporary_folder.h"
 #include "pencilscan/pattern/gray_code.h"
@@ -151,6 +152,96 @@ TEST_F(GrayCapture, AMovedSceneIsNamed) {
   EXPECT_THAT(moved, ElementsAre("cam0 under proj0", "cam1 under proj0"));
 }
 
+TEST_F(GrayCapture, RefusedPicturesAreTakenAnew) {
+  options_.delay_ms = {5, 5};
+  options_.retakes = 1;
+  room_.delay_ns[0] = 300'000'000;
+  const auto live = cameras();
+  const GrayCaptureReport refused = capture(*live);
+  EXPECT_THAT(refused.refused, ElementsAre("proj0"));
+  EXPECT_FALSE(std::filesystem::exists(out() / "proj0"));
+  EXPECT_TRUE(std::filesystem::exists(out() / "proj1"));
+  room_.delay_ns[0] = room_.delay_ns[1] = 15'000'000;
+  options_.delay_ms = {20, 20};
+  const GrayCaptureReport again = capture(*live);
+  EXPECT_EQ(again.resumed, 1U);
+  EXPECT_THAT(again.faults, IsEmpty());
+  EXPECT_THAT(again.refused, IsEmpty());
+  EXPECT_EQ(decoded_column("proj0", "cam0", 90, 3), 45);
+}
+
+TEST_F(GrayCapture, EveryProjectorHasItsOwnFaults) {
+  options_.delay_ms = {5, 5};
+  options_.retakes = 1;
+  room_.delay_ns[0] = room_.delay_ns[1] = 300'000'000;
+  const auto live = cameras();
+  EXPECT_THAT(capture(*live).refused, ElementsAre("proj0", "proj1"));
+}
+
+TEST_F(GrayCapture, WhatMovedUnderOneProjectorIsTakenAnewUnderAll) {
+  std::filesystem::create_directories(out());
+  const auto live = cameras();
+  const GrayCaptureReport report = capture(*live, [&](const std::string& what, double share) {
+    if (what == "proj1" && share > 0.7) room_.moved = true;
+    return true;
+  });
+  EXPECT_THAT(report.refused, ElementsAre("proj0", "proj1"));
+  EXPECT_FALSE(std::filesystem::exists(out() / "proj0"));
+  const GrayCaptureReport again = capture(*live);
+  EXPECT_EQ(again.resumed, 0U);
+  EXPECT_THAT(again.faults, IsEmpty());
+}
+
+TEST_F(GrayCapture, AnotherCaptureThanTheOneThatIsThereIsRefused) {
+  const auto live = cameras();
+  (void)capture(*live);
+  const auto complaint = [&] {
+    const int shows = room_.shows;
+    try {
+      (void)capture(*live);
+      return std::string("accepted");
+    } catch (const InputError& error) {
+      EXPECT_EQ(room_.shows, shows);  // nothing is shown before
+      return std::string(error.what()).substr(out().string().size() + 1);
+    }
+  };
+  EXPECT_EQ(complaint(), "accepted");
+  options_.solids = true;
+  EXPECT_THAT(complaint(), HasSubstr("proj0/capture.json: solids = false: must be true"));
+  options_.solids = false;
+  options_.inverses = false;
+  EXPECT_THAT(complaint(), HasSubstr("inverses = true: must be false"));
+  options_.inverses = true;
+  rig_.cameras[1].width /= 2;
+  EXPECT_THAT(complaint(), HasSubstr("cameras.cam1.width = 128: must be 64"));
+  rig_.cameras[1].name = "cam7";
+  EXPECT_THAT(complaint(), HasSubstr("cameras.cam1 = "));
+  rig_.cameras[1].name = "cam1";
+  rig_.cameras[1].width *= 2;
+  // Pictures of another program have no note, and are believed.
+  for (const char* projector : {"proj0", "proj1"})
+    std::filesystem::remove(out() / projector / "capture.json");
+  options_.solids = true;
+  EXPECT_EQ(complaint(), "accepted");
+}
+
+TEST_F(GrayCapture, AFullDiskEndsItInOrder) {
+  // Big pictures: while one write fails, other threads are still at work on theirs.
+  const auto live = cameras([](std::size_t, CameraScript& script) {
+    script.expose = [](std::int64_t, double, double) {
+      return cv::Mat(1500, 2000, CV_8UC3, cv::Scalar::all(99));
+    };
+  });
+  EXPECT_THROW((void)capture(*live,
+                             [&](const std::string&, double) {
+                               // A file where the folder of a camera has to be.
+                               std::filesystem::remove_all(out() / ".proj0.part" / "cam1");
+                               write_text(out() / ".proj0.part" / "cam1", "full");
+                               return true;
+                             }),
+               std::exception);
+}
+
 TEST_F(GrayCapture, ACameraThatSeesNothingHasNoFolder) {
   room_.blind = [](std::size_t camera, std::size_t projector) {
     return camera == 1 && projector == 0;
@@ -219,7 +310,7 @@ TEST(PictureCheck, ATornPictureIsTold) {
   const cv::Mat pattern = blocks(stripes(8));
   const cv::Mat inverse = white + black - pattern;
   EXPECT_EQ(pair_trouble(pattern, inverse, view), "");
-  EXPECT_THAT(pair_trouble(pattern, pattern, view), HasSubstr("alike"));
+  EXPECT_THAT(pair_trouble(pattern, pattern, view), HasSubstr("100 % of what it lights is alike"));
   // The inverse came when half of the exposure still had the pattern.
   EXPECT_THAT(pair_trouble(pattern, 0.5 * pattern + 0.5 * inverse, view), HasSubstr("alike"));
   // Stored with gamma 2.2, and with light scattered within the scene.
@@ -236,10 +327,10 @@ TEST(PictureCheck, TellsAMovedSceneFromAWarmLamp) {
   const cv::Mat white = blocks([](int x, int y) { return x < 20 && y > 3; });
   const cv::Mat black = blocks([](int, int) { return false; });
   const LitView view = lit_view(white, black);
-  EXPECT_EQ(white_again_trouble(white, white, view), "");
-  EXPECT_THAT(white_again_trouble(white, 0.8 * white, view), HasSubstr("lamp"));
+  EXPECT_EQ(white_again_trouble(white, white, view).why, "");
+  EXPECT_THAT(white_again_trouble(white, 0.8 * white, view).why, HasSubstr("lamp"));
   const cv::Mat moved = blocks([](int x, int y) { return x < 17 && y > 3; });
-  EXPECT_THAT(white_again_trouble(white, moved, view), HasSubstr("moved"));
+  EXPECT_THAT(white_again_trouble(white, moved, view).why, HasSubstr("moved"));
 }
 
 TEST(PictureCheck, MeansOfBlocksAreFinerThanTheLevelsOfThePicture) {
@@ -267,11 +358,11 @@ TEST(PictureCheck, NoiseOfDimLightIsNoMotion) {
   };
   const cv::Mat before = noisy(white);
   const LitView view = lit_view(before, cv::Mat(white.size(), CV_32FC1, cv::Scalar(0)));
-  EXPECT_EQ(white_again_trouble(before, noisy(white), view), "");
+  EXPECT_EQ(white_again_trouble(before, noisy(white), view).why, "");
   cv::Mat moved(white.size(), CV_32FC1, cv::Scalar(0));
   const cv::Size rest(white.cols - 3, white.rows);
   white(cv::Rect({0, 0}, rest)).copyTo(moved(cv::Rect({3, 0}, rest)));
-  EXPECT_THAT(white_again_trouble(before, noisy(moved), view), HasSubstr("moved"));
+  EXPECT_THAT(white_again_trouble(before, noisy(moved), view).why, HasSubstr("moved"));
 }
 
 }  // namespace

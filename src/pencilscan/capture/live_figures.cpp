@@ -5,7 +5,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "pencilscan/capture/gray_capture.h"
+#include "pencilscan/capture/camera_picture.h"
 #include "pencilscan/core/formatted.h"
 #include "pencilscan/core/median.h"
 
@@ -18,7 +18,10 @@ constexpr double kFull = 254.5 / 255;
 constexpr double kLitShare = 0.2;    ///< of the brightest
 constexpr double kEdgeShare = 0.1;   ///< of the brightest
 constexpr double kLeastEdge = 0.05;  ///< of the range: noise is less
-constexpr int kLeastEdges = 50;      ///< pixels, for a width
+/// Of the range above black: a fifth of it, where "lit" begins, is 2.5 steps of 8 bits, which is
+/// what noise of one step reaches in one pixel of a hundred.
+constexpr double kLeastLight = 2.5 / 255 / kLitShare;
+constexpr int kLeastEdges = 50;  ///< pixels, for a width
 
 // What advice begins at. Light: docs/lab.md asks for 80 % under one projector; half of it still has
 // seven bits. A line of 4 px that is blurred by 3 has lost half of its height.
@@ -94,7 +97,7 @@ double contrast(const cv::Mat& light, double least) {
 
 }  // namespace
 
-LiveFigures live_figures(const CameraFrame& frame) {
+LiveFigures live_figures(const CameraFrame& frame, double black_level) {
   LiveFigures figures;
   if (frame.image.empty()) return figures;
   const cv::Mat light = light_of(frame);
@@ -108,7 +111,7 @@ LiveFigures live_figures(const CameraFrame& frame) {
   };
   figures.saturated = share(kFull);
   figures.brightest = lower_quantile(values, 0.999);
-  if (figures.brightest <= 0) return figures;
+  if (figures.brightest - black_level < kLeastLight) return figures;
   figures.lit = share(kLitShare * figures.brightest);
   figures.edge_px = edge_width(light, std::max(kLeastEdge, kEdgeShare * figures.brightest)) *
                     (frame.mosaic.empty() ? 1 : 2);
@@ -120,7 +123,7 @@ std::vector<std::string> advice_for(const LiveFigures& figures, bool lines) {
   std::vector<std::string> advice;
   if (figures.saturated > kMostSaturated)
     advice.push_back(
-        formatted(100 * figures.saturated, "%.2g %%") +
+        percent_text(figures.saturated) +
         " is at the end of the range: half the exposure, close the iris, or less gain");
   else if (figures.brightest < kDim)
     advice.push_back("the brightest is " + formatted(100 * figures.brightest, "%.0f %%") +

@@ -5,7 +5,7 @@
 
 #include <opencv2/imgproc.hpp>
 
-#include "pencilscan/capture/gray_capture.h"
+#include "pencilscan/capture/camera_picture.h"
 
 namespace pencilscan {
 namespace {
@@ -77,6 +77,19 @@ TEST(LiveFigures, PreviewsLeaveThePictureAlone) {
   frame.image = cv::Mat(60, 80, CV_8UC3, cv::Scalar(200, 100, 0));
   EXPECT_FALSE(preview_jpeg(frame, 640).empty());
   EXPECT_EQ(frame.image.at<cv::Vec3b>(5, 5), cv::Vec3b(200, 100, 0));
+}
+
+TEST(LiveFigures, OfABlackPictureNothingIsSaid) {
+  CameraFrame frame;
+  frame.image = cv::Mat(200, 320, CV_8UC3);
+  cv::theRNG().state = 1;
+  cv::randn(frame.image, cv::Scalar::all(2), cv::Scalar::all(1.5));
+  EXPECT_EQ(live_figures(frame).lit, 0);
+  EXPECT_EQ(live_figures(frame).line_contrast, 0);
+  frame.image += cv::Scalar::all(16);  // a black level
+  EXPECT_GT(live_figures(frame).lit, 0);
+  EXPECT_EQ(live_figures(frame, 16.0 / 255).lit, 0);
+  EXPECT_EQ(live_figures(frame, 16.0 / 255).line_contrast, 0);
 }
 
 TEST(LiveFigures, NoiseHasNoEdges) {

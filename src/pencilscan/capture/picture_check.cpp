@@ -102,12 +102,12 @@ std::string pair_trouble(const cv::Mat& pattern, const cv::Mat& inverse, const L
   if (within < kLeastBlocks) return {};
   const double share = static_cast<double>(wrong) / within;
   if (share <= kWrongShare) return {};
-  return formatted(100 * share, "%.2g %%") +
+  return percent_text(share) +
          " of what it lights is alike in a pattern and its inverse: one of them came late, or "
          "something moved";
 }
 
-std::string white_again_trouble(const cv::Mat& white, const cv::Mat& again, const LitView& view) {
+WhiteTrouble white_again_trouble(const cv::Mat& white, const cv::Mat& again, const LitView& view) {
   struct Block {
     float light;
     float change;
@@ -124,8 +124,8 @@ std::string white_again_trouble(const cv::Mat& white, const cv::Mat& again, cons
   if (static_cast<int>(blocks.size()) < kLeastBlocks) return {};
   const float lamp = upper_median(ratios);
   if (std::abs(lamp) > kLampChange)
-    return "the projector's white changed by " + formatted(100 * lamp, "%.2g %%") +
-           " during the capture: its lamp warms up, or an automatic exposure is on";
+    return {"the projector's white changed by " + percent_text(lamp) +
+            " during the capture: its lamp warms up, or an automatic exposure is on"};
   std::vector<float> changes;
   for (Block& block : blocks) {
     block.change -= lamp * block.light;
@@ -139,9 +139,11 @@ std::string white_again_trouble(const cv::Mat& white, const cv::Mat& again, cons
   });
   const double share = static_cast<double>(moved) / static_cast<double>(blocks.size());
   if (share <= kMovedShare) return {};
-  return formatted(100 * share, "%.2g %%") +
-         " of what is lit changed from the first to the last picture: the object or the camera "
-         "moved";
+  return {
+      percent_text(share) +
+          " of what is lit changed from the first to the last picture: the object or the camera "
+          "moved",
+      true};
 }
 
 }  // namespace pencilscan

@@ -29,9 +29,12 @@ struct LitView {
 [[nodiscard]] std::string pair_trouble(const cv::Mat& pattern, const cv::Mat& inverse,
                                        const LitView& view);
 
-/// What is wrong when white is shown again after everything: the scene or the camera moved, or the
-/// lamp's light changed; empty: nothing.
-[[nodiscard]] std::string white_again_trouble(const cv::Mat& white, const cv::Mat& again,
-                                              const LitView& view);
+/// What is wrong when white is shown again after everything.
+struct WhiteTrouble {
+  std::string why;     ///< empty: nothing
+  bool moved = false;  ///< the scene or the camera did; else the lamp's light changed
+};
+[[nodiscard]] WhiteTrouble white_again_trouble(const cv::Mat& white, const cv::Mat& again,
+                                               const LitView& view);
 
 }  // namespace pencilscan

@@ -21,11 +21,12 @@ constexpr auto kTurn = std::chrono::milliseconds(2);  ///< between looks at what
 /// One recording while it runs.
 class Session {
  public:
-  Session(LiveCameras& cameras, const std::filesystem::path& out, const RecordOptions& options)
+  Session(LiveCameras& cameras, const Rig& rig, const std::filesystem::path& out,
+          const RecordOptions& options)
       : cameras_(cameras),
         options_(options),
         gathering_(gathering_of(cameras.group(), options), cameras.clocks()),
-        writer_(cameras.group(), out, utc_minus_host_ns(), true),
+        writer_(cameras.group(), rig, out, utc_minus_host_ns(), true),
         first_ns_(cameras.group().size(), -1),
         listener_(cameras, [this](std::size_t camera, CameraFrame frame) {
           const std::lock_guard lock(mutex_);
@@ -201,9 +202,9 @@ RecordReport Session::run(const RecordWatch& watch) {
 
 }  // namespace
 
-RecordReport record(LiveCameras& cameras, const std::filesystem::path& out,
+RecordReport record(LiveCameras& cameras, const Rig& rig, const std::filesystem::path& out,
                     const RecordOptions& options, const RecordWatch& watch) {
-  return Session(cameras, out, options).run(watch);
+  return Session(cameras, rig, out, options).run(watch);
 }
 
 }  // namespace pencilscan

@@ -7,6 +7,7 @@
 
 #include "pencilscan/capture/gathering.h"
 #include "pencilscan/capture/live_cameras.h"
+#include "pencilscan/rig/rig.h"
 
 namespace pencilscan {
 
@@ -41,11 +42,13 @@ struct RecordReport {
 using RecordWatch = std::function<bool(const RecordReport& so_far)>;
 
 /// Records until it is over into `out`: recording.zarr where its name ends in ".zarr", else image
-/// folders `out`/000000/<camera>.png. The cameras run. It begins when all of them have given some
-/// pictures, so that their clocks are known, or after two seconds. Whatever is missing is named in
-/// the report. InputError when `out` is there already and not empty; StageError when the disk is
-/// full.
-[[nodiscard]] RecordReport record(LiveCameras& cameras, const std::filesystem::path& out,
-                                  const RecordOptions& options, const RecordWatch& watch = {});
+/// folders `out`/000000/<camera>.png. `rig`: its cameras in the order of `cameras`; a mosaic that
+/// it does not state is made colour, as in Gray-code captures. The cameras run. It begins when all
+/// of them have given some pictures, so that their clocks are known, or after two seconds. Whatever
+/// is missing is named in the report. InputError when `out` is there already and not empty;
+/// StageError when the disk is full, or a camera delivers another mosaic than the rig states.
+[[nodiscard]] RecordReport record(LiveCameras& cameras, const Rig& rig,
+                                  const std::filesystem::path& out, const RecordOptions& options,
+                                  const RecordWatch& watch = {});
 
 }  // namespace pencilscan

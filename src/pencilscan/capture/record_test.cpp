@@ -5,16 +5,19 @@
 
 #include <thread>
 
+#include "pencilscan/capture/camera_picture.h"
 #include "pencilscan/capture/live_cameras.h"
 #include "pencilscan/capture/scripted_camera.h"
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/host_clock.h"
+#include "pencilscan/io/image.h"
 #include "pencilscan/io/temporary_folder.h"
 #include "pencilscan/recording/recording.h"
 
 namespace pencilscan {
 namespace {
 
+using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
 /// Cameras whose pictures hold their number.
@@ -43,6 +46,14 @@ CameraSettings fast() {
   settings.exposure_us = 2000;
   settings.pixel_format = "Mono8";
   return settings;
+}
+
+/// A rig of these cameras.
+Rig rig_of(const LiveCameras& cameras) {
+  Rig rig;
+  for (std::size_t c = 0; c < cameras.group().size(); ++c)
+    rig.cameras.emplace_back().name = cameras.group().name(c);
+  return rig;
 }
 
 TEST(LiveCameras, APictureAnswersItsTriggerHoweverLongItTook) {
@@ -76,7 +87,8 @@ TEST(Record, FramesOfOneMomentGoToARecording) {
   RecordOptions options;
   options.rate_hz = 50;
   options.frames = 20;
-  const RecordReport report = record(cameras, folder.path() / "recording.zarr", options);
+  const RecordReport report =
+      record(cameras, rig_of(cameras), folder.path() / "recording.zarr", options);
   EXPECT_EQ(report.frames, 20U);
   EXPECT_EQ(report.whole, 20U);
   EXPECT_THAT(report.faults, IsEmpty());
@@ -102,8 +114,98 @@ TEST(Record, ANameThatEndsWithASlashIsThatOfARecordingToo) {
   RecordOptions options;
   options.rate_hz = 50;
   options.frames = 2;
-  EXPECT_EQ(record(cameras, folder.path() / "recording.zarr" / "", options).frames, 2U);
+  EXPECT_EQ(record(cameras, rig_of(cameras), folder.path() / "recording.zarr" / "", options).frames,
+            2U);
   EXPECT_TRUE(Recording::is_one(folder.path() / "recording.zarr"));
+}
+
+/// A camera that delivers a red surface behind a mosaic, in frames or a recording.
+class RawCamera {
+ public:
+  RawCamera()
+      : cameras_(scripted(1, [](std::size_t, CameraScript& script) {
+          script.mosaic = "RGGB";
+          script.expose = [](std::int64_t, double, double) {
+            cv::Mat raw(6, 8, CV_8UC1, cv::Scalar(0));
+            for (int y = 0; y < raw.rows; y += 2)
+              for (int x = 0; x < raw.cols; x += 2) raw.at<std::uint8_t>(y, x) = 200;
+            return raw;
+          };
+        })) {
+    CameraSettings settings = fast();
+    settings.pixel_format = "BayerRG8";
+    cameras_.group().configure(0, settings);
+    cameras_.start();
+  }
+
+  void take(const std::string& mosaic, const std::filesystem::path& out) {
+    Rig rig = rig_of(cameras_);
+    rig.cameras[0].mosaic = Mosaic::from_name(mosaic);
+    RecordOptions options;
+    options.rate_hz = 50;
+    options.frames = 2;
+    EXPECT_EQ(record(cameras_, rig, out, options).frames, 2U);
+  }
+
+ private:
+  LiveCameras cameras_;
+};
+
+TEST(Record, AMosaicThatTheRigDoesNotStateIsMadeColour) {
+  const TemporaryFolder folder("record_mosaic");
+  RawCamera camera;
+  camera.take("", folder.path() / "frames");
+  const cv::Mat picture = read_image(folder.path() / "frames" / "000001" / "cam0.png");
+  ASSERT_EQ(picture.channels(), 3);
+  EXPECT_NEAR(picture.at<cv::Vec3f>(3, 4)[0], 200.0 / 255, 0.01);
+  EXPECT_EQ(picture.at<cv::Vec3f>(3, 4)[2], 0);
+  camera.take("", folder.path() / "recording.zarr");
+  const cv::Mat stored = Recording::open(folder.path() / "recording.zarr").read(1, 0);
+  EXPECT_EQ(stored.at<cv::Vec3b>(3, 4), cv::Vec3b(200, 0, 0));
+}
+
+TEST(Record, AMosaicThatTheRigStatesStaysRaw) {
+  const TemporaryFolder folder("record_raw");
+  RawCamera camera;
+  camera.take("RGGB", folder.path() / "frames");
+  EXPECT_EQ(read_stored_image(folder.path() / "frames" / "000001" / "cam0.png").channels(), 1);
+  camera.take("RGGB", folder.path() / "recording.zarr");
+  const cv::Mat stored = Recording::open(folder.path() / "recording.zarr").read(1, 0);
+  ASSERT_EQ(stored.type(), CV_8UC1);
+  EXPECT_EQ(stored.at<std::uint8_t>(2, 4), 200);
+}
+
+TEST(Record, AnotherMosaicThanTheRigStatesIsNoSuccess) {
+  const TemporaryFolder folder("record_other_mosaic");
+  RawCamera camera;
+  try {
+    camera.take("BGGR", folder.path() / "frames");
+    FAIL();
+  } catch (const StageError& error) {
+    EXPECT_STREQ(error.what(), "cam0 delivers RGGB; the rig states the mosaic BGGR");
+  }
+}
+
+TEST(Mosaics, AFormatThatContradictsTheRigIsRefused) {
+  Camera camera;
+  camera.name = "cam0";
+  CameraSettings made;
+  made.pixel_format = "BayerRG8";
+  EXPECT_NO_THROW(check_mosaic(camera, made, "lab.json"));
+  camera.mosaic = Mosaic::from_name("RGGB");
+  EXPECT_NO_THROW(check_mosaic(camera, made, "lab.json"));
+  camera.mosaic = Mosaic::from_name("BGGR");
+  try {
+    check_mosaic(camera, made, "lab.json");
+    FAIL();
+  } catch (const InputError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("lab.json: cameras.cam0.pixel_format = BayerRG8: must"));
+    EXPECT_THAT(error.what(), HasSubstr("BGGR; the camera delivers RGGB"));
+  }
+  made.pixel_format = "RGB8";
+  EXPECT_THROW(check_mosaic(camera, made, "lab.json"), InputError);
+  made.pixel_format = "BayerRG8Packed";  // of unknown layout
+  EXPECT_NO_THROW(check_mosaic(camera, made, "lab.json"));
 }
 
 TEST(Record, LostPicturesAreNamedAndNoFrame) {
@@ -119,7 +221,7 @@ TEST(Record, LostPicturesAreNamedAndNoFrame) {
   RecordOptions options;
   options.rate_hz = 50;
   options.frames = 20;
-  const RecordReport report = record(cameras, folder.path() / "frames", options);
+  const RecordReport report = record(cameras, rig_of(cameras), folder.path() / "frames", options);
   EXPECT_EQ(report.frames, 20U);
   EXPECT_EQ(report.whole, 16U);
   ASSERT_EQ(report.faults.size(), 1U);
@@ -142,7 +244,7 @@ TEST(Record, SoftwareTriggersSetThePace) {
   options.rate_hz = 20;
   options.seconds = 1;
   options.software_trigger = true;
-  const RecordReport report = record(cameras, folder.path() / "frames", options);
+  const RecordReport report = record(cameras, rig_of(cameras), folder.path() / "frames", options);
   EXPECT_THAT(report.faults, IsEmpty());
   EXPECT_NEAR(static_cast<double>(report.frames), 20, 3);
   EXPECT_EQ(report.whole, report.frames);
@@ -156,7 +258,8 @@ TEST(Record, AnOldFolderIsRefused) {
   cameras.start();
   RecordOptions options;
   options.frames = 1;
-  EXPECT_THROW((void)record(cameras, folder.path() / "frames", options), InputError);
+  EXPECT_THROW((void)record(cameras, rig_of(cameras), folder.path() / "frames", options),
+               InputError);
 }
 
 }  // namespace

@@ -134,7 +134,7 @@ void record_frames(const CaptureCommand& command, Interruption& interruption) {
   options.keep_partial = !command.whole_only;
   const Progress progress = stderr_progress();
   RecordReport report =
-      record(*running.cameras, command.out, options, [&](const RecordReport& so_far) {
+      record(*running.cameras, running.rig, command.out, options, [&](const RecordReport& so_far) {
         const double share = command.seconds > 0  ? so_far.seconds / command.seconds
                              : command.frames > 0 ? static_cast<double>(so_far.frames) /
                                                         static_cast<double>(command.frames)
@@ -166,6 +166,7 @@ void capture_gray(const CaptureCommand& command, Interruption& interruption) {
   figures["pictures"] = report.pictures;
   figures["retaken"] = report.retaken;
   figures["resumed_projectors"] = report.resumed;
+  if (!report.refused.empty()) figures["refused_projectors"] = report.refused;
   figures["seconds"] = report.seconds;
   figures["waiting_seconds"] = report.waiting_seconds;
   for (std::size_t p = 0; p < running.rig.projectors.size(); ++p)
@@ -174,6 +175,9 @@ void capture_gray(const CaptureCommand& command, Interruption& interruption) {
         figures["sees"][running.rig.projectors[p].name][running.rig.cameras[c].name] =
             report.views[p][c].share;
   print_figures(command.common, figures);
+  for (const std::string& projector : report.refused)
+    std::cerr << "pencilscan: the pictures of " << projector
+              << " are refused; the same command takes them anew\n";
   end_with(report.faults);
   if (interruption.within(0)) throw StageError("stopped; the same command goes on");
 }
@@ -190,6 +194,7 @@ void test_lab(const CaptureCommand& command, Interruption& interruption) {
                                                  progress("flashing " + what, share);
                                                  return !interruption.within(0);
                                                });
+  if (interruption.within(0)) throw StageError("stopped; nothing was written");
   for (Fault& fault : screen->check()) report.faults.push_back(std::move(fault));
   Json figures;
   for (std::size_t p = 0; p < running.rig.projectors.size(); ++p) {

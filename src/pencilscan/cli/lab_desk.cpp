@@ -19,6 +19,7 @@
 #include "pencilscan/cli/own_command.h"
 #include "pencilscan/cli/pose_cover.h"
 #include "pencilscan/core/error.h"
+#include "pencilscan/core/formatted.h"
 #include "pencilscan/io/file.h"
 #include "pencilscan/report/labelled_share.h"
 
@@ -144,7 +145,7 @@ Json Desk::camera_status(std::size_t camera) {
     const std::lock_guard lock(figures_mutex_);
     Figured& known = figured_[camera];
     if (latest.frame && known.time_ns != latest.time_ns)
-      known = {latest.time_ns, live_figures(*latest.frame)};
+      known = {latest.time_ns, live_figures(*latest.frame, rig_.cameras[camera].black_level)};
     figures = known.figures;
   }
   const LiveCameras::Count count = cameras_->count(camera);
@@ -246,6 +247,8 @@ std::string Desk::set_camera(const Values& values) {
   if (!camera || *camera < 0 || *camera >= static_cast<double>(rig_.cameras.size()) || !exposure ||
       *exposure <= 0)
     return "an exposure is a number of milliseconds above zero";
+  if (*exposure > kLongestExposureMs)
+    return "an exposure is at most " + formatted(kLongestExposureMs, "%.0f") + " ms";
   const auto index = static_cast<std::size_t>(*camera);
   LabCamera& wanted = options_.lab.cameras[rig_.cameras[index].name];
   return work_.begin("setting", [this, index, &wanted, exposure, gain = number_in(values, "gain")] {
@@ -255,6 +258,10 @@ std::string Desk::set_camera(const Values& values) {
     Lab lab = options_.lab;
     lab.cameras[rig_.cameras[index].name] = changed;
     cameras_->group().configure(index, settings_for(lab, rig_.cameras[index]));
+    // As the camera made it: it may round.
+    const CameraSettings made = cameras_->group().settings(index);
+    if (made.exposure_us) changed.exposure_ms = *made.exposure_us / 1000;
+    if (made.gain) changed.gain = *made.gain;
     wanted = changed;
     write_lab(options_.lab, at("lab.json"));
   });
@@ -299,6 +306,8 @@ void Desk::capture() {
   const bool whole = std::all_of(rig_.projectors.begin(), rig_.projectors.end(),
                                  [&](const Projector& p) { return fs::exists(part / p.name); });
   show({}, "");
+  for (const std::string& projector : report.refused)
+    work_.say(pose + ": the pictures of " + projector + " are taken anew", true);
   if (!whole) return work_.say(pose + " is not whole: press the button again to go on", true);
   if (!report.faults.empty()) {
     fs::remove_all(part);
@@ -367,7 +376,7 @@ void Desk::record() {
   options.frames = 1;
   if (options.software_trigger) options.rate_hz = std::min(options.rate_hz, kCalmRateHz);
   RecordReport report =
-      pencilscan::record(*cameras_, options_.out / name, options,
+      pencilscan::record(*cameras_, rig_, options_.out / name, options,
                          [&](const RecordReport&) { return work_.progress("taking a frame", 0); });
   for (Fault& fault : screen_->check()) report.faults.push_back(std::move(fault));
   work_.say(report.faults);

@@ -1,5 +1,6 @@
 #include "pencilscan/cli/lab_devices.h"
 
+#include "pencilscan/capture/camera_picture.h"
 #include "pencilscan/display/x_screen.h"
 
 namespace pencilscan::cli {
@@ -20,7 +21,9 @@ std::unique_ptr<LiveCameras> start_lab_cameras(const Rig& rig, Lab& lab,
   auto cameras = std::make_unique<LiveCameras>(open_lab_cameras(lab, rig, source));
   for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
     cameras->group().configure(c, settings_for(lab, rig.cameras[c]));
-    const auto exposure = cameras->group().settings(c).exposure_us;
+    const CameraSettings made = cameras->group().settings(c);
+    check_mosaic(rig.cameras[c], made, source);
+    const auto exposure = made.exposure_us;
     LabCamera& camera = lab.cameras[rig.cameras[c].name];
     if (exposure && !camera.exposure_ms) camera.exposure_ms = *exposure / 1000;
   }

@@ -17,7 +17,8 @@ namespace pencilscan::cli {
                                                                const std::string& source);
 
 /// All cameras of the rig, opened, set and running; exposures that the laboratory does not state
-/// are filled in with the cameras' own. `source`: lab.json, for messages.
+/// are filled in with the cameras' own. InputError where a camera delivers another mosaic than the
+/// rig states. `source`: lab.json, for messages.
 [[nodiscard]] std::unique_ptr<LiveCameras> start_lab_cameras(const Rig& rig, Lab& lab,
                                                              const std::string& source);
 

@@ -187,7 +187,7 @@ TEST_F(Virtual, AClockThatRunsAwayIsNamed) {
   RecordOptions options;
   options.rate_hz = 10;
   options.seconds = 6;
-  const RecordReport report = record(*live, temporary_.path() / "frames", options);
+  const RecordReport report = record(*live, rig_, temporary_.path() / "frames", options);
   EXPECT_THAT(told(report.faults), Contains(HasSubstr("clock cam1")));
 }
 
