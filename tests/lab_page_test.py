@@ -38,6 +38,8 @@ def look_at(link):
     ready = wait_for(link, lambda s: all(c["whole"] > 0 for c in s["cameras"]))
     assert [c["name"] for c in ready["cameras"]] == ["cam0", "cam1", "cam2"]
     assert get(link, "preview/2")[:2] == b"\xff\xd8"  # JPEG
+    black = wait_for(link, lambda s: s["showing"] == "black" and not s["job"]["running"])
+    assert all(c["figures"]["lit"] == c["figures"]["line_contrast"] == 0 for c in black["cameras"])
     get(link, "act/show?what=lines", post=True)
     lit = wait_for(link, lambda s: min(c["figures"]["brightest"] for c in s["cameras"]) > 0.4)
     assert lit["showing"] == "lines"
@@ -49,13 +51,52 @@ def look_at(link):
     assert "open the iris" in dim["cameras"][1]["advice"][0]
     assert abs(dim["cameras"][1]["exposure_ms"] - 4) < 0.01
     for nonsense in ("act/shell", "act/show?what=%2Fetc%2Fpasswd", "act/set?camera=9&exposure_ms=1",
-                     "act/set?camera=0&exposure_ms=-1"):
+                     "act/set?camera=0&exposure_ms=-1",
+                     "act/set?camera=1&exposure_ms=100000000"):
         try:
             get(link, nonsense, post=True)
         except urllib.error.HTTPError as error:
             assert error.code == 409, (nonsense, error.code)
         else:
             raise AssertionError(nonsense)
+
+
+def own_display(screen):
+    """The environment in which programs see the laboratory's outputs: its server alone knows its
+    cookie."""
+    for socket in os.listdir("/tmp/.X11-unix"):
+        env = dict(os.environ, DISPLAY=":" + socket[1:], XAUTHORITY=os.path.join(screen, "authority"))
+        listed = subprocess.run([os.environ["PENCILSCAN_PROGRAM"], "show", "--list"], env=env,
+                                capture_output=True)
+        if listed.returncode == 0:
+            return env
+    raise AssertionError("no display")
+
+
+def interrupt_a_test(folder):
+    """A test that is interrupted leaves no lab.json: it would lack the delays that it did not come to."""
+    lab = os.path.join(folder, "lab")
+    with open(os.path.join(lab, "lab.json")) as file:
+        wanted = json.load(file)
+    for name, camera in wanted["cameras"].items():
+        shots = os.path.join(folder, name)
+        os.mkdir(shots)
+        wanted["cameras"][name] = {"device": "folder:" + shots}
+    wanted["patience_s"] = 1
+    own = os.path.join(folder, "own.json")
+    with open(own, "w") as file:
+        json.dump(wanted, file)
+    tested = os.path.join(folder, "tested.json")
+    test = subprocess.Popen(
+        [os.environ["PENCILSCAN_PROGRAM"], "capture", "--rig", os.path.join(lab, "devices.json"),
+         "--lab", own, "--test", tested], env=own_display(os.path.join(lab, "screen")),
+        stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    time.sleep(2)
+    test.send_signal(signal.SIGINT)
+    said = test.communicate(timeout=PATIENCE)[1]
+    assert test.returncode == 1, (test.returncode, said)
+    assert "stopped; nothing was written" in said, said
+    assert not os.path.exists(tested)
 
 
 def main():
@@ -70,6 +111,7 @@ def main():
                 sys.stderr.write(said)
                 return SKIPPED if any(words in said for words in NOT_HERE) else 1
             look_at(first.split()[1])
+            interrupt_a_test(folder)
         finally:
             lab.send_signal(signal.SIGINT)
             code = lab.wait(PATIENCE)
