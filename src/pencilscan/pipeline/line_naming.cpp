@@ -66,11 +66,12 @@ LineNaming name_lines(const Rig& rig, const std::vector<ColorFamily>& families,
   if (!are_enough(result.crossings)) return result;
   const NamingDoubt doubt = doubt_of(rig, families, graphs, result.labeling);
   const bool is_wrong = is_off || !doubt.denied().empty();
-  const bool lacks_names = !doubt.unnamed().empty();
-  if (!is_wrong && !lacks_names &&
-      points > kNearlyAll * static_cast<double>(telling_points(result.labeling).all()))
+  // Where a projector stands far off, a frame alone keeps the points of the others, and says so.
+  if (const std::string text = doubt.of_projectors(); !text.empty())
+    result.warning = naming_warning(text);
+  if (!is_wrong && points > kNearlyAll * static_cast<double>(telling_points(result.labeling).all()))
     return result;
-  if (!is_wrong && !lacks_names) {
+  if (!is_wrong) {
     // Two of three signs of a right rig.
     const bool meets = result.crossings.median_px <= kAsClosely * result.crossings.expected_px;
     const bool are_named = least_named_share(result.labeling) > kMostNamed;
@@ -96,9 +97,7 @@ LineNaming name_lines(const Rig& rig, const std::vector<ColorFamily>& families,
     // names may meet as well as right ones: but they leave many curves without one.
     const bool is_better =
         (names_more && misses < kAsWell) || (named > points && misses < kClearlyLess);
-    const bool is_settled = lacks_names && agrees && named > points &&
-                            doubt_of(found.rig, families, graphs, again).text().empty();
-    if (is_settled || (is_wrong ? agrees || is_better : agrees && names_more)) {
+    if (is_wrong ? agrees || is_better : agrees && names_more) {
       result.labeling = std::move(again);
       result.corrected = std::move(found.rig);
       result.rig_in_frame = agrees ? RigInFrame::kCorrected : RigInFrame::kPartlyCorrected;
@@ -107,8 +106,6 @@ LineNaming name_lines(const Rig& rig, const std::vector<ColorFamily>& families,
   }
   if (is_off || result.corrected)
     result.warning = rig_warning(result.crossings, result.rig_in_frame);
-  else if (is_wrong || lacks_names)
-    result.warning = naming_warning(doubt.text());
   return result;
 }
 

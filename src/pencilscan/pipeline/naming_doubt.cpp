@@ -62,36 +62,42 @@ std::string NamingDoubt::denied() const {
   return names;
 }
 
-std::string NamingDoubt::unnamed() const {
-  // What has no name in a projector's colours may be of any projector that has them.
-  std::vector<std::size_t> sharing(devices_.size(), 1);
-  for (const ColorFamily& family : color_families(*rig_)) {
-    const std::vector<std::size_t> projectors = projectors_of(family);
-    for (const std::size_t p : projectors) {
-      std::size_t& most = sharing[rig_->cameras.size() + p];
-      most = std::max(most, projectors.size());
-    }
-  }
-  std::string text;
-  for (std::size_t d = 0; d < devices_.size(); ++d) {
-    const TellingPoints& points = devices_[d];
-    if (!points.are_enough() || points.named_share() > kMostNamed / static_cast<double>(sharing[d]))
-      continue;
-    add_name(text,
-             "only " + formatted(100 * points.named_share(), "%.0f") + " % of the curves " +
-                 (d < rig_->cameras.size() ? "of camera " : "in the colours of projector ") +
-                 device_at(*rig_, d).name + " have a name",
-             "; ");
-  }
-  return text;
+std::string NamingDoubt::unnamed(std::size_t device, std::size_t sharing) const {
+  const TellingPoints& points = devices_[device];
+  if (!points.are_enough() || points.named_share() > kMostNamed / static_cast<double>(sharing))
+    return {};
+  return "only " + formatted(100 * points.named_share(), "%.0f") + " % of the curves " +
+         (device < rig_->cameras.size() ? "of camera " : "in the colours of projector ") +
+         device_at(*rig_, device).name + " have a name";
 }
 
-std::string NamingDoubt::text() const {
-  std::string text = unnamed();
+std::string NamingDoubt::of_projectors() const {
+  // What has no name in a projector's colours may be of any projector that has them.
+  std::vector<std::size_t> sharing(rig_->projectors.size(), 1);
+  for (const ColorFamily& family : color_families(*rig_)) {
+    const std::vector<std::size_t> projectors = projectors_of(family);
+    for (const std::size_t p : projectors) sharing[p] = std::max(sharing[p], projectors.size());
+  }
+  std::string text;
+  for (std::size_t p = 0; p < sharing.size(); ++p) {
+    const std::string lack = unnamed(rig_->cameras.size() + p, sharing[p]);
+    if (!lack.empty()) add_name(text, lack, "; ");
+  }
   const std::string projectors = denied();
   if (!projectors.empty())
     add_name(text, "the colours of " + projectors + " are those of other lines than the ones named",
              "; ");
+  return text;
+}
+
+std::string NamingDoubt::text() const {
+  std::string text;
+  for (std::size_t c = 0; c < rig_->cameras.size(); ++c) {
+    const std::string lack = unnamed(c, 1);
+    if (!lack.empty()) add_name(text, lack, "; ");
+  }
+  const std::string projectors = of_projectors();
+  if (!projectors.empty()) add_name(text, projectors, "; ");
   return text;
 }
 

@@ -21,15 +21,17 @@ class NamingDoubt {
 
   /// Projectors whose colours are those of other lines than the ones named; empty: none.
   [[nodiscard]] std::string denied() const;
-  /// Cameras most of whose curves have no name, and projectors most of what is drawn in whose
-  /// colours has none, in plain words; empty: none.
-  [[nodiscard]] std::string unnamed() const;
-  /// Both.
+  /// In plain words, projectors most of what is drawn in whose colours has no name, and those that
+  /// colours deny; empty: none.
+  [[nodiscard]] std::string of_projectors() const;
+  /// The same, and cameras most of whose curves have no name.
   [[nodiscard]] std::string text() const;
   /// Of a camera, or in the colours of a projector.
   [[nodiscard]] const TellingPoints& telling(std::size_t device) const { return devices_[device]; }
 
  private:
+  [[nodiscard]] std::string unnamed(std::size_t device, std::size_t sharing) const;
+
   const Rig* rig_;
   std::vector<TellingPoints> devices_;  ///< cameras, then projectors: in the colours of each
   ShownColorCount colors_;
