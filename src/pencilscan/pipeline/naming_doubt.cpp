@@ -59,6 +59,9 @@ std::string NamingDoubt::denied() const {
     if (shown.deny())
       add_name(names, rig_->projectors[static_cast<std::size_t>(shown.pattern.projector)].name);
   }
+  const std::vector<ShownColors> seen = colors_.seen();
+  for (std::size_t c = 0; c < seen.size(); ++c)
+    if (seen[c].deny()) add_name(names, rig_->cameras[c].name);
   return names;
 }
 

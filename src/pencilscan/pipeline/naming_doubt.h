@@ -19,7 +19,8 @@ class NamingDoubt {
   void add(const std::vector<ColorFamily>& families, std::span<const GridGraph> graphs,
            const Labeling& labeling);
 
-  /// Projectors whose colours are those of other lines than the ones named; empty: none.
+  /// Projectors, and cameras, whose lines have the colours of others than the ones named; empty:
+  /// none.
   [[nodiscard]] std::string denied() const;
   /// In plain words, projectors most of what is drawn in whose colours has no name, and those that
   /// colours deny; empty: none.

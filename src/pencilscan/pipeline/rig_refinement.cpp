@@ -41,16 +41,16 @@ struct Attempt {
   std::vector<CrossingTrack> tracks;  ///< of the last labels
   std::vector<std::size_t> moved;     ///< RefineRigOptions::moved
   bool agrees = false;
-  std::string denied;  ///< projectors whose colours speak against their lines' names
+  std::string denied;  ///< devices whose colours speak against their lines' names
   std::size_t points = 0;
 };
 
-std::vector<ShownColors> shown_colors(const Rig& rig, std::span<const FrameCurves> frames,
-                                      std::span<const Labeling> labelings) {
+ShownColorCount shown_colors(const Rig& rig, std::span<const FrameCurves> frames,
+                             std::span<const Labeling> labelings) {
   ShownColorCount count(rig);
   for (std::size_t f = 0; f < frames.size(); ++f)
     count.add(frames[f].families, frames[f].graphs, labelings[f]);
-  return count.shown();
+  return count;
 }
 
 /// Where few devices moved and all others are as calibrated, refinement starts with those put back.
@@ -111,7 +111,8 @@ bool turn_by_colors(const Rig& calibrated, std::span<const FrameCurves> frames, 
   bool turned = false;
   RigCorrection correction = result.correction;
   correction.resize(device_count(calibrated));
-  for (const ShownColors& shown : shown_colors(calibrated, frames, result.refinement.labelings)) {
+  for (const ShownColors& shown :
+       shown_colors(calibrated, frames, result.refinement.labelings).shown()) {
     if (shown.better_shift() == 0) continue;
     const auto p = static_cast<std::size_t>(shown.pattern.projector);
     const LinePattern& lines =
@@ -141,12 +142,16 @@ Attempt attempt(const Rig& calibrated, std::span<const FrameCurves> frames, doub
       !run_rounds(calibrated, frames, tolerance, options, result))
     return result;
   result.agrees = !disagrees(crossing_disagreement(result.refinement.rig, result.tracks));
-  for (const ShownColors& shown : shown_colors(calibrated, frames, result.refinement.labelings)) {
-    if (!shown.deny()) continue;
-    const auto p = static_cast<std::size_t>(shown.pattern.projector);
-    add_name(result.denied, calibrated.projectors[p].name);
-    result.agrees = false;
+  const ShownColorCount colors = shown_colors(calibrated, frames, result.refinement.labelings);
+  for (const ShownColors& shown : colors.shown()) {
+    if (shown.deny())
+      add_name(result.denied,
+               calibrated.projectors[static_cast<std::size_t>(shown.pattern.projector)].name);
   }
+  const std::vector<ShownColors> seen = colors.seen();
+  for (std::size_t c = 0; c < seen.size(); ++c)
+    if (seen[c].deny()) add_name(result.denied, calibrated.cameras[c].name);
+  if (!result.denied.empty()) result.agrees = false;
   for (const Labeling& labeling : result.refinement.labelings)
     result.points += labelled_points(labeling);
   return result;

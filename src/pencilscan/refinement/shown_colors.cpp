@@ -31,9 +31,19 @@ SeenColor seen_color(const float* code, int colors) {
   return seen;
 }
 
+/// Share of a pattern's lines that have the colour of a line by chance.
+double chance_of(const LinePattern& lines) {
+  std::vector<double> of_symbol(static_cast<std::size_t>(lines.alphabet), 0);
+  for (int line = 0; line < lines.period(); ++line)
+    of_symbol[static_cast<std::size_t>(lines.symbol(line))] += 1.0 / lines.period();
+  double chance = 0;
+  for (const double share : of_symbol) chance += share * share;
+  return chance;
+}
+
 }  // namespace
 
-ShownColorCount::ShownColorCount(const Rig& rig) : rig_(&rig) {
+ShownColorCount::ShownColorCount(const Rig& rig) : rig_(&rig), seen_(rig.cameras.size()) {
   for (std::size_t p = 0; p < rig.projectors.size(); ++p) {
     for (std::size_t k = 0; k < rig.projectors[p].patterns.size(); ++k) {
       const PatternRef ref{static_cast<int>(p), static_cast<int>(k)};
@@ -61,7 +71,10 @@ void ShownColorCount::add(const std::vector<ColorFamily>& families,
       const LinePattern& lines = pattern(count->ref);
       const std::vector<int> color_of = family.color_of_symbol(lines);
       const int reach = reach_of(lines);
+      const double chance = chance_of(lines);
+      Seen& in_camera = seen_[static_cast<std::size_t>(graph.camera)];
       ++count->runs;
+      if (chance < 1) ++in_camera.runs;
       for (int i = run.begin; i < run.end; ++i) {
         const SeenColor seen =
             seen_color(curve.code.data() + static_cast<std::ptrdiff_t>(i) * colors, colors);
@@ -69,8 +82,13 @@ void ShownColorCount::add(const std::vector<ColorFamily>& families,
         for (int shift = -reach; shift <= reach; ++shift) {
           // Lines before the first one are those of the period before.
           const int id = (run.label.line + shift + lines.period() * kFarthest) % lines.period();
-          if (color_of[static_cast<std::size_t>(lines.symbol(id))] == seen.color)
-            count->agree[static_cast<std::size_t>(shift + reach)] += seen.weight;
+          if (color_of[static_cast<std::size_t>(lines.symbol(id))] != seen.color) continue;
+          count->agree[static_cast<std::size_t>(shift + reach)] += seen.weight;
+          if (shift == 0 && chance < 1) in_camera.agree += seen.weight;
+        }
+        if (chance < 1) {
+          in_camera.weight += seen.weight;
+          in_camera.chance += chance * seen.weight;
         }
       }
     }
@@ -86,11 +104,7 @@ std::vector<ShownColors> ShownColorCount::shown() const {
     shown.pattern = count.ref;
     shown.runs = count.runs;
     if (!(count.weight > 0)) continue;  // no colour tells
-    std::vector<double> of_symbol(static_cast<std::size_t>(lines.alphabet), 0);
-    for (int line = 0; line < lines.period(); ++line)
-      of_symbol[static_cast<std::size_t>(lines.symbol(line))] += 1.0 / lines.period();
-    shown.chance = 0;
-    for (const double share : of_symbol) shown.chance += share * share;
+    shown.chance = chance_of(lines);
     const auto share_at = [&](int shift) {
       return count.agree[static_cast<std::size_t>(shift + reach)] / count.weight;
     };
@@ -102,6 +116,18 @@ std::vector<ShownColors> ShownColorCount::shown() const {
         shown.shifted_share = share_at(shift);
       }
     }
+  }
+  return result;
+}
+
+std::vector<ShownColors> ShownColorCount::seen() const {
+  std::vector<ShownColors> result;
+  for (const Seen& camera : seen_) {
+    ShownColors& shown = result.emplace_back();
+    shown.runs = camera.runs;
+    if (!(camera.weight > 0)) continue;
+    shown.chance = camera.chance / camera.weight;
+    shown.share = shown.shifted_share = camera.agree / camera.weight;
   }
   return result;
 }

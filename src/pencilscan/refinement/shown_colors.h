@@ -9,7 +9,8 @@
 
 namespace pencilscan {
 
-/// What the colours of labelled curves say of the names of one pattern's lines. A device that
+/// What the colours of labelled curves say of the names of one pattern's lines, or of all lines in
+/// one camera (without a pattern and a shift). A device that
 /// stands elsewhere may have every crossing agree with names that are whole lines off; colours do
 /// not agree then.
 struct ShownColors {
@@ -43,6 +44,8 @@ class ShownColorCount {
   void add(const std::vector<ColorFamily>& families, std::span<const GridGraph> graphs,
            const Labeling& labeling);
   [[nodiscard]] std::vector<ShownColors> shown() const;
+  /// The same by camera.
+  [[nodiscard]] std::vector<ShownColors> seen() const;
 
  private:
   struct Count {
@@ -53,8 +56,17 @@ class ShownColorCount {
   };
   [[nodiscard]] const LinePattern& pattern(PatternRef ref) const;
 
+  /// Of a camera; `chance` is a sum of weights, as `agree` is.
+  struct Seen {
+    std::size_t runs = 0;
+    double weight = 0;
+    double agree = 0;
+    double chance = 0;
+  };
+
   const Rig* rig_;
   std::vector<Count> counts_;
+  std::vector<Seen> seen_;
 };
 
 }  // namespace pencilscan
