@@ -67,7 +67,7 @@ TEST_F(Newcomer, IsToldTheWrongWordAndTheNearestRightOne) {
   expect_bad("ring --out rig.json", "unknown command ring; did you mean rig ring?");
   expect_bad("reconstruct --rig r --frames f --output o", "did you mean --out?");
   expect_bad("reconstruct --rig r --frames f --out o --method lineer",
-             "--method = lineer: must be joint, multiview, linear or single-projector; did you "
+             "--method = lineer: must be linear, multiview, joint or single-projector; did you "
              "mean linear? (see pencilscan reconstruct --help)");
   expect_bad("simulate --rig r --mesh m --out o --up w", "--up = w: must be x, y or z");
 }

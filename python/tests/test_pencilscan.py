@@ -354,7 +354,7 @@ class PackageTest(unittest.TestCase):
             ps.reconstruct(rig, {"cam0": np.zeros((360, 480, 3), np.uint8)})
         with self.assertRaises(TypeError):
             ps.reconstruct(rig, frame, metod="joint")
-        self.assertIn("must be one of joint", str(self.complaint(
+        self.assertIn("must be joint", str(self.complaint(
             lambda: ps.reconstruct(rig, frame, method="magic"))))
 
     def test_pictures_may_be_a_list_in_the_rigs_order(self) -> None:

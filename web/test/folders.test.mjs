@@ -70,7 +70,7 @@ test('an experiment has its title, tables, pictures and runs, without a complain
     .map((image) => image.complete && image.naturalWidth > 0));
   assert.deepEqual(shown, [true, true, true, true, true, true]); // moving, sheet, plot and three small ones
   assert.deepEqual(await page.evaluate(() => [window.ran, document.title.startsWith('experiment')]), [undefined, true]);
-  assert.match(await page.locator('.notes:visible').innerText(), /Cannot be read: broken\.png\s+broken\.png: must be/);
+  assert.match(await page.locator('.notes').innerText(), /Cannot be read: broken\.png\s+broken\.png: must be/);
   assert.match(await page.locator('#experiment').innerText(), /work\/deep\/calibrated\s+calibration\s+doubtful\s+pencilscan report experiment\/work\/deep\/calibrated/);
   await page.click('text=Values of results.csv (2 rows)');
   assert.ok(await page.locator('text=0.25').isVisible());

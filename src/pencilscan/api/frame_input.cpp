@@ -85,9 +85,12 @@ FrameOptions frame_options(const Rig& rig, const ReconstructionOptions& options)
   PointOptions& points = frame.points;
   const SolutionMethod* method = find_method(options.method);
   if (method == nullptr) {
-    std::string names;
-    for (const std::string& name : method_names()) add_name(names, name);
-    throw InputError("options", "method", options.method, "must be one of " + names);
+    std::vector<std::string> names = method_names();
+    std::sort(names.begin(), names.end());
+    const std::string last = names.back();
+    names.pop_back();
+    throw InputError("options", "method", options.method,
+                     "must be " + name_list(names) + " or " + last);
   }
   points.method = method->defaults;
   if (!set_multiview_cost(options.multiview_cost, points.method)) {

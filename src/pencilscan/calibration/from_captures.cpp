@@ -8,6 +8,7 @@
 #include "pencilscan/boards/board.h"
 #include "pencilscan/calibration/mirrored.h"
 #include "pencilscan/core/error.h"
+#include "pencilscan/core/name_list.h"
 #include "pencilscan/gray/gray_decode.h"
 #include "pencilscan/gray/image_order.h"
 #include "pencilscan/planning/units.h"
@@ -25,11 +26,7 @@ std::vector<Finding> findings_of(const WrongOrders& orders, std::size_t pairs) {
   for (const auto& [order, names] : orders) {
     std::string who = "all " + std::to_string(pairs) + " pairs";
     const bool is_all = names.size() == pairs && pairs > 1;
-    if (!is_all) {
-      who = names.front();
-      for (std::size_t i = 1; i < std::min(names.size(), kNamed); ++i) who += ", " + names[i];
-      if (names.size() > kNamed) who += " and " + std::to_string(names.size() - kNamed) + " more";
-    }
+    if (!is_all) who = name_list(names, kNamed);
     findings.push_back({is_all ? Grade::kUnusable : Grade::kDoubtful,
                         "the images of " + who + " are in the wrong order: " + order,
                         "put them in the documented order; they were left out"});

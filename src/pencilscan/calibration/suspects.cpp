@@ -8,6 +8,7 @@
 
 #include "pencilscan/bundle/bundle_device.h"
 #include "pencilscan/calibration/pair_fit.h"
+#include "pencilscan/core/name_list.h"
 
 namespace pencilscan {
 namespace {
@@ -73,12 +74,6 @@ void find_swaps(const CalibrationInput& input, const Matches& matches, const Pai
   }
 }
 
-std::string join(const std::vector<std::string>& names) {
-  std::string text;
-  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
-  return text;
-}
-
 /// The device that most of the contradicting pairs have in common; of several, the one whose pairs
 /// fit worst altogether.
 Finding name_mover(const CalibrationInput& input, const Matches& matches, const PairFit& fit,
@@ -107,12 +102,12 @@ Finding name_mover(const CalibrationInput& input, const Matches& matches, const 
   const bool is_camera = mover->first < input.rig.cameras.size();
   std::string text = std::string(is_camera ? "camera " : "projector ") +
                      device_at(input.rig, mover->first).name + " has moved: its images " +
-                     (is_camera ? "of " : "in ") + join(partners) +
+                     (is_camera ? "of " : "in ") + name_list(partners) +
                      " do not fit the rest of the rig";
   if (!when.empty()) {
     std::vector<std::string> names;
     for (const std::size_t capture : when) names.push_back(std::to_string(capture + 1));
-    text += " (--captures number " + join(names) + ")";
+    text += " (--captures number " + name_list(names) + ")";
   }
   return {Grade::kDoubtful, text,
           "fix the device, and take the captures again; those that do not fit were left out"};

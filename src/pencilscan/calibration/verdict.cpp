@@ -8,6 +8,7 @@
 #include "pencilscan/calibration/suspects.h"
 #include "pencilscan/core/formatted.h"
 #include "pencilscan/core/length_units.h"
+#include "pencilscan/core/name_list.h"
 
 namespace pencilscan {
 namespace {
@@ -174,12 +175,9 @@ class Judge {
                  "cameras"));
     }
     if (!at_prior.empty()) {
-      std::string list;
-      for (std::size_t i = 0; i < std::min<std::size_t>(at_prior.size(), 6); ++i)
-        list += (i == 0 ? "" : ", ") + at_prior[i];
-      if (at_prior.size() > 6) list += " and " + std::to_string(at_prior.size() - 6) + " more";
       add(Grade::kDoubtful,
-          "the data do not determine " + list + ": held near what is plausible or was given",
+          "the data do not determine " + name_list(at_prior, 6) +
+              ": held near what is plausible or was given",
           "add captures with the object moved and turned, or give K");
     }
   }

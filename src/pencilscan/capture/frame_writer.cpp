@@ -10,17 +10,13 @@
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/io/image.h"
 #include "pencilscan/io/partial_folder.h"
+#include "pencilscan/recording/pack.h"
 #include "pencilscan/recording/recording_writer.h"
 
 namespace pencilscan {
 namespace {
 
 namespace fs = std::filesystem;
-
-std::string six_digits(std::size_t number) {
-  const std::string text = std::to_string(number);
-  return std::string(text.size() < 6 ? 6 - text.size() : 0, '0') + text;
-}
 
 bool is_zarr(const fs::path& out) { return out.extension() == ".zarr"; }
 

@@ -79,11 +79,16 @@ TEST(LiveFigures, PreviewsLeaveThePictureAlone) {
   EXPECT_EQ(frame.image.at<cv::Vec3b>(5, 5), cv::Vec3b(200, 100, 0));
 }
 
-TEST(LiveFigures, OfABlackPictureNothingIsSaid) {
+CameraFrame noisy(double mean, double deviation) {
   CameraFrame frame;
   frame.image = cv::Mat(200, 320, CV_8UC3);
   cv::theRNG().state = 1;
-  cv::randn(frame.image, cv::Scalar::all(2), cv::Scalar::all(1.5));
+  cv::randn(frame.image, cv::Scalar::all(mean), cv::Scalar::all(deviation));
+  return frame;
+}
+
+TEST(LiveFigures, OfABlackPictureNothingIsSaid) {
+  CameraFrame frame = noisy(2, 1.5);
   EXPECT_EQ(live_figures(frame).lit, 0);
   EXPECT_EQ(live_figures(frame).line_contrast, 0);
   frame.image += cv::Scalar::all(16);  // a black level
@@ -92,13 +97,7 @@ TEST(LiveFigures, OfABlackPictureNothingIsSaid) {
   EXPECT_EQ(live_figures(frame, 16.0 / 255).line_contrast, 0);
 }
 
-TEST(LiveFigures, NoiseHasNoEdges) {
-  CameraFrame frame;
-  frame.image = cv::Mat(200, 320, CV_8UC3);
-  cv::theRNG().state = 1;
-  cv::randn(frame.image, cv::Scalar::all(4), cv::Scalar::all(2));
-  EXPECT_EQ(live_figures(frame).edge_px, 0);
-}
+TEST(LiveFigures, NoiseHasNoEdges) { EXPECT_EQ(live_figures(noisy(4, 2)).edge_px, 0); }
 
 }  // namespace
 }  // namespace pencilscan

@@ -7,6 +7,7 @@
 #include "pencilscan/cli/sequence_jobs.h"
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/median.h"
+#include "pencilscan/core/name_list.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/recording/pack.h"
 
@@ -106,12 +107,9 @@ struct InfoCommand {
 
 /// "000012, 000020 and 5 more".
 std::string frame_list(const std::vector<std::size_t>& frames) {
-  constexpr std::size_t kShown = 8;
-  std::string text;
-  for (std::size_t i = 0; i < std::min(frames.size(), kShown); ++i)
-    text += (i == 0 ? "" : ", ") + six_digits(frames[i]);
-  if (frames.size() > kShown) text += " and " + std::to_string(frames.size() - kShown) + " more";
-  return text;
+  std::vector<std::string> names;
+  for (const std::size_t k : frames) names.push_back(six_digits(k));
+  return name_list(names, kNamedFrames);
 }
 
 Json names_of(const std::vector<std::size_t>& frames) {

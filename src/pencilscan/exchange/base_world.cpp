@@ -7,6 +7,7 @@
 #include "pencilscan/core/formatted.h"
 #include "pencilscan/core/length_units.h"
 #include "pencilscan/core/median.h"
+#include "pencilscan/core/name_list.h"
 #include "pencilscan/geometry/least_squares.h"
 #include "pencilscan/rig/device_list.h"
 
@@ -44,11 +45,7 @@ std::vector<std::string> kept_devices(const MergedFiles& files, const Uncalibrat
 std::string list_text(const std::vector<std::string>& words) {
   constexpr std::size_t kMost = 6;
   constexpr std::size_t kOfMany = 4;
-  const std::size_t shown = words.size() > kMost ? kOfMany : words.size();
-  std::string text;
-  for (std::size_t i = 0; i < shown; ++i) text += (i == 0 ? "" : ", ") + words[i];
-  return shown == words.size() ? text
-                               : text + " and " + std::to_string(words.size() - shown) + " more";
+  return name_list(words, words.size() > kMost ? kOfMany : kMost);
 }
 
 /// Length in the base over length in the files, of the distances of devices that both place;

@@ -3,17 +3,14 @@
 #include <algorithm>
 #include <vector>
 
+#include "pencilscan/core/name_list.h"
+
 namespace pencilscan {
 namespace {
 
 std::string some_of(std::vector<std::string>& names) {
-  constexpr std::size_t kShown = 4;
   std::sort(names.begin(), names.end());
-  std::string text;
-  for (std::size_t i = 0; i < std::min(names.size(), kShown); ++i)
-    text += (i == 0 ? "" : ", ") + names[i];
-  if (names.size() > kShown) text += " and " + std::to_string(names.size() - kShown) + " more";
-  return text;
+  return name_list(names, 4);
 }
 
 }  // namespace

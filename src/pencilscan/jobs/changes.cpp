@@ -16,7 +16,6 @@ namespace {
 // values gave no change in 100 sequences of 300 values; with 25 values 12.
 constexpr std::size_t kReference = 15;
 constexpr std::size_t kFewest = 8;  // values that a median and its spread can be trusted of
-constexpr std::size_t kInARow = 3;  // named within that many frames, and no single bad one is
 
 /// The running median and its spread.
 class Reference {
@@ -113,9 +112,9 @@ Steps search(std::span<const double> values, const Reference& empty,
       levels.add(values[k]);
       continue;
     }
-    const auto next = values.subspan(k, std::min(kInARow, values.size() - k));
+    const auto next = values.subspan(k, std::min(kFramesOfChange, values.size() - k));
     const bool lasts =
-        next.size() == kInARow &&
+        next.size() == kFramesOfChange &&
         std::all_of(next.begin(), next.end(), [&](double v) { return levels.side(v) == side; });
     if (!lasts && !is_told) {
       steps.outliers.push_back(k);

@@ -31,6 +31,9 @@ struct Change {
   double spreads = 0;  ///< difference over the spread before
 };
 
+/// So many values out in a row are a change; no single bad one is.
+inline constexpr std::size_t kFramesOfChange = 3;
+
 struct ChangeReport {
   std::vector<Change> changes;
   std::vector<std::size_t> outliers;  ///< single values that differ

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "pencilscan/core/error.h"
+#include "pencilscan/core/name_list.h"
 #include "pencilscan/jobs/job_folder.h"
 #include "pencilscan/pipeline/shard.h"
 #include "pencilscan/rig/rig.h"
@@ -81,20 +82,14 @@ SequenceSummary summarize_sequence(const fs::path& out) {
 }
 
 std::optional<std::string> not_run_again(const SequenceSummary& summary) {
-  constexpr std::size_t kShown = 8;
-  std::string names;
-  std::size_t count = 0;
-  for (const Hole& hole : summary.holes) {
-    if (hole.may_fill) continue;
-    if (count < kShown) names += (count == 0 ? "" : ", ") + summary.rows[hole.row].name;
-    ++count;
-  }
-  if (count == 0) return std::nullopt;
-  if (count > kShown) names += " and " + std::to_string(count - kShown) + " more";
-  return "frames that failed for their pictures are not run again: " + names +
+  std::vector<std::string> names;
+  for (const Hole& hole : summary.holes)
+    if (!hole.may_fill) names.push_back(summary.rows[hole.row].name);
+  if (names.empty()) return std::nullopt;
+  return "frames that failed for their pictures are not run again: " +
+         name_list(names, kNamedFrames) +
          "; where these were repaired since, give the command that made the sequence once more "
-         "with "
-         "--overwrite: it makes anew what depends on them, and keeps the rest";
+         "with --overwrite: it makes anew what depends on them, and keeps the rest";
 }
 
 std::vector<std::size_t> tasks_with_holes(const SequenceSummary& summary, std::size_t tasks) {

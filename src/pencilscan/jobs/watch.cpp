@@ -119,8 +119,6 @@ std::string usual_cause(const std::string& kind, bool up, bool all, bool lines_t
   return up ? "" : "agrees again";
 }
 
-constexpr std::size_t kFramesOfChange = 3;  // as find_changes() asks for
-
 /// Median over the known ones of `count` frames, from `first` on.
 template <class Row>
 double median_of_done(Row first, Row last, std::size_t count, const Reading& reading) {

@@ -8,13 +8,12 @@ namespace pencilscan {
 std::span<const SolutionMethod> solution_methods() {
   using Families = std::vector<ColorFamily>;
   using Graphs = std::span<const GridGraph>;
-  // In the order of the alternatives of MethodOptions.
-  static const std::array<SolutionMethod, 4> kMethods = {{
-      {"joint",
-       {.may_be_guided = true, .allows_dense_depth = true, .corrects_rig = true},
-       JointOptions{},
-       [](const Rig& rig, const Families& families, Graphs graphs, const MethodOptions& options) {
-         return solve_joint(rig, families, graphs, std::get<JointOptions>(options));
+  static const std::array kMethods = std::to_array<SolutionMethod>({
+      {"linear",
+       {.needs_identities = true},
+       LinearOptions{},
+       [](const Rig& rig, const Families&, Graphs graphs, const MethodOptions&) {
+         return solve_linear(rig, graphs);
        }},
       {"multiview",
        {.needs_identities = true},
@@ -22,11 +21,11 @@ std::span<const SolutionMethod> solution_methods() {
        [](const Rig& rig, const Families&, Graphs graphs, const MethodOptions& options) {
          return solve_multiview(rig, graphs, std::get<MultiviewOptions>(options));
        }},
-      {"linear",
-       {.needs_identities = true},
-       LinearOptions{},
-       [](const Rig& rig, const Families&, Graphs graphs, const MethodOptions&) {
-         return solve_linear(rig, graphs);
+      {"joint",
+       {.may_be_guided = true, .allows_dense_depth = true, .corrects_rig = true},
+       JointOptions{},
+       [](const Rig& rig, const Families& families, Graphs graphs, const MethodOptions& options) {
+         return solve_joint(rig, families, graphs, std::get<JointOptions>(options));
        }},
       {"single-projector",
        {.needs_identities = true, .needs_grid = true},
@@ -34,12 +33,15 @@ std::span<const SolutionMethod> solution_methods() {
        [](const Rig& rig, const Families&, Graphs graphs, const MethodOptions& options) {
          return solve_projector_grids(rig, graphs, std::get<SingleProjectorOptions>(options));
        }},
-  }};
+  });
   return kMethods;
 }
 
 const SolutionMethod& solution_method(const MethodOptions& options) {
-  return solution_methods()[options.index()];
+  const auto methods = solution_methods();
+  return *std::find_if(methods.begin(), methods.end(), [&](const SolutionMethod& m) {
+    return m.defaults.index() == options.index();
+  });
 }
 
 std::vector<std::string> method_names() {

@@ -37,11 +37,11 @@ struct SolutionMethod {
                     std::span<const GridGraph> graphs, const MethodOptions& options);
 };
 
-/// All methods, the default one first.
+/// All methods, in the order in which people are told of them.
 [[nodiscard]] std::span<const SolutionMethod> solution_methods();
 /// The method that these options are of.
 [[nodiscard]] const SolutionMethod& solution_method(const MethodOptions& options);
-/// The default one first.
+/// The same.
 [[nodiscard]] std::vector<std::string> method_names();
 /// Nothing for a name that no method has.
 [[nodiscard]] const SolutionMethod* find_method(std::string_view name);

@@ -53,18 +53,6 @@ void NamingDoubt::add(const std::vector<ColorFamily>& families, std::span<const 
   }
 }
 
-std::string NamingDoubt::denied() const {
-  std::string names;
-  for (const ShownColors& shown : colors_.shown()) {
-    if (shown.deny())
-      add_name(names, rig_->projectors[static_cast<std::size_t>(shown.pattern.projector)].name);
-  }
-  const std::vector<ShownColors> seen = colors_.seen();
-  for (std::size_t c = 0; c < seen.size(); ++c)
-    if (seen[c].deny()) add_name(names, rig_->cameras[c].name);
-  return names;
-}
-
 std::string NamingDoubt::unnamed(std::size_t device, std::size_t sharing) const {
   const TellingPoints& points = devices_[device];
   if (!points.are_enough() || points.named_share() > kMostNamed / static_cast<double>(sharing))

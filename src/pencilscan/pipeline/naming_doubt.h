@@ -14,6 +14,7 @@ namespace pencilscan {
 /// there are may meet.
 class NamingDoubt {
  public:
+  /// The rig must outlive it.
   explicit NamingDoubt(const Rig& rig);
   /// One frame.
   void add(const std::vector<ColorFamily>& families, std::span<const GridGraph> graphs,
@@ -21,9 +22,9 @@ class NamingDoubt {
 
   /// Projectors, and cameras, whose lines have the colours of others than the ones named; empty:
   /// none.
-  [[nodiscard]] std::string denied() const;
-  /// In plain words, projectors most of what is drawn in whose colours has no name, and those that
-  /// colours deny; empty: none.
+  [[nodiscard]] std::string denied() const { return colors_.denied(); }
+  /// In plain words, projectors most of what is drawn in whose colours has no name, and devices
+  /// that colours deny; empty: none.
   [[nodiscard]] std::string of_projectors() const;
   /// The same, and cameras most of whose curves have no name.
   [[nodiscard]] std::string text() const;

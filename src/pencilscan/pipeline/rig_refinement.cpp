@@ -7,7 +7,6 @@
 #include <string>
 #include <utility>
 
-#include "pencilscan/core/name_list.h"
 #include "pencilscan/joint/joint.h"
 #include "pencilscan/refinement/moved_devices.h"
 #include "pencilscan/refinement/shown_colors.h"
@@ -142,15 +141,7 @@ Attempt attempt(const Rig& calibrated, std::span<const FrameCurves> frames, doub
       !run_rounds(calibrated, frames, tolerance, options, result))
     return result;
   result.agrees = !disagrees(crossing_disagreement(result.refinement.rig, result.tracks));
-  const ShownColorCount colors = shown_colors(calibrated, frames, result.refinement.labelings);
-  for (const ShownColors& shown : colors.shown()) {
-    if (shown.deny())
-      add_name(result.denied,
-               calibrated.projectors[static_cast<std::size_t>(shown.pattern.projector)].name);
-  }
-  const std::vector<ShownColors> seen = colors.seen();
-  for (std::size_t c = 0; c < seen.size(); ++c)
-    if (seen[c].deny()) add_name(result.denied, calibrated.cameras[c].name);
+  result.denied = shown_colors(calibrated, frames, result.refinement.labelings).denied();
   if (!result.denied.empty()) result.agrees = false;
   for (const Labeling& labeling : result.refinement.labelings)
     result.points += labelled_points(labeling);

@@ -15,6 +15,7 @@
 #include <utility>
 
 #include "pencilscan/core/error.h"
+#include "pencilscan/core/name_list.h"
 #include "pencilscan/io/file.h"
 #include "pencilscan/io/hash.h"
 #include "pencilscan/io/image.h"
@@ -236,7 +237,6 @@ void check_replaceable(const fs::path& out, const std::string& frame) {
 
 std::optional<std::string> strays_warning(const fs::path& out,
                                           const std::vector<std::string>& frames) {
-  constexpr std::size_t kShown = 8;
   const std::set<std::string> known(frames.begin(), frames.end());
   std::vector<std::string> strays;
   std::error_code ignored;
@@ -248,11 +248,8 @@ std::optional<std::string> strays_warning(const fs::path& out,
   }
   if (strays.empty()) return std::nullopt;
   std::sort(strays.begin(), strays.end());
-  std::string names;
-  for (std::size_t i = 0; i < std::min(strays.size(), kShown); ++i)
-    names += (i == 0 ? "" : ", ") + strays[i];
-  if (strays.size() > kShown) names += " and " + std::to_string(strays.size() - kShown) + " more";
-  return out.string() + " holds results of frames that the input does not have: " + names +
+  return out.string() + " holds results of frames that the input does not have: " +
+         name_list(strays, kNamedFrames) +
          "; report takes them in, so remove their folders or name a new output folder";
 }
 

@@ -11,6 +11,7 @@
 #include <system_error>
 
 #include "pencilscan/core/error.h"
+#include "pencilscan/core/name_list.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/io/file.h"
 #include "pencilscan/io/found_files.h"
@@ -120,16 +121,6 @@ std::vector<std::string> words(const std::string& line) {
 /// Time stamps by frame name and camera.
 using Times = std::map<std::string, std::map<std::string, std::int64_t>>;
 
-/// "000012, 000020 and 5 more".
-std::string name_list(const std::vector<std::string>& names) {
-  constexpr std::size_t kShown = 8;
-  std::string text;
-  for (std::size_t i = 0; i < std::min(names.size(), kShown); ++i)
-    text += (i == 0 ? "" : ", ") + names[i];
-  if (names.size() > kShown) text += " and " + std::to_string(names.size() - kShown) + " more";
-  return text;
-}
-
 /// The cameras of the columns. InputError where one has no pictures, or stands twice.
 std::vector<std::string> read_header(const fs::path& file, const std::string& line,
                                      const std::vector<std::string>& cameras) {
@@ -138,8 +129,9 @@ std::vector<std::string> read_header(const fs::path& file, const std::string& li
     throw InputError(file.string(), "line 1", line, "must be frame,<camera>,<camera>,...");
   for (auto column = header.begin() + 1; column != header.end(); ++column) {
     if (std::find(cameras.begin(), cameras.end(), *column) == cameras.end()) {
-      throw InputError(file.string(), "line 1", *column,
-                       "must be a camera that has pictures (" + name_list(cameras) + ")");
+      throw InputError(
+          file.string(), "line 1", *column,
+          "must be a camera that has pictures (" + name_list(cameras, kNamedFrames) + ")");
     }
     if (std::find(header.begin() + 1, column, *column) != column)
       throw InputError(file.string(), "line 1", *column, "must stand once");
@@ -187,7 +179,7 @@ std::int64_t time_of(const Times& times, const std::string& frame, const std::st
 
 /// "3 (000012, 000020, 000021)".
 std::string counted(const std::vector<std::string>& names) {
-  return std::to_string(names.size()) + " (" + name_list(names) + ")";
+  return std::to_string(names.size()) + " (" + name_list(names, kNamedFrames) + ")";
 }
 
 /// Warns of time stamps and pictures without the other. InputError where no row is of a frame.

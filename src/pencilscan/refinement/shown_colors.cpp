@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "pencilscan/core/name_list.h"
+
 namespace pencilscan {
 namespace {
 
@@ -48,7 +50,7 @@ ShownColorCount::ShownColorCount(const Rig& rig) : rig_(&rig), seen_(rig.cameras
     for (std::size_t k = 0; k < rig.projectors[p].patterns.size(); ++k) {
       const PatternRef ref{static_cast<int>(p), static_cast<int>(k)};
       const auto shifts = static_cast<std::size_t>(2 * reach_of(pattern(ref)) + 1);
-      counts_.push_back({ref, 0, 0, std::vector<double>(shifts, 0)});
+      counts_.push_back({ref, chance_of(pattern(ref)), 0, 0, std::vector<double>(shifts, 0)});
     }
   }
 }
@@ -71,7 +73,7 @@ void ShownColorCount::add(const std::vector<ColorFamily>& families,
       const LinePattern& lines = pattern(count->ref);
       const std::vector<int> color_of = family.color_of_symbol(lines);
       const int reach = reach_of(lines);
-      const double chance = chance_of(lines);
+      const double chance = count->chance;
       Seen& in_camera = seen_[static_cast<std::size_t>(graph.camera)];
       ++count->runs;
       if (chance < 1) ++in_camera.runs;
@@ -104,7 +106,7 @@ std::vector<ShownColors> ShownColorCount::shown() const {
     shown.pattern = count.ref;
     shown.runs = count.runs;
     if (!(count.weight > 0)) continue;  // no colour tells
-    shown.chance = chance_of(lines);
+    shown.chance = count.chance;
     const auto share_at = [&](int shift) {
       return count.agree[static_cast<std::size_t>(shift + reach)] / count.weight;
     };
@@ -130,6 +132,19 @@ std::vector<ShownColors> ShownColorCount::seen() const {
     shown.share = shown.shifted_share = camera.agree / camera.weight;
   }
   return result;
+}
+
+std::string ShownColorCount::denied() const {
+  std::string names;
+  for (const ShownColors& of_pattern : shown()) {
+    if (of_pattern.deny())
+      add_name(names,
+               rig_->projectors[static_cast<std::size_t>(of_pattern.pattern.projector)].name);
+  }
+  const std::vector<ShownColors> of_cameras = seen();
+  for (std::size_t c = 0; c < of_cameras.size(); ++c)
+    if (of_cameras[c].deny()) add_name(names, rig_->cameras[c].name);
+  return names;
 }
 
 }  // namespace pencilscan

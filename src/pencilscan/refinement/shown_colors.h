@@ -1,6 +1,7 @@
 #pragma once
 
 #include <span>
+#include <string>
 #include <vector>
 
 #include "pencilscan/labeling/labeling.h"
@@ -10,9 +11,8 @@
 namespace pencilscan {
 
 /// What the colours of labelled curves say of the names of one pattern's lines, or of all lines in
-/// one camera (without a pattern and a shift). A device that
-/// stands elsewhere may have every crossing agree with names that are whole lines off; colours do
-/// not agree then.
+/// one camera (without a pattern and a shift). A device that stands elsewhere may have every
+/// crossing agree with names that are whole lines off; colours do not agree then.
 struct ShownColors {
   PatternRef pattern;
   std::size_t runs = 0;  ///< stretches with a name
@@ -35,21 +35,25 @@ struct ShownColors {
   [[nodiscard]] bool tell() const { return runs >= 30 && chance < 1; }
 };
 
-/// Adds what one frame shows to `shown`, which is empty at first: then one entry per pattern, in
-/// the order of projectors and patterns. Shifts are looked for up to half a period of the code,
-/// beyond which they begin anew, and up to 16 lines.
+/// Counts over frames. Shifts are looked for up to half a period of the code, beyond which they
+/// begin anew, and up to 16 lines.
 class ShownColorCount {
  public:
+  /// The rig must outlive it.
   explicit ShownColorCount(const Rig& rig);
   void add(const std::vector<ColorFamily>& families, std::span<const GridGraph> graphs,
            const Labeling& labeling);
+  /// By pattern, in the order of projectors and patterns.
   [[nodiscard]] std::vector<ShownColors> shown() const;
-  /// The same by camera.
+  /// By camera.
   [[nodiscard]] std::vector<ShownColors> seen() const;
+  /// Names of the projectors and cameras that these deny; empty: none.
+  [[nodiscard]] std::string denied() const;
 
  private:
   struct Count {
     PatternRef ref;
+    double chance = 1;
     std::size_t runs = 0;
     double weight = 0;
     std::vector<double> agree;  ///< per shift, from -reach
