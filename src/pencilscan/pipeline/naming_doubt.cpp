@@ -53,13 +53,24 @@ void NamingDoubt::add(const std::vector<ColorFamily>& families, std::span<const 
   }
 }
 
-std::string NamingDoubt::unnamed(std::size_t device, std::size_t sharing) const {
+bool NamingDoubt::lacks_names(std::size_t device, std::size_t sharing) const {
   const TellingPoints& points = devices_[device];
-  if (!points.are_enough() || points.named_share() > kMostNamed / static_cast<double>(sharing))
-    return {};
-  return "only " + formatted(100 * points.named_share(), "%.0f") + " % of the curves " +
+  return points.are_enough() && points.named_share() <= kMostNamed / static_cast<double>(sharing);
+}
+
+std::string NamingDoubt::unnamed(std::size_t device, std::size_t sharing) const {
+  if (!lacks_names(device, sharing)) return {};
+  return "only " + formatted(100 * devices_[device].named_share(), "%.0f") + " % of the curves " +
          (device < rig_->cameras.size() ? "of camera " : "in the colours of projector ") +
          device_at(*rig_, device).name + " have a name";
+}
+
+std::vector<std::size_t> NamingDoubt::cameras() const {
+  const std::vector<ShownColors> seen = colors_.seen();
+  std::vector<std::size_t> cameras;
+  for (std::size_t c = 0; c < rig_->cameras.size(); ++c)
+    if (lacks_names(c, 1) || seen[c].deny()) cameras.push_back(c);
+  return cameras;
 }
 
 std::string NamingDoubt::of_projectors() const {

@@ -28,10 +28,13 @@ class NamingDoubt {
   [[nodiscard]] std::string of_projectors() const;
   /// The same, and cameras most of whose curves have no name.
   [[nodiscard]] std::string text() const;
+  /// Cameras most of whose curves have no name, or that colours deny.
+  [[nodiscard]] std::vector<std::size_t> cameras() const;
   /// Of a camera, or in the colours of a projector.
   [[nodiscard]] const TellingPoints& telling(std::size_t device) const { return devices_[device]; }
 
  private:
+  [[nodiscard]] bool lacks_names(std::size_t device, std::size_t sharing) const;
   [[nodiscard]] std::string unnamed(std::size_t device, std::size_t sharing) const;
 
   const Rig* rig_;

@@ -356,5 +356,25 @@ TEST_F(PipelineTest, AProjectorThatIsWholeLinesOffIsPutBackByItsColors) {
   EXPECT_EQ(check_rig_on_frames(*rig_, {&curves, 1}).verdict, RigVerdict::kFits);
 }
 
+TEST_F(PipelineTest, ACameraThatWasKnockedIsFoundBySurfaceOfTheOthers) {
+  const PointResult seen = detect_frame(*rig_, *frame_);
+  const FrameCurves curves{seen.families, seen.graphs};
+  const TruthScene truth(ball(), *rig_);
+  for (const Vec3& turn : {Vec3(0, 12, 0), Vec3(-21, 17, 6)}) {
+    Rig wrong = *rig_;
+    Camera& camera = wrong.cameras[1];
+    camera.device_from_world = corrected_pose(camera, {turn, Vec3(0, 2, 0)});
+    const RigRefinement found = refine_rig_on_frames(wrong, {&curves, 1});
+    ASSERT_TRUE(found.report.refined) << turn.transpose() << ": " << found.report.reason;
+    const auto points = triangulate(found.rig, seen.graphs, found.labelings.front());
+    EXPECT_GT(points_by_camera(*rig_, points)[1].size(), 300U);
+    EXPECT_LT(label_figures(truth, points, judge_points(truth, points)).wrong.value(), 0.01)
+        << turn.transpose();
+    const RigFit fit = check_rig_on_frames(wrong, {&curves, 1});
+    EXPECT_EQ(fit.verdict, RigVerdict::kOneMoved) << fit.text;
+    EXPECT_TRUE(fit.devices[1].has_moved);
+  }
+}
+
 }  // namespace
 }  // namespace pencilscan

@@ -149,10 +149,8 @@ RigFit check_rig_on_frames(const Rig& stated, std::span<const FrameCurves> frame
   const double unit = footprint(stated);
   const Rig rig = with_registered_patterns(scaled(stated, 1 / unit));
   NamedCrossings named = named_crossings(rig, frames, labels_of(rig, frames));
-  const std::string of_projectors = named.doubt.of_projectors();
-  if (!of_projectors.empty() && named.doubt.text() == of_projectors) {
-    // All frames together, and colours, may tell where a projector stands. Of a camera they do not:
-    // its names may be off by other lines of each projector, at which crossings and colours agree.
+  if (!named.doubt.text().empty()) {
+    // All frames together, and colours, may tell where a device stands.
     RigRefinementOptions refinement;
     refinement.refine.max_remaining = std::numeric_limits<double>::infinity();
     const RigRefinement found = refine_rig_on_frames(rig, frames, refinement);

@@ -8,6 +8,10 @@
 #include <utility>
 
 #include "pencilscan/joint/joint.h"
+#include "pencilscan/pipeline/lost_cameras.h"
+#include "pencilscan/pipeline/view_agreement.h"
+#include "pencilscan/points/settle.h"
+#include "pencilscan/points/triangulate.h"
 #include "pencilscan/refinement/moved_devices.h"
 #include "pencilscan/refinement/shown_colors.h"
 
@@ -40,7 +44,7 @@ struct Attempt {
   std::vector<CrossingTrack> tracks;  ///< of the last labels
   std::vector<std::size_t> moved;     ///< RefineRigOptions::moved
   bool agrees = false;
-  std::string denied;  ///< devices whose colours speak against their lines' names
+  std::string objection;  ///< what speaks against the names though crossings may meet
   std::size_t points = 0;
 };
 
@@ -50,6 +54,30 @@ ShownColorCount shown_colors(const Rig& rig, std::span<const FrameCurves> frames
   for (std::size_t f = 0; f < frames.size(); ++f)
     count.add(frames[f].families, frames[f].graphs, labelings[f]);
   return count;
+}
+
+/// A camera most of whose points lie in front of or behind what the others measured: it has the
+/// names of other lines, at which crossings and colours agree. Empty: none.
+std::string contradicted_camera(const Rig& rig, std::span<const FrameCurves> frames,
+                                std::span<const Labeling> labelings) {
+  TriangulationOptions some;
+  some.used_of_seven = 1;
+  std::vector<PairAgreement> said(rig.cameras.size());
+  for (std::size_t f = 0; f < frames.size(); ++f) {
+    const ViewAgreement views(
+        rig, points_by_camera(rig, triangulate(rig, frames[f].graphs, labelings[f], some)));
+    for (std::size_t c = 0; c < said.size(); ++c) {
+      const PairAgreement of_frame = views.with_others(c);
+      said[c].same += of_frame.same;
+      said[c].apart += of_frame.apart;
+    }
+  }
+  // A right camera beside a wrong one is contradicted too: the one with the least on its side.
+  const auto least = std::min_element(
+      said.begin(), said.end(),
+      [](const PairAgreement& a, const PairAgreement& b) { return a.share() < b.share(); });
+  return least->is_doubtful() ? rig.cameras[static_cast<std::size_t>(least - said.begin())].name
+                              : std::string();
 }
 
 /// Where few devices moved and all others are as calibrated, refinement starts with those put back.
@@ -81,7 +109,7 @@ bool run_rounds(const Rig& calibrated, std::span<const FrameCurves> frames, doub
     joint.projection_sigma_px = tolerance;
     const auto labelings = label(refinement.rig, frames, joint);
     const auto tracks = tracks_of(refinement.rig, frames, labelings, options.tracks);
-    if (refinement.rounds.empty()) {
+    if (refinement.rounds.empty() && result.moved.empty()) {
       put_back_few(calibrated, tracks, result);
       refine.moved = result.moved;
     }
@@ -102,6 +130,16 @@ bool run_rounds(const Rig& calibrated, std::span<const FrameCurves> frames, doub
   refinement.labelings = label(refinement.rig, frames, joint);
   result.tracks = tracks_of(refinement.rig, frames, refinement.labelings, options.tracks);
   return true;
+}
+
+/// What speaks against the names, in plain words; empty: nothing.
+std::string objection(const Rig& rig, std::span<const FrameCurves> frames,
+                      std::span<const Labeling> labelings) {
+  if (const std::string denied = shown_colors(rig, frames, labelings).denied(); !denied.empty())
+    return "the colours of " + denied + " speak against its lines' names";
+  if (const std::string camera = contradicted_camera(rig, frames, labelings); !camera.empty())
+    return "what " + camera + " measures lies elsewhere than what the other cameras do";
+  return {};
 }
 
 /// Turns projectors of whose lines all colours say that they are a few lines further. True where
@@ -132,17 +170,36 @@ bool turn_by_colors(const Rig& calibrated, std::span<const FrameCurves> frames, 
   return turned;
 }
 
+/// Where refinement begins: cameras that stand far off where they are found.
+struct Start {
+  RigCorrection correction;  ///< empty: as calibrated
+  std::vector<std::size_t> moved;
+};
+
+Start start_of(const Rig& calibrated, std::span<const FrameCurves> frames) {
+  Start start;
+  for (const FoundCamera& found :
+       find_lost_cameras(calibrated, frames, label(calibrated, frames, JointOptions{}))) {
+    start.correction.resize(device_count(calibrated));
+    start.correction[found.camera] = found.correction;
+    start.moved.push_back(found.camera);
+  }
+  return start;
+}
+
 Attempt attempt(const Rig& calibrated, std::span<const FrameCurves> frames, double tolerance,
-                const RigRefinementOptions& options) {
+                const Start& start, const RigRefinementOptions& options) {
   Attempt result;
-  result.refinement.rig = calibrated;
+  result.correction = start.correction;
+  result.moved = start.moved;
+  result.refinement.rig = corrected_rig(calibrated, start.correction);
   if (!run_rounds(calibrated, frames, tolerance, options, result)) return result;
   if (turn_by_colors(calibrated, frames, result) &&
       !run_rounds(calibrated, frames, tolerance, options, result))
     return result;
   result.agrees = !disagrees(crossing_disagreement(result.refinement.rig, result.tracks));
-  result.denied = shown_colors(calibrated, frames, result.refinement.labelings).denied();
-  if (!result.denied.empty()) result.agrees = false;
+  result.objection = objection(result.refinement.rig, frames, result.refinement.labelings);
+  if (!result.objection.empty()) result.agrees = false;
   for (const Labeling& labeling : result.refinement.labelings)
     result.points += labelled_points(labeling);
   return result;
@@ -166,19 +223,19 @@ RigRefinement refine_rig_on_frames(const Rig& stated, std::span<const FrameCurve
                                    const RigRefinementOptions& options) {
   const double unit = footprint(stated);
   const Rig calibrated = with_registered_patterns(scaled(stated, 1 / unit));
+  const Start start = options.finds_lost_cameras ? start_of(calibrated, frames) : Start{};
   std::optional<Attempt> best;
   for (const double tolerance : options.first_tolerances_px) {
-    Attempt next = attempt(calibrated, frames, tolerance, options);
+    Attempt next = attempt(calibrated, frames, tolerance, start, options);
     const bool is_settled = best && end_alike(*best, next);
     if (!best || is_better(next, *best)) best = std::move(next);
     if (is_settled) break;
   }
   RigRefinement result = std::move(best->refinement);
-  if (result.report.refined && !best->denied.empty()) {
+  if (result.report.refined && !best->objection.empty()) {
     result.report.refined = false;
-    result.report.reason = "where crossings meet, the colours of " + best->denied +
-                           " speak against its lines' names: it stands too far from where the rig "
-                           "has it; calibrate anew";
+    result.report.reason = "where crossings meet, " + best->objection +
+                           ": it stands too far from where the rig has it; calibrate anew";
   }
   if (result.report.refined) {
     RefineRigOptions refine = options.refine;

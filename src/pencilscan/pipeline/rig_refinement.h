@@ -18,6 +18,8 @@ struct RigRefinementOptions {
   std::vector<double> first_tolerances_px = {2, 3, 4, 6, 1};
   TrackOptions tracks;
   RefineRigOptions refine;
+  /// Cameras that stand far off are looked for first (lost_cameras.h).
+  bool finds_lost_cameras = true;
 };
 
 /// Labels and refinement at one tolerance.

@@ -1,0 +1,99 @@
+#!/usr/bin/python3
+"""One device knocked out of its place: what `rig check --frames` says, and what `--refine-rig` makes of it.
+
+Rendered scenes whose rig has one device elsewhere: turned in any direction and shifted, so that its picture of the
+volume moves by so many pixels, more than its lines are apart too. The seed draws device and way.
+"""
+
+import json
+import math
+import shutil
+
+import numpy as np
+
+import common
+import heldout
+
+SCENES = ["bust", "part", "dragon_p10", "rock_eight", "bust_four", "vase_two"]
+AMOUNTS = [0, 2, 5, 10, 20, 40, 80]  # px
+COLUMNS = ["device", "verdict", "names_it", "others_named", "left_px", "refused", "label_error", "line_recall"]
+
+
+def probe_of(rig):
+    points = np.random.default_rng(0).normal(size=(400, 3))
+    points *= 0.7 * rig["volume"]["radius"] / np.linalg.norm(points, axis=1, keepdims=True)
+    return points + rig["volume"]["center"]
+
+
+def way(a, b, probe):
+    """How far the picture of the volume lies apart, root mean square, px."""
+    return math.sqrt(np.mean(np.sum((common.project(a, probe) - common.project(b, probe))**2, 1)))
+
+
+def knocked(rig, kind, amount, seed):
+    """One device turned and shifted: `amount` px together, a third of it by its shift."""
+    random = np.random.default_rng([seed, amount, kind == "cameras"])
+    result = json.loads(json.dumps(rig))
+    d = result[kind][random.integers(len(rig[kind]))]
+    before, probe = json.loads(json.dumps(d)), probe_of(rig)
+    R, t = np.asarray(d["R"]), np.asarray(d["t"])
+    turn, shift = random.normal(size=3), random.normal(size=3)
+
+    def moved(a, b):
+        return {**d, "R": (common._rotation(a * turn) @ R).tolist(),
+                "t": (common._rotation(a * turn) @ t + b * shift).tolist()}
+
+    small = 1e-4 * rig["volume"]["radius"]
+    b = small / way(moved(0, small), before, probe) * amount / 3
+    a = 1e-5 / way(moved(1e-5, 0), before, probe) * amount
+    if amount > 0:
+        a *= amount / way(moved(a, b), before, probe)
+        d.update(moved(a, b))
+    return result, d["name"]
+
+
+def measured(program, scene, work, kind, amount, seed):
+    true_rig = json.loads((scene / "rig.json").read_text())
+    rig, name = knocked(true_rig, kind, amount, seed)
+    shutil.rmtree(work, ignore_errors=True)
+    rig_path = common.write_rig(work / "rig.json", rig)
+    row = {"device": name}
+    # Exit code 1 where it does not fit; the figures are written all the same.
+    program("rig", "check", "--rig", rig_path, "--frames", scene / "frames", "--put-back", work / "back.json",
+            "--json", work / "fit.json", may_fail=True, json_output=False)
+    fit = json.loads((work / "fit.json").read_text())
+    row["verdict"] = fit["verdict"]
+    row["names_it"] = int(name in fit["moved"])
+    row["others_named"] = len([d for d in fit["moved"] if d != name])
+    if (work / "back.json").exists():
+        back = json.loads((work / "back.json").read_text())
+        right, is_now = (next(d for d in r[kind] if d["name"] == name) for r in (true_rig, back))
+        row["left_px"] = way(right, is_now, probe_of(true_rig))
+    made = program("reconstruct", "--rig", rig_path, "--frames", scene / "frames", "--out", work / "result",
+                   "--refine-rig", "--no-mesh", "--no-pictures", may_crash=True)
+    row["refused"] = int(made is None)
+    if (work / "result/000000/points.ply").exists():
+        figures = program("evaluate", "--truth", scene / "truth/mesh.ply", "--rig", scene / "rig.json", "--result",
+                          work / "result/000000", may_crash=True) or {}
+        row.update({key: figures.get(key) for key in ("label_error", "line_recall")})
+    return row
+
+
+def main():
+    args = common.arguments("knocked", __doc__, seed=(1, 1))
+    program = common.Program(args)
+    rows = common.Rows(args.out / "results.csv", ["scene", "kind", "amount"], COLUMNS, args.resume)
+    scenes = heldout.SMALL if args.small else {name: heldout.SPLITS["held"][name] for name in SCENES}
+    for name, scene in scenes.items():
+        folder = heldout.rendered(program, args.out / "scenes" / name, scene, args.seed)
+        for kind in ("cameras", "projectors"):
+            for amount in AMOUNTS[4:5] if args.small else AMOUNTS:
+                if rows.has(scene=name, kind=kind, amount=amount):
+                    continue
+                common.progress(f"knocked: {name}, {kind}, {amount} px")
+                rows.add(scene=name, kind=kind, amount=amount,
+                         **measured(program, folder, args.out / "work", kind, amount, args.seed))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "pencilscan/pipeline/rig_refinement.h"
+#include "pencilscan/refinement/correction.h"
+
+namespace pencilscan {
+
+// A camera that was knocked stands farther from where the rig has it than its lines are apart. Its
+// crossings cannot tell where it is: its names are those of other lines. The other cameras still
+// measure the surface, and with it where every line lies in space. The camera is looked for where
+// these lines lie on curves of their colours in its picture.
+
+/// A camera, and where it stands.
+struct FoundCamera {
+  std::size_t camera = 0;
+  PoseCorrection correction;  ///< rotation only: to a few pixels
+};
+
+struct CameraSearchOptions {
+  double reach = 0.125;          ///< of the picture's longer side: how far it may be turned
+  double most_roll_degrees = 2;  ///< about the optical axis
+};
+
+/// Cameras few of whose curves have names in `labelings`, or the wrong ones by their colours, that
+/// are found elsewhere. `rig`: in footprints, with registered patterns; a labeling per frame.
+[[nodiscard]] std::vector<FoundCamera> find_lost_cameras(const Rig& rig,
+                                                         std::span<const FrameCurves> frames,
+                                                         std::span<const Labeling> labelings,
+                                                         const CameraSearchOptions& options = {});
+
+}  // namespace pencilscan
