@@ -68,7 +68,6 @@ ChildProcess::ChildProcess(const std::vector<std::string>& arguments, const Opti
   std::vector<std::string> environment = environment_with(options.environment);
   const auto argv = pointers_to(words);
   const auto envp = pointers_to(environment);
-  Pipe to_child;
   Pipe from_child;
   Pipe failure;  // closed by a successful exec
   const pid_t parent = ::getpid();
@@ -82,15 +81,14 @@ ChildProcess::ChildProcess(const std::vector<std::string>& arguments, const Opti
     ::sigprocmask(SIG_SETMASK, &none, nullptr);
     ::signal(SIGPIPE, SIG_DFL);
     const int nothing = ::open("/dev/null", O_RDWR | O_CLOEXEC);
-    ::dup2(options.pipes ? to_child.ends[0] : nothing, STDIN_FILENO);
-    if (options.pipes) ::dup2(from_child.ends[1], STDOUT_FILENO);
+    ::dup2(nothing, STDIN_FILENO);
     // Results of this program go to its standard output alone.
-    if (!options.pipes) ::dup2(STDERR_FILENO, STDOUT_FILENO);
+    ::dup2(options.piped ? from_child.ends[1] : STDERR_FILENO, STDOUT_FILENO);
     if (!options.error_file.empty()) {
       const int file =
           ::open(options.error_file.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
       if (file >= 0) ::dup2(file, STDERR_FILENO);
-      if (file >= 0 && !options.pipes) ::dup2(file, STDOUT_FILENO);
+      if (file >= 0 && !options.piped) ::dup2(file, STDOUT_FILENO);
     }
     ::execvpe(argv[0], argv.data(), envp.data());
     const int error = errno;
@@ -107,15 +105,11 @@ ChildProcess::ChildProcess(const std::vector<std::string>& arguments, const Opti
     ::waitpid(id_, nullptr, 0);
     throw StageError(arguments.front() + " cannot be run: " + std::strerror(error));
   }
-  if (options.pipes) {
-    input_ = to_child.take(1);
-    output_ = from_child.take(0);
-  }
+  if (options.piped) output_ = from_child.take(0);
 }
 
 ChildProcess::~ChildProcess() {
   stop();
-  if (input_ >= 0) ::close(input_);
   if (output_ >= 0) ::close(output_);
 }
 
@@ -139,29 +133,6 @@ std::optional<std::string> ChildProcess::read_line(Seconds patience) {
     if (got <= 0) return std::nullopt;
     unread_.append(bytes.data(), static_cast<std::size_t>(got));
   }
-}
-
-bool ChildProcess::write_line(const std::string& line) {
-  const std::string bytes = line + "\n";
-  // A child that is gone must not end us by SIGPIPE, whatever the program does about signals.
-  sigset_t broken;
-  sigset_t before;
-  sigemptyset(&broken);
-  sigaddset(&broken, SIGPIPE);
-  ::pthread_sigmask(SIG_BLOCK, &broken, &before);
-  std::size_t done = 0;
-  while (input_ >= 0 && done < bytes.size()) {
-    const ssize_t sent = ::write(input_, bytes.data() + done, bytes.size() - done);
-    if (sent < 0 && errno == EINTR) continue;
-    if (sent < 0) break;
-    done += static_cast<std::size_t>(sent);
-  }
-  if (done < bytes.size()) {
-    const timespec now{};
-    ::sigtimedwait(&broken, nullptr, &now);
-  }
-  ::pthread_sigmask(SIG_SETMASK, &before, nullptr);
-  return done == bytes.size();
 }
 
 std::optional<int> ChildProcess::wait(Seconds patience) {

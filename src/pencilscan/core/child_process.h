@@ -17,7 +17,7 @@ class ChildProcess {
   struct Options {
     std::map<std::string, std::string> environment;  ///< added to or replacing this program's
     std::string error_file;  ///< its standard error goes there; empty: to ours
-    bool pipes = false;      ///< its standard input and output are ours to write and read
+    bool piped = false;      ///< its standard output is ours to read
   };
   /// arguments[0] is the program, found along PATH. StageError when it cannot be started.
   explicit ChildProcess(const std::vector<std::string>& arguments)
@@ -30,8 +30,6 @@ class ChildProcess {
   using Seconds = std::chrono::duration<double>;
   /// The next line of its output, without its end; nothing when there is none in time, or ever.
   [[nodiscard]] std::optional<std::string> read_line(Seconds patience);
-  /// False when it no longer listens.
-  bool write_line(const std::string& line);
   /// Its exit code (128 + signal when one ended it), once it has ended; nothing when it still runs.
   std::optional<int> wait(Seconds patience);
   [[nodiscard]] bool running() { return !wait(Seconds(0)).has_value(); }
@@ -41,7 +39,6 @@ class ChildProcess {
 
  private:
   pid_t id_ = -1;
-  int input_ = -1;   ///< what we write to
   int output_ = -1;  ///< what we read from
   std::string unread_;
   std::optional<int> code_;

@@ -158,7 +158,7 @@ DummyScreen::DummyScreen(const fs::path& folder, const std::vector<Output>& outp
   write_text(state_->authority, authority());
   fs::permissions(state_->authority, fs::perms::owner_read | fs::perms::owner_write);
   ChildProcess::Options options;
-  options.pipes = true;
+  options.piped = true;
   options.error_file = (here / "server.txt").string();
   state_->server = std::make_unique<ChildProcess>(
       std::vector<std::string>{
