@@ -102,9 +102,10 @@ class ProjectorRun {
     return i < shots_.size() ? shots_[i] : shots_[0];
   }
   void judge_whites();
-  /// Shots to take again, with the reason for every camera that complains.
+  /// Shots to take again. `last`: nobody will, and what a camera lacks of them is a fault.
   [[nodiscard]] std::set<std::size_t> failed(bool last);
-  void note(std::size_t camera, std::size_t i, const std::string& why, bool given_up);
+  /// A fault of the camera, unless it has one of this kind already; `why` its picture is none.
+  void give_up(std::size_t camera, std::size_t i, const std::string& why);
   /// Why there is no picture of a camera, as far as that is known.
   [[nodiscard]] std::string why_missing(std::size_t camera) const;
   /// True, with a fault, when a camera gives no pictures any more: waiting for each of them would
@@ -194,9 +195,7 @@ void ProjectorRun::judge_whites() {
       views_[c] = lit_view(coarse_[0][c], coarse_[1][c]);
 }
 
-void ProjectorRun::note(std::size_t camera, std::size_t i, const std::string& why, bool given_up) {
-  report_.troubles.push_back({projector_, camera, to_string(shot(i).picture), why, given_up});
-  if (!given_up) return;
+void ProjectorRun::give_up(std::size_t camera, std::size_t i, const std::string& why) {
   const std::string& projector = screen_.projectors()[projector_].name;
   const bool missing = coarse_[i][camera].empty();
   for (std::size_t f = faults_before_; f < report_.faults.size(); ++f)
@@ -219,14 +218,14 @@ std::set<std::size_t> ProjectorRun::failed(bool last) {
     for (std::size_t i = 0; i <= shots_.size(); ++i) {
       if (!coarse_[i][c].empty()) continue;
       again.insert(i);
-      note(c, i, why_missing(c), last);
+      if (last) give_up(c, i, why_missing(c));
     }
     // A camera that sees nothing between white and black, and then something: these came late.
     if (views_[c].share < kLeastSeen) {
       if (changing_share(c) < kLeastSeen) continue;
       // Then every picture may show the one before: pairs would not tell.
       for (std::size_t i = 0; i <= white_again; ++i) again.insert(i);
-      note(c, 0, "white and black came late", last);
+      if (last) give_up(c, 0, "white and black came late");
       continue;
     }
     if (!options_.inverses) continue;
@@ -238,7 +237,7 @@ std::set<std::size_t> ProjectorRun::failed(bool last) {
       const std::string why = pair_trouble(coarse_[i][c], coarse_[i + 1][c], views_[c]);
       if (why.empty()) continue;
       again.insert({i, i + 1});
-      note(c, i, why, last);
+      if (last) give_up(c, i, why);
     }
   }
   return again;

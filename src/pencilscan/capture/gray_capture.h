@@ -21,15 +21,6 @@ struct GrayCaptureOptions {
   double patience_s = 3;  ///< for a picture of every camera, > 0
 };
 
-/// One picture that was taken again, or given up.
-struct PictureTrouble {
-  std::size_t projector = 0;
-  std::size_t camera = 0;
-  std::string picture;  ///< as to_string(ProjectorPicture)
-  std::string why;
-  bool given_up = false;
-};
-
 struct GrayCaptureReport {
   std::size_t pictures = 0;  ///< shown and taken, retakes too
   std::size_t retaken = 0;
@@ -38,8 +29,7 @@ struct GrayCaptureReport {
   std::vector<std::string> refused;
   double seconds = 0;
   double waiting_seconds = 0;  ///< of them, for the projectors' delay and the cameras' pictures
-  std::vector<PictureTrouble> troubles;
-  std::vector<Fault> faults;  ///< empty: the capture can be used as it is
+  std::vector<Fault> faults;   ///< empty: the capture can be used as it is
   /// [projector][camera]: what each camera sees of each projector.
   std::vector<std::vector<LitView>> views;
 };
