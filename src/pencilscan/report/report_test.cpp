@@ -108,7 +108,7 @@ TEST(ShadedView, SilhouetteOfABallHasItsProjectedArea) {
 
 TEST(ShadedView, BallIsLitFromAboveOnALightGround) {
   const Device view = make_view({Vec3::Zero(), 1.5}, Vec3(1, 0, 0), 120, 120);
-  const cv::Mat picture = shaded_view(make_sphere(1), view);
+  const cv::Mat picture = MeshPainter(make_sphere(1)).draw(view);
   ASSERT_EQ(picture.type(), CV_8UC3);
   const auto brightness = [&](int y, int x) { return cv::sum(picture.at<Color>(y, x))[0]; };
   EXPECT_GT(brightness(35, 50), brightness(90, 70) + 100);
@@ -119,14 +119,14 @@ TEST(ShadedView, BallIsLitFromAboveOnALightGround) {
 TEST(ShadedView, VertexColorsAndInventedPartsShow) {
   TriangleMesh ball = make_sphere(1);
   const Device view = make_view({Vec3::Zero(), 1.5}, Vec3(1, 0, 0), 60, 60);
-  const Color clay = shaded_view(ball, view).at<Color>(30, 30);
+  const Color clay = MeshPainter(ball).draw(view).at<Color>(30, 30);
   EXPECT_GT(clay[0], clay[2]);
   ball.confidence.assign(ball.vertices.size(), 0.0F);
-  const Color invented = shaded_view(ball, view).at<Color>(30, 30);
+  const Color invented = MeshPainter(ball).draw(view).at<Color>(30, 30);
   EXPECT_GT(invented[2], invented[0]);
   ShadeOptions options;
   options.vertex_colors.assign(ball.vertices.size(), Color{255, 0, 0});
-  const Color red = shaded_view(ball, view, options).at<Color>(30, 30);
+  const Color red = MeshPainter(ball).draw(view, options).at<Color>(30, 30);
   EXPECT_GT(red[0], 100);
   EXPECT_EQ(red[1], 0);
 }

@@ -242,10 +242,6 @@ cv::Mat MeshPainter::draw(const Device& view, const ShadeOptions& options) const
   return picture;
 }
 
-cv::Mat shaded_view(const TriangleMesh& mesh, const Device& view, const ShadeOptions& options) {
-  return MeshPainter(mesh, options.occlusion_rays).draw(view, options);
-}
-
 std::vector<double> distances_to(const RayScene& truth, const TriangleMesh& mesh) {
   std::vector<double> distances(mesh.vertices.size());
   parallel_for(distances.size(), [&](std::size_t v) {

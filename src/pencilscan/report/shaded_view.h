@@ -18,13 +18,13 @@ namespace pencilscan {
 struct ShadeOptions {
   std::vector<Color> vertex_colors;  ///< empty (clay, invented parts in blue) or one per vertex
   int supersampling = 2;             ///< rays per pixel side, in [1, 4]
-  int occlusion_rays = 24;           ///< per vertex, 0 = no ambient occlusion
   const Rig* devices = nullptr;      ///< draws the frusta of its cameras and projectors
 };
 
 /// A mesh ready to be drawn many times: rays, smooth normals and ambient occlusion are kept.
 class MeshPainter {
  public:
+  /// `occlusion_rays`: per vertex, of ambient occlusion; 0: none.
   explicit MeshPainter(const TriangleMesh& mesh, int occlusion_rays = 24);
 
   /// Smoothly shaded on a light studio ground. CV_8UC3 RGB.
@@ -37,10 +37,6 @@ class MeshPainter {
   std::vector<Vec3> normals_;
   std::vector<float> openness_;  ///< per vertex: share of the hemisphere that is free
 };
-
-/// One call of MeshPainter.
-[[nodiscard]] cv::Mat shaded_view(const TriangleMesh& mesh, const Device& view,
-                                  const ShadeOptions& options = {});
 
 /// Points as small discs of `radius_mm` on a dark ground, with eye-dome lighting (Boucheny, 2009):
 /// a pixel is darkened by how much nearer its neighbours are. colors: one per point. CV_8UC3 RGB.
