@@ -143,8 +143,7 @@ class ProblemBuilder {
     ceres::Solve(solver, problem_.get(), &summary);
     const double cost =
         summary.IsSolutionUsable() ? summary.final_cost : std::numeric_limits<double>::infinity();
-    return {cost, static_cast<int>(summary.iterations.size()), views_,
-            summary.termination_type == ceres::CONVERGENCE};
+    return {cost, static_cast<int>(summary.iterations.size()), views_};
   }
 
   [[nodiscard]] bool empty() const { return views_ == 0; }

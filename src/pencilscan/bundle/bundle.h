@@ -37,7 +37,6 @@ struct BundleSummary {
   double cost = 0;  ///< half the robust sum of squares; infinite where it could not be taken
   int iterations = 0;
   std::size_t views = 0;
-  bool converged = false;
 };
 
 /// Minimises, over poses, chosen inner parameters and points,

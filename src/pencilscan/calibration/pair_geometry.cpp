@@ -140,19 +140,10 @@ void solve_pair(const Rig& rig, const std::vector<PairMatch>& matches, PairGeome
   pair.fundamental = to_p.asDiagonal() * F * to_c.asDiagonal();
   std::vector<cv::Point2d> inlier_a;
   std::vector<cv::Point2d> inlier_b;
-  std::map<std::size_t, std::pair<std::size_t, std::size_t>> per_capture;  // all, inliers
   for (std::size_t i = 0; i < matches.size(); ++i) {
-    auto& [all, agreeing] = per_capture[matches[i].capture];
-    ++all;
     if (epipolar_distance(rig, pair, matches[i]) > options.tolerance) continue;
-    ++agreeing;
     inlier_a.push_back(a[i]);
     inlier_b.push_back(b[i]);
-  }
-  for (const auto& [capture, counts] : per_capture) {
-    if (counts.first < options.least_matches) continue;
-    pair.by_capture.emplace_back(
-        capture, static_cast<double>(counts.second) / static_cast<double>(counts.first));
   }
   pair.inliers = inlier_a.size();
   pair.planar_share = planar_share(inlier_a, inlier_b, 1000 * options.planar_tolerance);

@@ -18,8 +18,6 @@ struct PairGeometry {
   std::size_t inliers = 0;          ///< agree with one fundamental matrix
   double planar_share = 0;          ///< of the inliers that one homography explains as well
   Mat3 fundamental = Mat3::Zero();  ///< x_projector' F x_camera = 0; pixels
-  /// (capture, share of its matches that are inliers), where the capture has enough of them.
-  std::vector<std::pair<std::size_t, double>> by_capture;
   [[nodiscard]] double inlier_share() const {
     return matches == 0 ? 0 : static_cast<double>(inliers) / static_cast<double>(matches);
   }

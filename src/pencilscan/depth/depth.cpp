@@ -6,7 +6,6 @@
 #include "pencilscan/core/check.h"
 #include "pencilscan/core/median.h"
 #include "pencilscan/core/parallel.h"
-#include "pencilscan/core/stopwatch.h"
 #include "pencilscan/depth/wide_windows.h"
 #include "pencilscan/rig/camera_light.h"
 
@@ -40,7 +39,6 @@ DepthResult measure_depth(const Rig& rig, const std::vector<ColorFamily>& famili
                           std::span<const CameraDetection> detections,
                           std::span<const MeasuredPoint> points, const DepthStageOptions& options) {
   PENCILSCAN_CHECK(images.size() == rig.cameras.size() && detections.size() == images.size());
-  const Stopwatch watch;
   DepthResult result;
   std::vector<std::size_t> cameras;
   for (std::size_t c = 0; c < images.size(); ++c) {
@@ -78,9 +76,7 @@ DepthResult measure_depth(const Rig& rig, const std::vector<ColorFamily>& famili
         light, binning_for(static_cast<double>(light.spacing_px), depth), result.maps[i],
         [&](const CameraLight& wide, DepthMap& map) { grow(wide, space, depth, map); });
   });
-  result.report.seconds_depth = watch.seconds();
 
-  const Stopwatch consistency_watch;
   std::vector<int> pattern_projector;
   for (const ColorFamily& family : families) {
     for (const PatternRef& ref : family.patterns) pattern_projector.push_back(ref.projector);
@@ -90,7 +86,6 @@ DepthResult measure_depth(const Rig& rig, const std::vector<ColorFamily>& famili
   for (std::size_t i = 0; i < cameras.size(); ++i)
     result.report.cameras.push_back(
         camera_report(result.maps[i], static_cast<double>(result.lights[i].blur_px)));
-  result.report.seconds_consistency = consistency_watch.seconds();
   return result;
 }
 

@@ -2,7 +2,6 @@
 
 #include <array>
 #include <span>
-#include <string>
 #include <vector>
 
 #include "pencilscan/depth/consistency.h"
@@ -31,9 +30,6 @@ struct DepthReport {
   std::vector<CameraDepthReport> cameras;
   ConsistencyReport consistency;
   std::size_t completed = 0;  ///< nodes found from the closed surface
-  double seconds_depth = 0;
-  double seconds_consistency = 0;
-  std::vector<std::string> warnings;
 };
 
 struct DepthResult {

@@ -13,7 +13,6 @@ namespace pencilscan {
 /// What the grid says of a curve before its line is known.
 struct CurveIdentity {
   std::optional<PatternRef> pattern;  ///< the pencil it belongs to
-  float pattern_margin = 0;           ///< log-likelihood ratio to the next pattern
   int local_id = -1;                  ///< line index modulo the pattern's period; -1: not decided
   float id_probability = 0;
 };

@@ -109,19 +109,14 @@ CurveIdentity decide(const VoteTable& table, const std::vector<PatternRef>& patt
                      const std::vector<float>& costs) {
   CurveIdentity identity;
   double best = 0;
-  double second = 0;
   for (std::size_t k = 0; k < table.size(); ++k) {
     if (table[k].empty()) continue;
     const double score = *std::max_element(table[k].begin(), table[k].end()) - costs[k];
     if (score > best) {
-      second = best;
       best = score;
       identity.pattern = patterns[k];
-    } else {
-      second = std::max(second, score);
     }
   }
-  identity.pattern_margin = static_cast<float>(best - second);
   if (patterns.size() == 1) identity.pattern = patterns.front();
   return identity;
 }

@@ -11,7 +11,7 @@ namespace pencilscan {
 /// on the crossing's ray agrees with a line of the other curve, by
 ///   log( N(dz; 0, sigma) / density of chance agreements ), limited below at 0;
 /// a curve sums its crossings per (pattern, line), and the best line speaks for the pattern.
-/// Fills CurveIdentity::pattern and pattern_margin.
+/// Fills CurveIdentity::pattern.
 void vote_for_projectors(const Rig& rig, const std::vector<ColorFamily>& families,
                          const GridOptions& options, GridGraph& graph);
 

@@ -127,8 +127,4 @@ EncodedImage mesh_thumbnail(const TriangleMesh& mesh, int width, int height) {
   return encode(picture, ".jpg", "image/jpeg", {cv::IMWRITE_JPEG_QUALITY, 78});
 }
 
-std::string data_url(const EncodedImage& image) {
-  return "data:" + image.type + ";base64," + base64(image.bytes);
-}
-
 }  // namespace pencilscan

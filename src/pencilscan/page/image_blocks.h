@@ -35,7 +35,4 @@ struct EncodedImage {
 /// A small shaded view of a mesh as JPEG.
 [[nodiscard]] EncodedImage mesh_thumbnail(const TriangleMesh& mesh, int width, int height);
 
-/// "data:<type>;base64,..."
-[[nodiscard]] std::string data_url(const EncodedImage& image);
-
 }  // namespace pencilscan

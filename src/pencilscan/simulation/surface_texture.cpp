@@ -40,14 +40,6 @@ double value_noise(const Vec3& p) {
 
 }  // namespace
 
-std::optional<TextureKind> texture_from_name(std::string_view name) {
-  if (name == "none") return TextureKind::kNone;
-  if (name == "noise") return TextureKind::kNoise;
-  if (name == "stripes") return TextureKind::kStripes;
-  if (name == "checker") return TextureKind::kChecker;
-  return std::nullopt;
-}
-
 double SurfaceTexture::factor(const Vec3& x_in_object) const {
   const Vec3 p = x_in_object / period_mm;
   double brightness = 1;

@@ -1,15 +1,10 @@
 #pragma once
 
-#include <optional>
-#include <string_view>
-
 #include "pencilscan/geometry/types.h"
 
 namespace pencilscan {
 
 enum class TextureKind { kNone, kNoise, kStripes, kChecker };
-/// none, noise, stripes, checker; nothing for another name.
-[[nodiscard]] std::optional<TextureKind> texture_from_name(std::string_view name);
 
 /// Solid procedural texture: a function of the position in the object, so it moves along with it.
 struct SurfaceTexture {

@@ -32,7 +32,7 @@ Cube bounding_cube(std::span<const SurfaceSample> samples) {
 constexpr double kRoom = 1.5;
 
 /// Keeps the component with the largest measured area and those with a fair share of it.
-TriangleMesh without_floaters(const TriangleMesh& mesh, double min_share, std::size_t& removed) {
+TriangleMesh without_floaters(const TriangleMesh& mesh, double min_share) {
   const std::vector<int> component = face_components(mesh);
   const std::vector<char> measured = measured_faces(mesh);
   std::vector<double> area;
@@ -47,7 +47,6 @@ TriangleMesh without_floaters(const TriangleMesh& mesh, double min_share, std::s
   for (std::size_t c = 0; c < area.size(); ++c) {
     keep_component[c] = c == static_cast<std::size_t>(largest - area.begin()) ||
                         (area[c] > 0 && area[c] >= min_share * *largest);
-    removed += keep_component[c] ? 0 : 1;
   }
   std::vector<char> keep(mesh.faces.size());
   for (std::size_t f = 0; f < keep.size(); ++f) {
@@ -68,7 +67,6 @@ ClosedSurface surface_within_cube(std::span<const SurfaceSample> samples, double
   for (; result.depth < max_depth && cells * cell_mm < side; ++result.depth) cells *= 2;
   const double cell = std::max(cell_mm, side / cells);
   const Vec3 origin = cube.center - Vec3::Constant(0.5 * cell * cells);
-  result.scale = 0.5 * cell * cells / std::max(cube.half_side, 0.5 * cell);
   const InsideField field = inside_field(samples, origin, cell, cells, floor);
   // Caps: where the surface leaves the cells around it, which its growth from level to level
   // prevents.
@@ -82,8 +80,7 @@ ClosedSurface closed_surface(std::span<const SurfaceSample> samples,
   ClosedSurface result =
       surface_within_cube(samples, options.cell_mm, options.max_depth, options.floor);
   attribute_vertices(samples, options.reach_spacings, options.spacing_mm, result.mesh);
-  result.mesh =
-      without_floaters(result.mesh, options.min_component_share, result.components_removed);
+  result.mesh = without_floaters(result.mesh, options.min_component_share);
   return result;
 }
 

@@ -21,8 +21,6 @@ struct ClosingOptions {
 struct ClosedSurface {
   TriangleMesh mesh;  ///< with sigma and confidence
   int depth = 0;      ///< log2 of the cells along the cube
-  double scale = 0;   ///< cube / bounding cube of the samples
-  std::size_t components_removed = 0;
 };
 
 /// The closed surface of at least one oriented sample within a cube around all of them, without

@@ -8,7 +8,6 @@
 #include "pencilscan/core/check.h"
 #include "pencilscan/core/chunks.h"
 #include "pencilscan/core/median.h"
-#include "pencilscan/core/stopwatch.h"
 #include "pencilscan/depth/consistency.h"
 #include "pencilscan/surface/attributes.h"
 #include "pencilscan/surface/closing.h"
@@ -137,8 +136,6 @@ void lift_over_bows(std::span<const double> bows, std::span<const char> has_dept
 void take(ClosedSurface closed, SurfaceResult& result) {
   result.mesh = std::move(closed.mesh);
   result.report.depth = closed.depth;
-  result.report.scale = closed.scale;
-  result.report.components_removed = closed.components_removed;
 }
 
 }  // namespace
@@ -150,13 +147,11 @@ SurfaceResult reconstruct_surface(const Rig& rig, std::span<const MeasuredPoint>
   const auto tell = [&](double fraction) {
     if (progress) progress("surface", fraction);
   };
-  const Stopwatch watch;
   SurfaceResult result;
   SurfaceReport& report = result.report;
   result.used.assign(points.size(), 0);
   SampleSet set = sample_curves(rig, points, options.sample_spacings);
   report.spacing_mm = set.spacing;
-  report.samples = set.samples.size();
   for (const std::int32_t s : set.sample_of_point) report.points += s >= 0 ? 1 : 0;
   if (report.points < points.size()) {
     report.warnings.push_back({WarningCode::kPointsLeftOut,
@@ -172,13 +167,10 @@ SurfaceResult reconstruct_surface(const Rig& rig, std::span<const MeasuredPoint>
       if (keep[i]) kept.push_back(set.samples[i]);
     }
   }
-  report.samples_used = kept.size();
-  report.seconds_filter = watch.seconds();
   if (kept.size() < kLeastSamples) {
     report.status = SurfaceStatus::kTooFewPoints;
     report.warnings.push_back({WarningCode::kTooFewPoints,
                                "too few points for a surface: " + std::to_string(report.points)});
-    report.seconds = watch.seconds();
     return result;
   }
   for (std::size_t i = 0; i < points.size(); ++i) {
@@ -190,7 +182,6 @@ SurfaceResult reconstruct_surface(const Rig& rig, std::span<const MeasuredPoint>
 
   fit_local_surfaces(kept, kFitRadius * set.spacing);
   tell(0.4);
-  const Stopwatch closing_watch;
   ClosingOptions closing;
   closing.spacing_mm = set.spacing;
   closing.cell_mm = options.cell_spacings * set.spacing;
@@ -199,9 +190,7 @@ SurfaceResult reconstruct_surface(const Rig& rig, std::span<const MeasuredPoint>
   closing.min_component_share = options.min_component_share;
   closing.floor = rig.floor;
   take(closed_surface(kept, closing), result);
-  report.seconds_closing = closing_watch.seconds();
   finish(4 * set.spacing * set.spacing, result);
-  report.seconds = watch.seconds();
   tell(1);
   return result;
 }
@@ -210,21 +199,16 @@ SurfaceResult close_depth(const Rig& rig, std::span<const DepthMap> maps,
                           const FusionOptions& options, std::span<const Silhouette> silhouettes) {
   PENCILSCAN_CHECK(options.max_depth >= 5 && options.max_depth <= 10);
   PENCILSCAN_CHECK(options.cell_spacings > 0 && options.fit_spacings > 0);
-  const Stopwatch watch;
   SurfaceResult result;
   SurfaceReport& report = result.report;
   std::vector<SurfaceSample> samples = node_samples(rig, maps, report.spacing_mm);
-  report.samples = report.samples_used = samples.size();
   if (samples.size() < kLeastSamples) {
     report.status = SurfaceStatus::kTooFewPoints;
     report.warnings.push_back({WarningCode::kTooFewPoints,
                                "too few depths for a surface: " + std::to_string(samples.size())});
-    report.seconds = watch.seconds();
     return result;
   }
   fit_local_surfaces(samples, options.fit_spacings * report.spacing_mm);
-  report.seconds_filter = watch.seconds();
-  const Stopwatch closing_watch;
   ClosingOptions closing;
   closing.spacing_mm = report.spacing_mm;
   closing.cell_mm = options.cell_spacings * report.spacing_mm;
@@ -233,24 +217,20 @@ SurfaceResult close_depth(const Rig& rig, std::span<const DepthMap> maps,
   closing.min_component_share = options.min_component_share;
   closing.floor = rig.floor;
   take(closed_surface(samples, closing), result);
-  report.seconds_closing = closing_watch.seconds();
   const std::vector<Vec3> closed = result.mesh.vertices;
   carve(rig, silhouettes, options.carving, result.mesh);
   untangle(closed, result.mesh);
   result.samples = std::move(samples);
-  report.seconds = watch.seconds();
   return result;
 }
 
 void follow_depth(const Rig& rig, std::span<const DepthMap> maps, const FusionOptions& options,
                   SurfaceResult& result) {
-  const Stopwatch watch;
   SurfaceReport& report = result.report;
   if (report.status == SurfaceStatus::kTooFewPoints || result.mesh.faces.empty()) return;
   std::vector<SurfaceSample> samples = std::exchange(result.samples, {});
   const std::size_t fitted = samples.size();
   add_node_samples(rig, maps, samples);
-  report.samples = report.samples_used = samples.size();
   fit_local_surfaces(samples, options.fit_spacings * report.spacing_mm, fitted);
   std::vector<Vec3> closed = result.mesh.vertices;
   FollowOptions once = options.follow;  // normals have settled on the coarse mesh
@@ -273,7 +253,6 @@ void follow_depth(const Rig& rig, std::span<const DepthMap> maps, const FusionOp
   report.self_intersections = untangle(closed, result.mesh);
   result.evidence =
       attribute_vertices(samples, options.reach_spacings, report.spacing_mm, result.mesh, middles);
-  report.seconds += watch.seconds();
 }
 
 void note_points_used(const Rig& rig, std::span<const MeasuredPoint> points,

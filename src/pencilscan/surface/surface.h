@@ -52,20 +52,13 @@ struct SurfaceReport {
   std::size_t points =
       0;  ///< input points with finite coordinates (and nearer than 1e7 footprints)
   std::size_t points_used = 0;  ///< of them, those whose sample survived the votes
-  std::size_t samples = 0;
-  std::size_t samples_used = 0;
-  double spacing_mm = 0;  ///< median distance of neighbouring light sheets at the object
-  int depth = 0;          ///< log2 of the cells along the cube
-  double scale = 0;       ///< cube / bounding cube of the samples
-  std::size_t components_removed = 0;
+  double spacing_mm = 0;        ///< median distance of neighbouring light sheets at the object
+  int depth = 0;                ///< log2 of the cells along the cube
   std::size_t vertices = 0;
   std::size_t faces = 0;
   EdgeCounts edges;                    ///< of the closed mesh; all zero when it is watertight
   std::size_t self_intersections = 0;  ///< faces that cut another one (dense depth)
   double measured_share = 0;  ///< area of `mesh` that was measured, islands and all / its area
-  double seconds_filter = 0;
-  double seconds_closing = 0;
-  double seconds = 0;
   std::vector<Warning> warnings;
 };
 

@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "pencilscan/core/chunks.h"
-#include "pencilscan/core/stopwatch.h"
 #include "pencilscan/depth/consistency.h"
 #include "pencilscan/geometry/ray_scene.h"
 #include "pencilscan/surface/attributes.h"
@@ -127,12 +126,10 @@ std::optional<CarriedSurface> carry_surface(const Rig& rig, std::span<const Dept
                                             const FusionOptions& options,
                                             std::span<const Silhouette> silhouettes) {
   constexpr std::size_t kLeastSamples = 1000;  // fewer do not tell how a surface moved
-  const Stopwatch watch;
   CarriedSurface result;
   SurfaceReport& report = result.surface.report;
   std::vector<SurfaceSample> samples = node_samples(rig, maps, report.spacing_mm);
   if (samples.size() < kLeastSamples) return std::nullopt;
-  report.samples = report.samples_used = samples.size();
   TriangleMesh& mesh = result.surface.mesh;
   mesh = before.coarse();
   const std::vector<Vec3> then = mesh.vertices;
@@ -148,13 +145,11 @@ std::optional<CarriedSurface> carry_surface(const Rig& rig, std::span<const Dept
   fit_local_surfaces(samples, options.fit_spacings * report.spacing_mm);
   attribute_vertices(samples, options.reach_spacings, report.spacing_mm, mesh);
   if (!is_as_good(surface_fit(rig, maps, mesh), before.fit)) return std::nullopt;
-  report.seconds_filter = watch.seconds();
   std::vector<Vec3> whole = then;  // moved rigidly, it did not cut itself
   for (Vec3& x : whole) x = result.motion * x;
   carve(rig, silhouettes, options.carving, mesh);
   untangle(whole, mesh);
   result.surface.samples = std::move(samples);
-  report.seconds = watch.seconds();
   return result;
 }
 
