@@ -7,6 +7,7 @@
 #include "pencilscan/core/median.h"
 #include "pencilscan/core/stretches.h"
 #include "pencilscan/detection/refine.h"
+#include "pencilscan/detection/refine_scales.h"
 #include "pencilscan/view/nearest.h"
 
 namespace pencilscan {
@@ -17,12 +18,6 @@ constexpr float kHeightWidths = 3;    // of the mean height
 constexpr float kDark = 0.4F;         // of the line's height
 constexpr std::size_t kFifth = 5;     // the lower one
 constexpr std::size_t kTogether = 4;  // places that are judged as one
-
-float median_width(std::span<const CurvePoint> points) {
-  std::vector<float> widths;
-  for (const CurvePoint& p : points) widths.push_back(p.width_px);
-  return upper_median(std::move(widths));
-}
 
 /// Means of values along a curve over `half` of them to either side.
 std::vector<float> means(std::span<const float> values, std::size_t half) {

@@ -340,7 +340,7 @@ std::vector<Curve> refine_curves(const cv::Mat& presence, std::vector<Curve> cur
 std::vector<Curve> fit_guess(const cv::Mat& unexplained, Curve guess,
                              const RefineOptions& options) {
   // No fit at full size gives a line that is wider.
-  const std::size_t size = median_width(guess) > kMaxLineWidth ? size_of_curve(guess, 0) : 0;
+  const std::size_t size = median_width(guess.points) > kMaxLineWidth ? size_of_curve(guess, 0) : 0;
   cv::Mat image = unexplained;
   Vector2f corner(0, 0);
   if (size > 0) {

@@ -71,15 +71,15 @@ std::size_t size_of_width(float width_px) {
   return size;
 }
 
-float median_width(const Curve& curve) {
+float median_width(std::span<const CurvePoint> points) {
   std::vector<float> widths;
-  for (const CurvePoint& p : curve.points) widths.push_back(p.width_px);
-  return widths.empty() ? 0.F : upper_median(std::move(widths));
+  for (const CurvePoint& p : points) widths.push_back(p.width_px);
+  return upper_median(std::move(widths));
 }
 
 std::size_t size_of_curve(const Curve& curve, std::size_t size) {
   if (curve.points.empty()) return size;
-  return size_of_width(median_width(curve) * static_cast<float>(1U << size));
+  return size_of_width(median_width(curve.points) * static_cast<float>(1U << size));
 }
 
 Curve resized(Curve curve, std::size_t from, std::size_t to) {

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <opencv2/core.hpp>
+#include <span>
 #include <vector>
 
 #include "pencilscan/detection/curve.h"
@@ -20,8 +21,8 @@ constexpr float kWidestProfilePx = static_cast<float>(kMaxHalf) / 2.4F;
 /// it.
 [[nodiscard]] std::size_t size_of_width(float width_px);
 
-/// px of the size that it is given at; 0 of no points.
-[[nodiscard]] float median_width(const Curve& curve);
+/// px of the size that the points are given at; 0 of no points.
+[[nodiscard]] float median_width(std::span<const CurvePoint> points);
 
 /// The same for a curve that is given at `size`, by its median width.
 [[nodiscard]] std::size_t size_of_curve(const Curve& curve, std::size_t size);
