@@ -1,6 +1,7 @@
 #include "pencilscan/api/images.h"
 
 #include "pencilscan/core/error.h"
+#include "pencilscan/core/formatted.h"
 
 namespace pencilscan {
 namespace {
@@ -19,8 +20,8 @@ ImageView::ImageView(const void* values, std::size_t count, int width, int heigh
   if (!has_size || count != static_cast<std::size_t>(width) * static_cast<std::size_t>(height) *
                                 static_cast<std::size_t>(channels)) {
     throw InputError("image", "values", std::to_string(count),
-                     "must be width x height x channels = " + std::to_string(width) + " x " +
-                         std::to_string(height) + " x " + std::to_string(channels));
+                     "must be width x height x channels = " + size_text(width, height) + " x " +
+                         std::to_string(channels));
   }
   // Nobody writes to the pixels of an input: cv::Mat has no way to say so.
   stored_ = cv::Mat(height, width, CV_MAKETYPE(depth, channels), const_cast<void*>(values));

@@ -119,11 +119,9 @@ void AravisCamera::set_picture(const CameraSettings& settings, CameraSettings& r
     gint highest = INT_MAX;
     arv_camera_get_width_bounds(camera_.get(), &least, &widest, failure.out());
     arv_camera_get_height_bounds(camera_.get(), &least, &highest, failure.out());
-    const std::string size =
-        std::to_string(settings.width) + " x " + std::to_string(settings.height);
+    const std::string size = size_text(settings.width, settings.height);
     if (settings.width > widest || settings.height > highest)
-      refuse("size", size,
-             "must be at most " + std::to_string(widest) + " x " + std::to_string(highest));
+      refuse("size", size, "must be at most " + size_text(widest, highest));
     arv_camera_set_region(camera_.get(), 0, 0, settings.width, settings.height, failure.out());
     if (failure.failed()) refuse("size", size, failure.text());
   }
@@ -131,8 +129,8 @@ void AravisCamera::set_picture(const CameraSettings& settings, CameraSettings& r
   gint y = 0;
   arv_camera_get_region(camera_.get(), &x, &y, &result.width, &result.height, failure.out());
   if (settings.width > 0 && (result.width != settings.width || result.height != settings.height))
-    refuse("size", std::to_string(result.width) + " x " + std::to_string(result.height),
-           "must be " + std::to_string(settings.width) + " x " + std::to_string(settings.height) +
+    refuse("size", size_text(result.width, result.height),
+           "must be " + size_text(settings.width, settings.height) +
                ", that of the rig: the camera allows no other");
   result.pixel_format =
       text_of(arv_camera_get_pixel_format_as_string(camera_.get(), failure.out()));

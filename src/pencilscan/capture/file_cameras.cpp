@@ -10,6 +10,7 @@
 
 #include "pencilscan/core/child_process.h"
 #include "pencilscan/core/error.h"
+#include "pencilscan/core/formatted.h"
 #include "pencilscan/core/host_clock.h"
 #include "pencilscan/core/lower_case.h"
 #include "pencilscan/io/file.h"
@@ -43,9 +44,9 @@ CameraFrame frame_of_file(const fs::path& path, const CameraSettings& settings) 
   if (settings.width > 0 &&
       (frame.image.cols != settings.width || frame.image.rows != settings.height)) {
     frame.status = PictureStatus::kWrongSize;
-    frame.remark = path.filename().string() + " has " + std::to_string(frame.image.cols) + " x " +
-                   std::to_string(frame.image.rows) + " px, not " + std::to_string(settings.width) +
-                   " x " + std::to_string(settings.height);
+    frame.remark = path.filename().string() + " has " +
+                   size_text(frame.image.cols, frame.image.rows) + " px, not " +
+                   size_text(settings.width, settings.height);
     frame.image.release();
   }
   return frame;

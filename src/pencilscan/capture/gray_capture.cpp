@@ -41,11 +41,6 @@ struct Shot {
   std::string file;
 };
 
-std::string three_digits(std::size_t number) {
-  const std::string text = std::to_string(number);
-  return std::string(text.size() < 3 ? 3 - text.size() : 0, '0') + text;
-}
-
 /// The sequence as files; with inverses, a pattern is followed by its inverse.
 std::vector<Shot> shots_of(const Projector& projector, const GrayCaptureOptions& options) {
   std::vector<Shot> shots;
@@ -53,7 +48,7 @@ std::vector<Shot> shots_of(const Projector& projector, const GrayCaptureOptions&
   const auto all = gray_code_sequence(projector.width, projector.height, true);
   for (std::size_t i = 0, k = 0; k < wanted.size(); ++i) {
     if (!options.inverses && all[i].inverse) continue;
-    shots.push_back({{Kind::kGray, i, {}}, three_digits(k++) + ".png"});
+    shots.push_back({{Kind::kGray, i, {}}, gray_code_file_stem(k++) + ".png"});
   }
   if (!options.solids) return shots;
   for (const SolidImage& solid : solid_images())

@@ -18,6 +18,7 @@
 
 #include "pencilscan/capture/sensor_pixels.h"
 #include "pencilscan/core/error.h"
+#include "pencilscan/core/formatted.h"
 #include "pencilscan/core/host_clock.h"
 
 namespace pencilscan {
@@ -195,10 +196,9 @@ void VideoCamera::choose_format(const CameraSettings& settings, CameraSettings& 
   result.pixel_format = chosen->name;
   if (format_.pixelformat != chosen->code ||
       (settings.width > 0 && (result.width != settings.width || result.height != settings.height)))
-    throw InputError(
-        info_.address, "size", std::to_string(result.width) + " x " + std::to_string(result.height),
-        "must be " + std::to_string(settings.width) + " x " + std::to_string(settings.height) +
-            ", that of the rig: the camera offers " + "no other in " + chosen->name);
+    throw InputError(info_.address, "size", size_text(result.width, result.height),
+                     "must be " + size_text(settings.width, settings.height) +
+                         ", that of the rig: the camera offers " + "no other in " + chosen->name);
 }
 
 void VideoCamera::choose_exposure(const CameraSettings& settings, CameraSettings& result) {

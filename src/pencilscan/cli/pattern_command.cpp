@@ -25,10 +25,7 @@ struct PatternOptions {
   bool overwrite = false;
 };
 
-std::string file_name(std::size_t number) {
-  const std::string digits = std::to_string(number);
-  return std::string(digits.size() < 3 ? 3 - digits.size() : 0, '0') + digits + ".png";
-}
+std::string file_name(std::size_t position) { return gray_code_file_stem(position) + ".png"; }
 
 /// The files of write_gray_codes().
 std::vector<std::filesystem::path> gray_code_files(const PatternOptions& options, const Rig& rig) {

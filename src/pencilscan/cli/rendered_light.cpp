@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "pencilscan/core/error.h"
+#include "pencilscan/core/formatted.h"
 #include "pencilscan/io/image.h"
 #include "pencilscan/recording/pack.h"
 
@@ -23,10 +24,9 @@ cv::Mat RenderedLight::read(const std::string& frame, const Camera& camera) cons
   const fs::path path = file(frame, camera);
   cv::Mat light = read_image(path);
   if (light.cols != camera.width || light.rows != camera.height) {
-    throw InputError(path.string(), "size",
-                     std::to_string(light.cols) + " x " + std::to_string(light.rows),
+    throw InputError(path.string(), "size", size_text(light.cols, light.rows),
                      "must be that of " + camera.name + " in the rig, " +
-                         std::to_string(camera.width) + " x " + std::to_string(camera.height));
+                         size_text(camera.width, camera.height));
   }
   return light;
 }

@@ -14,6 +14,11 @@ namespace pencilscan {
   return text.data();
 }
 
+/// The size of a picture or panel in a sentence: "1920 x 1080".
+[[nodiscard]] inline std::string size_text(int width, int height) {
+  return std::to_string(width) + " x " + std::to_string(height);
+}
+
 /// A share as "0.42 %", "4.2 %" or "38 %": two digits below 10, whole numbers from there on.
 [[nodiscard]] inline std::string percent_text(double share) {
   return formatted(100 * share, std::abs(100 * share) < 9.95 ? "%.2g %%" : "%.0f %%");

@@ -5,13 +5,10 @@
 #include <cstdio>
 
 #include "pencilscan/core/error.h"
+#include "pencilscan/core/formatted.h"
 
 namespace pencilscan {
 namespace {
-
-std::string size_text(int width, int height) {
-  return std::to_string(width) + " x " + std::to_string(height);
-}
 
 std::string hz(double refresh) {
   char text[32];

@@ -6,6 +6,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "pencilscan/core/error.h"
+#include "pencilscan/core/formatted.h"
 #include "pencilscan/pattern/gray_code.h"
 #include "pencilscan/pattern/solid_color.h"
 
@@ -57,9 +58,8 @@ cv::Mat identify_picture(const Projector& projector) {
   }
   put_centred(panel, projector.name, panel.rows * 2 / 5, 0.7);
   const std::string output = projector.output.empty() ? "" : projector.output + "   ";
-  put_centred(panel,
-              output + std::to_string(projector.width) + " x " + std::to_string(projector.height),
-              panel.rows * 3 / 5, 0.5);
+  put_centred(panel, output + size_text(projector.width, projector.height), panel.rows * 3 / 5,
+              0.5);
   put_centred(panel, "top", panel.rows / 8, 0.06);
   return panel;
 }

@@ -12,9 +12,8 @@ std::optional<ShownDifference> compare_shown(const cv::Mat& shown, const cv::Mat
   if (shown.size() != expected.size() || shown.type() != expected.type()) {
     result.kind = "other";
     result.share = 1;
-    result.sentence = "has " + std::to_string(shown.cols) + " x " + std::to_string(shown.rows) +
-                      " px instead of " + std::to_string(expected.cols) + " x " +
-                      std::to_string(expected.rows);
+    result.sentence = "has " + size_text(shown.cols, shown.rows) + " px instead of " +
+                      size_text(expected.cols, expected.rows);
     return result;
   }
   cv::Mat difference;

@@ -4,6 +4,7 @@
 #include <cstdio>
 
 #include "pencilscan/core/error.h"
+#include "pencilscan/core/formatted.h"
 #include "pencilscan/exchange/base_world.h"
 #include "pencilscan/exchange/merged_files.h"
 
@@ -108,9 +109,8 @@ JoinedRig join_rig(ExchangedRig files, const UncalibratedRig& base,
           "must be in the file, in --base, or given as --size " + d.device.name + "=1280x960");
     if (d.device.width != at->width || d.device.height != at->height)
       throw InputError(d.source, "image size of " + d.device.name,
-                       std::to_string(d.device.width) + " x " + std::to_string(d.device.height),
-                       "must be that of --base, " + std::to_string(at->width) + " x " +
-                           std::to_string(at->height));
+                       size_text(d.device.width, d.device.height),
+                       "must be that of --base, " + size_text(at->width, at->height));
     adopt_lens(options, d);
     take_over(d, *at, given[static_cast<std::size_t>(at - list.begin())]);
   };

@@ -26,10 +26,6 @@ struct Described {
         pose_source(device.source) {}
 };
 
-std::string size_text(const Device& device) {
-  return std::to_string(device.width) + " x " + std::to_string(device.height);
-}
-
 std::string K_text(const Mat3& K) {
   return "fx fy cx cy = " + formatted(K(0, 0), "%.7g") + " " + formatted(K(1, 1), "%.7g") + " " +
          formatted(K(0, 2), "%.7g") + " " + formatted(K(1, 2), "%.7g");
@@ -60,8 +56,10 @@ void join_size(const ExchangedDevice& next, Described& known) {
     device.height = next.device.height;
     known.size_source = next.source;
   } else if (device.width != next.device.width || device.height != next.device.height) {
-    throw InputError(next.source, "image size of " + device.name, size_text(next.device),
-                     "must be that of " + known.size_source + ", " + size_text(device));
+    throw InputError(
+        next.source, "image size of " + device.name,
+        size_text(next.device.width, next.device.height),
+        "must be that of " + known.size_source + ", " + size_text(device.width, device.height));
   }
 }
 

@@ -5,6 +5,7 @@
 
 #include "pencilscan/core/check.h"
 #include "pencilscan/core/error.h"
+#include "pencilscan/core/formatted.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/io/found_files.h"
 #include "pencilscan/io/image.h"
@@ -17,15 +18,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::string three_digits(std::size_t number) {
-  std::string text = std::to_string(number);
-  return std::string(text.size() < 3 ? 3 - text.size() : 0, '0') + text;
-}
-
 /// Files 000, 001, ... without a gap.
 std::vector<fs::path> numbered_files(const fs::path& folder) {
   std::vector<fs::path> files;
-  while (const auto file = find_image(folder, three_digits(files.size()))) files.push_back(*file);
+  while (const auto file = find_image(folder, gray_code_file_stem(files.size())))
+    files.push_back(*file);
   return files;
 }
 
@@ -49,7 +46,7 @@ std::size_t index_of(const std::vector<DeviceT>& devices, const std::string& nam
 
 /// The first number that is missing and, where nothing is named so, what there is instead.
 std::string what_is_missing(const fs::path& folder, const std::vector<fs::path>& files) {
-  const std::string missing = three_digits(files.size()) + ".png is missing";
+  const std::string missing = gray_code_file_stem(files.size()) + ".png is missing";
   return files.empty() ? missing + ", " + holdings(folder) : missing;
 }
 
@@ -86,8 +83,8 @@ CapturePair capture_pair(const fs::path& folder, const Projector& projector) {
     throw InputError(
         folder.string(), "images 000, 001, ... without a gap", std::to_string(pair.files.size()),
         "must be " + std::to_string(2 + 2 * bits) + " (or " + std::to_string(2 + bits) +
-            " without inverses) for a panel of " + std::to_string(projector.width) + " x " +
-            std::to_string(projector.height) + " px; " + what_is_missing(folder, pair.files));
+            " without inverses) for a panel of " + size_text(projector.width, projector.height) +
+            " px; " + what_is_missing(folder, pair.files));
   }
   pair.range = range_of(pair.files);
   return pair;
@@ -100,10 +97,9 @@ cv::Mat read_color_image(const CapturePair& pair, const fs::path& path, const Ca
   check_channels(camera, stored.channels(), path);
   cv::Mat color = camera_values(camera, stored);
   if (color.cols != camera.width || color.rows != camera.height) {
-    throw InputError(path.string(), "size",
-                     std::to_string(color.cols) + " x " + std::to_string(color.rows),
-                     "must be that of camera " + camera.name + ", " + std::to_string(camera.width) +
-                         " x " + std::to_string(camera.height));
+    throw InputError(
+        path.string(), "size", size_text(color.cols, color.rows),
+        "must be that of camera " + camera.name + ", " + size_text(camera.width, camera.height));
   }
   color = linearized(color, 1, camera.black_level);
   if (pair.range < 1 && camera.black_level < pair.range)

@@ -1,7 +1,5 @@
 #include "pencilscan/pattern/gray_code.h"
 
-#include <cstddef>
-
 #include "pencilscan/core/check.h"
 
 namespace pencilscan {
@@ -31,6 +29,11 @@ std::vector<GrayCodeImage> gray_code_sequence(int width, int height, bool with_i
     }
   }
   return sequence;
+}
+
+std::string gray_code_file_stem(std::size_t position) {
+  const std::string digits = std::to_string(position);
+  return std::string(digits.size() < 3 ? 3 - digits.size() : 0, '0') + digits;
 }
 
 cv::Mat render_gray_code(const GrayCodeImage& image, int width, int height) {

@@ -1,8 +1,10 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <opencv2/core.hpp>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "pencilscan/geometry/light_sheet.h"
@@ -38,6 +40,9 @@ struct GrayCodeImage {
 /// number.
 [[nodiscard]] std::vector<GrayCodeImage> gray_code_sequence(int width, int height,
                                                             bool with_inverses = true);
+
+/// Name of the file at this position of a sequence, without its ending: "007".
+[[nodiscard]] std::string gray_code_file_stem(std::size_t position);
 
 /// What the projector shows for one image: CV_8UC1, 0 or 255.
 [[nodiscard]] cv::Mat render_gray_code(const GrayCodeImage& image, int width, int height);

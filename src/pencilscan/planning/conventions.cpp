@@ -139,8 +139,8 @@ std::optional<std::string> intrinsics_convention_warning(const Rig& rig) {
     if (is_camera && (center.minCoeff() < kRim || center.maxCoeff() > 1 - kRim)) {
       warning = "K of " + device.name + " has its principal point at " + formatted(device.K(0, 2)) +
                 ", " + formatted(device.K(1, 2)) +
-                " px, at the rim of its picture: the middle of " + std::to_string(device.width) +
-                " x " + std::to_string(device.height) + " px is usual";
+                " px, at the rim of its picture: the middle of " +
+                size_text(device.width, device.height) + " px is usual";
     }
   };
   for (const Camera& camera : rig.cameras) look(camera, true);
