@@ -1,10 +1,12 @@
 #include "pencilscan/artefact/find_shapes.h"
 
-#include <algorithm>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include "pencilscan/artefact/sphere_fit.h"
+#include "pencilscan/core/evenly_picked.h"
+#include "pencilscan/core/median.h"
 #include "pencilscan/core/random.h"
 
 namespace pencilscan {
@@ -17,29 +19,17 @@ constexpr int kDraws = 2000;
 constexpr std::size_t kVoters = 3000;
 constexpr double kOfExtent = 0.01;
 
-std::vector<Vec3> evenly_picked(std::span<const Vec3> points) {
-  std::vector<Vec3> picked;
-  const std::size_t count = std::min(points.size(), kVoters);
-  for (std::size_t i = 0; i < count; ++i) picked.push_back(points[i * points.size() / count]);
-  return picked;
-}
-
 /// Twice the median distance from the middle one per axis: few far points do not change it.
 double extent_of(const std::vector<Vec3>& points) {
-  const auto median = [](std::vector<double> values) {
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    return *middle;
-  };
   Vec3 center;
   for (int axis = 0; axis < 3; ++axis) {
     std::vector<double> values;
     for (const Vec3& point : points) values.push_back(point(axis));
-    center(axis) = median(std::move(values));
+    center(axis) = upper_median(std::move(values));
   }
   std::vector<double> distances;
   for (const Vec3& point : points) distances.push_back((point - center).norm());
-  return 2 * median(std::move(distances));
+  return 2 * upper_median(std::move(distances));
 }
 
 template <typename Shape, typename Draw, typename Distance>
@@ -64,7 +54,7 @@ std::optional<Shape> most_voted(const std::vector<Vec3>& voters, double toleranc
 
 std::optional<Sphere> find_sphere(std::span<const Vec3> points, const SphereSearch& search) {
   if (points.size() < 4) return std::nullopt;
-  const std::vector<Vec3> voters = evenly_picked(points);
+  const std::vector<Vec3> voters = evenly_picked(points, kVoters);
   const double extent = extent_of(voters);
   const auto acceptable = [&](const Sphere& sphere) {
     if (search.not_here &&
@@ -94,7 +84,7 @@ std::optional<Sphere> find_sphere(std::span<const Vec3> points, const SphereSear
 std::optional<Plane> find_plane(std::span<const Vec3> points, std::uint64_t seed,
                                 std::optional<double> tolerance) {
   if (points.size() < 3) return std::nullopt;
-  const std::vector<Vec3> voters = evenly_picked(points);
+  const std::vector<Vec3> voters = evenly_picked(points, kVoters);
   Random random(seed);
   const auto pick = [&]() -> const Vec3& {
     return voters[random.below(static_cast<std::uint32_t>(voters.size()))];

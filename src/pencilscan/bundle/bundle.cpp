@@ -11,6 +11,7 @@
 #include "pencilscan/bundle/bundle_device.h"
 #include "pencilscan/bundle/reprojection.h"
 #include "pencilscan/core/check.h"
+#include "pencilscan/core/evenly_picked.h"
 
 namespace pencilscan {
 namespace {
@@ -69,9 +70,8 @@ class ProblemBuilder {
     std::vector<std::size_t> chosen;
     for (std::size_t t = 0; t < from_.tracks.size(); ++t)
       if (from_.used[t] != 0) chosen.push_back(t);
-    const std::size_t count =
-        options_.max_tracks == 0 ? chosen.size() : std::min(options_.max_tracks, chosen.size());
-    for (std::size_t i = 0; i < count; ++i) add_track(chosen[i * chosen.size() / count]);
+    const std::size_t most = options_.max_tracks == 0 ? chosen.size() : options_.max_tracks;
+    for (const std::size_t t : evenly_picked(chosen, most)) add_track(t);
   }
 
   void add_boards() {

@@ -10,6 +10,7 @@
 #include "pencilscan/bundle/bundle_device.h"
 #include "pencilscan/bundle/reduced_equations.h"
 #include "pencilscan/bundle/triangulation.h"
+#include "pencilscan/core/evenly_picked.h"
 #include "pencilscan/core/median.h"
 #include "pencilscan/core/random.h"
 #include "pencilscan/geometry/cross_matrix.h"
@@ -184,9 +185,7 @@ void measure_volume(const BundleProblem& problem, const Covariance& covariance, 
   std::vector<std::size_t> used;
   for (std::size_t t = 0; t < problem.tracks.size(); ++t)
     if (problem.used[t] != 0) used.push_back(t);
-  const std::size_t count = std::min(used.size(), kPoints);
-  for (std::size_t i = 0; i < count; ++i) {
-    const std::size_t t = used[i * used.size() / count];
+  for (const std::size_t t : evenly_picked(used, kPoints)) {
     Track track = problem.tracks[t];
     for (TrackView& view : track.views) {  // as the rig itself would see the point
       const auto error = view_error(problem.devices[view.device], problem.points[t], view);
@@ -195,6 +194,7 @@ void measure_volume(const BundleProblem& problem, const Covariance& covariance, 
     exact.tracks.push_back(track);
     exact.points.push_back(problem.points[t]);
   }
+  const std::size_t count = exact.tracks.size();
   std::vector<double> squares(count, 0);
   std::vector<int> draws(count, 0);
   Random random(seed);

@@ -7,6 +7,7 @@
 #include "pencilscan/bundle/bundle_device.h"
 #include "pencilscan/calibration/given_values.h"
 #include "pencilscan/color/color_json.h"
+#include "pencilscan/core/evenly_picked.h"
 
 namespace pencilscan {
 namespace {
@@ -54,11 +55,8 @@ Json points_json(const BundleProblem& problem) {
   for (const Vec3& x : used) square += (x - mean).squaredNorm() / static_cast<double>(used.size());
   const double step = std::max(1e-4 * std::sqrt(square), 1e-9);
   const double per_unit = std::pow(10, -std::floor(std::log10(step)));
-  const std::size_t count = std::min(used.size(), kMost);
-  for (std::size_t i = 0; i < count; ++i) {
-    const Vec3 x = (used[i * used.size() / count] * per_unit).array().round() / per_unit;
-    points.push_back(list(x));
-  }
+  for (const Vec3& x : evenly_picked(used, kMost))
+    points.push_back(list((x * per_unit).array().round() / per_unit));
   return points;
 }
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "pencilscan/calibration/pair_fit.h"
+#include "pencilscan/core/evenly_picked.h"
 
 namespace pencilscan {
 namespace {
@@ -55,13 +56,6 @@ Explained explained(const CalibrationInput& input, const CalibrationResult& resu
     shares.of_device.push_back(all[d] > 0 ? good[d] / all[d] : 1);
   shares.of_all = sum > 0 ? good_sum / sum : 1;
   return shares;
-}
-
-std::vector<Track> some_of(const std::vector<Track>& tracks, std::size_t count) {
-  if (tracks.size() <= count) return tracks;
-  std::vector<Track> some;
-  for (std::size_t i = 0; i < count; ++i) some.push_back(tracks[i * tracks.size() / count]);
-  return some;
 }
 
 CalibrationInput mirrored(CalibrationInput input, const std::vector<std::size_t>& devices) {
@@ -114,7 +108,7 @@ std::optional<Finding> find_mirrored(const CalibrationInput& input, const Calibr
   if (device_count(input.rig) < 3 || !are_pairs_sensible(result)) return std::nullopt;
   const Explained before = explained(input, result);
   CalibrationInput some = input;
-  some.tracks = some_of(input.tracks, kTracks);
+  some.tracks = evenly_picked(input.tracks, kTracks);
   const auto trials = suspects(input.rig, before);
   for (std::size_t i = 0; i < trials.size(); ++i) {
     if (progress)

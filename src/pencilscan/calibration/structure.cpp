@@ -11,6 +11,7 @@
 
 #include "pencilscan/bundle/bundle_device.h"
 #include "pencilscan/bundle/triangulation.h"
+#include "pencilscan/core/evenly_picked.h"
 #include "pencilscan/core/median.h"
 #include "pencilscan/geometry/least_squares.h"
 
@@ -78,8 +79,8 @@ std::vector<std::size_t> chosen_tracks(const BundleProblem& problem, std::size_t
     std::vector<std::size_t> pool;
     for (std::size_t t = 0; t < problem.tracks.size(); ++t)
       if ((problem.tracks[t].views.size() > 2) == is_long) pool.push_back(t);
-    const std::size_t take = std::min(pool.size(), is_long ? count : count / 2);
-    for (std::size_t i = 0; i < take; ++i) order.push_back(pool[i * pool.size() / take]);
+    const std::vector<std::size_t> picked = evenly_picked(pool, is_long ? count : count / 2);
+    order.insert(order.end(), picked.begin(), picked.end());
   }
   std::sort(order.begin(), order.end());
   return order;

@@ -7,6 +7,7 @@
 #include <tuple>
 
 #include "pencilscan/core/check.h"
+#include "pencilscan/core/evenly_picked.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/gray/local_map.h"
 
@@ -127,8 +128,8 @@ std::vector<Track> TrackBuilder::tracks() const {
       std::vector<const Track*> pool;
       for (const Track* track : group)
         if ((track->views.size() > 2) == is_long) pool.push_back(track);
-      const std::size_t take = std::min(pool.size(), wanted - chosen.size());
-      for (std::size_t i = 0; i < take; ++i) chosen.push_back(pool[i * pool.size() / take]);
+      const std::vector<const Track*> picked = evenly_picked(pool, wanted - chosen.size());
+      chosen.insert(chosen.end(), picked.begin(), picked.end());
     }
     for (const Track* track : chosen) tracks.push_back(*track);
   }

@@ -1,16 +1,22 @@
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <map>
 #include <set>
+#include <span>
 #include <vector>
 
 #include "pencilscan/core/disjoint_sets.h"
+#include "pencilscan/core/evenly_picked.h"
 #include "pencilscan/core/random.h"
 #include "pencilscan/core/tally.h"
 
 namespace pencilscan {
 namespace {
+
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
 
 TEST(DisjointSets, AreThoseOfASearchThroughTheLinks) {
   constexpr int kElements = 60;
@@ -43,6 +49,15 @@ struct Vote {
   int group = 0;
   float weight = 0;
 };
+
+TEST(EvenlyPicked, IsInOrderEvenAndNeverMoreThanThereAre) {
+  const std::vector<int> values{0, 1, 2, 3, 4, 5, 6};
+  EXPECT_THAT(evenly_picked(values, 3), ElementsAre(0, 2, 4));
+  EXPECT_EQ(evenly_picked(values, 7), values);
+  EXPECT_EQ(evenly_picked(std::span(values), 9), values);
+  EXPECT_THAT(evenly_picked(values, 0), IsEmpty());
+  EXPECT_THAT(evenly_picked(std::vector<int>{}, 3), IsEmpty());
+}
 
 TEST(Tally, IsTheSumOfTheStrongestOfEachGroup) {
   Random rng(3);

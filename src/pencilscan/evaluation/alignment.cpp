@@ -7,6 +7,7 @@
 
 #include "pencilscan/core/check.h"
 #include "pencilscan/core/chunks.h"
+#include "pencilscan/core/evenly_picked.h"
 #include "pencilscan/core/median.h"
 #include "pencilscan/evaluation/statistics.h"
 #include "pencilscan/evaluation/surface_figures.h"
@@ -164,14 +165,6 @@ Spread spread_of(std::span<const Vec3> points) {
   return spread;
 }
 
-std::vector<Vec3> even_subset(std::span<const Vec3> points, std::size_t count) {
-  count = std::min(count, points.size());
-  std::vector<Vec3> subset;
-  subset.reserve(count);
-  for (std::size_t i = 0; i < count; ++i) subset.push_back(points[i * points.size() / count]);
-  return subset;
-}
-
 /// Poses that match centroid and size of the two, unturned and turned by the principal axes.
 std::vector<Similarity> coarse_poses(std::span<const Vec3> points, const RayScene& truth,
                                      AlignmentKind kind) {
@@ -210,7 +203,7 @@ AlignmentReport align_to_surface(std::span<const Vec3> points, const RayScene& t
   constexpr std::size_t kCoarsePoints = 1000;
   constexpr int kCoarseSteps = 30;
   constexpr double kNear = 0.005;  // of the size: the points were about in place
-  const auto coarse = even_subset(points, kCoarsePoints);
+  const auto coarse = evenly_picked(points, kCoarsePoints);
   AlignmentReport best = refine(coarse, truth, kind, {}, 0, kCoarseSteps, size_mm);
   const auto cost = [](const AlignmentReport& r) {
     return r.median_mm / r.truth_from_result.scale;
@@ -221,7 +214,7 @@ AlignmentReport align_to_surface(std::span<const Vec3> points, const RayScene& t
       if (cost(other) < cost(best)) best = other;
     }
   }
-  return refine(even_subset(points, options.max_points), truth, kind, best.truth_from_result, 0,
+  return refine(evenly_picked(points, options.max_points), truth, kind, best.truth_from_result, 0,
                 options.max_iterations, size_mm);
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <vector>
 
+#include "pencilscan/core/evenly_picked.h"
 #include "pencilscan/core/formatted.h"
 #include "pencilscan/core/length_units.h"
 #include "pencilscan/evaluation/statistics.h"
@@ -13,13 +14,6 @@ namespace {
 
 constexpr double kNear = 0.05;         ///< of the result's extent
 constexpr std::size_t kLooked = 2000;  ///< of so many points the median is known well enough
-
-std::vector<Vec3> evenly_picked(std::span<const Vec3> points) {
-  std::vector<Vec3> picked;
-  const std::size_t count = std::min(points.size(), kLooked);
-  for (std::size_t i = 0; i < count; ++i) picked.push_back(points[i * points.size() / count]);
-  return picked;
-}
 
 /// Diagonal of the box that holds nine tenths of the points along each axis: few that are far off
 /// do not change it.
@@ -50,7 +44,7 @@ std::string unit_advice(double factor) {
 }  // namespace
 
 std::optional<std::string> truth_warning(const RayScene& truth, std::span<const Vec3> points) {
-  const std::vector<Vec3> looked = evenly_picked(points);
+  const std::vector<Vec3> looked = evenly_picked(points, kLooked);
   std::vector<Vec3> of_truth;
   for (const DrawnPoint& drawn : sample_surface(truth.mesh(), kLooked, 1))
     of_truth.push_back(drawn.point);

@@ -1,9 +1,9 @@
-#include <algorithm>
 #include <iomanip>
 #include <limits>
 #include <sstream>
 
 #include "pencilscan/core/error.h"
+#include "pencilscan/core/evenly_picked.h"
 #include "pencilscan/exchange/colmap_model.h"
 #include "pencilscan/exchange/unheld.h"
 #include "pencilscan/io/file.h"
@@ -44,13 +44,6 @@ void write_colmap_pose(const RigidTransform& pose, std::ostream& text) {
 void check_name(const std::string& name) {
   if (name.find_first_of(" \t#") != std::string::npos || name.empty())
     throw InputError("rig", "name", name, "COLMAP knows no names with blanks or #");
-}
-
-std::vector<MeasuredPoint> evenly_picked(std::span<const MeasuredPoint> points, std::size_t most) {
-  const std::size_t count = std::min(points.size(), most);
-  std::vector<MeasuredPoint> picked;
-  for (std::size_t i = 0; i < count; ++i) picked.push_back(points[i * points.size() / count]);
-  return picked;
 }
 
 }  // namespace

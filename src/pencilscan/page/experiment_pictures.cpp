@@ -8,6 +8,7 @@
 #include <set>
 
 #include "pencilscan/core/error.h"
+#include "pencilscan/core/evenly_picked.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/io/file.h"
 #include "pencilscan/io/image.h"
@@ -187,9 +188,8 @@ std::vector<const ExperimentPicture*> picked(const std::vector<const ExperimentP
   // A tenth less: other frames may be larger.
   const auto fit = static_cast<std::size_t>(0.9 * static_cast<double>(room) /
                                             static_cast<double>(std::max<std::size_t>(first, 1)));
-  const std::size_t count = std::min(keys.size(), fit);
-  std::set<std::string> chosen;
-  for (std::size_t i = 0; i < count; ++i) chosen.insert(keys[i * keys.size() / count]);
+  const std::vector<std::string> picked = evenly_picked(keys, fit);
+  const std::set<std::string> chosen(picked.begin(), picked.end());
   std::vector<const ExperimentPicture*> result;
   for (const auto* picture : pictures) {
     if (chosen.contains(group_key(*picture))) result.push_back(picture);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <optional>
 
+#include "pencilscan/core/evenly_picked.h"
 #include "pencilscan/core/median.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/geometry/least_squares.h"
@@ -29,9 +30,7 @@ class Mover {
  public:
   Mover(const Rig& rig, std::span<const CrossingTrack> tracks, const MovedDevicesOptions& options)
       : rig_(rig), options_(options), correction_(device_count(rig)) {
-    const std::size_t count = std::min(tracks.size(), options.max_tracks);
-    for (std::size_t i = 0; i < count; ++i) {
-      const CrossingTrack& track = tracks[i * tracks.size() / count];
+    for (const CrossingTrack& track : evenly_picked(tracks, options.max_tracks)) {
       const TrackResidual residual(rig, track, options.refine.line_sigma_px);
       if (residual.evaluate(poses(residual, correction_), false)) tracks_.push_back(track);
     }

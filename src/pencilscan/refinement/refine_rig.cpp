@@ -8,6 +8,7 @@
 #include <memory>
 #include <optional>
 
+#include "pencilscan/core/evenly_picked.h"
 #include "pencilscan/core/formatted.h"
 #include "pencilscan/core/median.h"
 #include "pencilscan/core/parallel.h"
@@ -228,9 +229,8 @@ UsedTracks usable(const Rig& rig, std::span<const CrossingTrack> tracks,
       changed = true;
     }
   }
-  const std::size_t count = std::min(kept.size(), options.max_tracks);
-  for (std::size_t i = 0; i < count; ++i)
-    used.tracks.push_back(tracks[kept[i * kept.size() / count]]);
+  for (const std::size_t t : evenly_picked(kept, options.max_tracks))
+    used.tracks.push_back(tracks[t]);
   return used;
 }
 
