@@ -30,20 +30,22 @@ Vec3 corner_point(const BundleProblem& problem, const BoardView& view) {
 }
 
 Vec2 corner_error(const BundleProblem& problem, const BoardView& view) {
-  constexpr double kBehind = 1e3;
+  constexpr double kBehind = 1e3;  // px: off by more than any corner that is kept
   return view_error(problem.devices[view.view.device], corner_point(problem, view), view.view)
       .value_or(Vec2(kBehind, 0));
 }
 
 void weigh_corners(BundleProblem& problem) {
-  constexpr double kLeastSigmaPx = 0.1;
+  constexpr double kLeastSigmaPx = 0.1;  // as corners are expected to scatter (boards/board.cpp)
+  // Boards are never quite flat, and corners share that: they count three times their own scatter
+  // (docs/calibration.md, "Boards"). Chosen; no fit of it is kept.
   constexpr double kShared = 3;
   const double sigma = kShared * std::max(kLeastSigmaPx, corner_scatter(problem));
   for (BoardView& v : problem.board_views) v.view.sigma_px = sigma;
 }
 
 void drop_corners(BundleProblem& problem, double deviations) {
-  constexpr double kLeastLimitPx = 0.5;
+  constexpr double kLeastLimitPx = 0.5;  // such corners stay, however well the rest fits
   const double limit = std::max(kLeastLimitPx, deviations * corner_scatter(problem));
   std::erase_if(problem.board_views,
                 [&](const BoardView& v) { return corner_error(problem, v).norm() > limit; });

@@ -64,7 +64,7 @@ ReducedEquations::ReducedEquations(const BundleProblem& problem, const BundleOpt
 }
 
 double ReducedEquations::variance_factor() const {
-  constexpr double kLeast = 0.05;
+  constexpr double kLeast = 0.05;  // without noise a rig would be exact
   if (loss_.slope == 0) return 1;
   return std::max(loss_.weight * loss_.influence / (loss_.slope * loss_.slope), kLeast);
 }
@@ -88,8 +88,9 @@ Eigen::MatrixXd ReducedEquations::systematic(double shared_px) const {
 }
 
 double ReducedEquations::shared_error(double visible_px, const Eigen::MatrixXd& root) const {
+  // A camera and a projector before a plane, the weakest rig there, show .2 (docs/calibration.md).
   constexpr double kLeastShare = 0.05;
-  constexpr double kLeastFreedom = 3;
+  constexpr double kLeastFreedom = 3;  // Student's t has a variance above 2 only
   if (patch_views_.isZero()) return visible_px;
   Eigen::MatrixXd free_rows(root.rows(), patches_.cols());
   Eigen::Index row = 0;

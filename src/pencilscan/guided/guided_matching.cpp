@@ -346,6 +346,7 @@ bool CameraMatching::is_supported(const Curve& curve, int begin, int end, const 
 
 /// A stretch [begin, end) on one line, within what is undecided of its curve.
 bool CameraMatching::is_long_enough(const std::vector<char>& decided, int begin, int end) const {
+  // Share of the undecided stretch that is most of it. Chosen; no fit of it is kept.
   constexpr double kMost = 0.8;
   const int n = static_cast<int>(decided.size());
   const int length = end - begin;

@@ -21,8 +21,12 @@ struct LinePlace {
 };
 
 constexpr int kNextLineCellPx = 16;
-constexpr float kNearPx = 12;  ///< most next lines are nearer
+/// Most next lines are nearer: a look so far, and then to the whole reach, finds the same sooner.
+constexpr float kNearPx = 12;
 
+// Negative log-likelihoods (docs/solutions.md, "order"): one line further counts as 4.5 times as
+// likely as what says nothing, the wrong order as a twentieth. They are chosen, no fit of them is
+// kept; experiments/one_projector.py shows what they do.
 constexpr float kNext = -1.5F;
 constexpr float kWrongOrder = 3;
 
@@ -37,7 +41,7 @@ bool lacks_crossings(const PieceGraph& graph) {
 }
 
 float next_line_reach_px(const Rig& rig, const Camera& camera) {
-  constexpr double kUsual = 48;
+  constexpr double kUsual = 48;  // px
   constexpr double kSpacings = 4;
   const double spacing = pixels_at_center(rig, camera, line_spacing(rig));
   return static_cast<float>(std::max(kUsual, kSpacings * spacing));
@@ -71,14 +75,17 @@ std::vector<NextPiece> next_pieces(const Camera& camera, const GridGraph& graph,
     const Vector2f normal(tangent.y(), -tangent.x());
     const Vector2f& at = middle.position;
     const auto nearest_within = [&](float reach, float side) {
-      constexpr float kAlong = 1;
+      constexpr float kAlong = 1;          // px: points of a curve lie so far apart
+      constexpr float kSameLinePx = 1.5F;  // what is nearer is taken for the same line
+      constexpr float kAlike = 0.85F;      // cosine of 32 degrees
       float nearest = reach;
       const LinePlace* found = nullptr;
       places.around(at, std::hypot(reach, kAlong), [&](const LinePlace& place) {
         const Vector2f way = place.pixel - at;
         const float across = side * way.dot(normal);
-        if (across < 1.5F || across >= nearest || std::abs(way.dot(tangent)) > kAlong) return;
-        if (place.curve == piece.curve || std::abs(place.tangent.dot(tangent)) < 0.85F ||
+        if (across < kSameLinePx || across >= nearest || std::abs(way.dot(tangent)) > kAlong)
+          return;
+        if (place.curve == piece.curve || std::abs(place.tangent.dot(tangent)) < kAlike ||
             graph.curves[static_cast<std::size_t>(place.curve)].family != curve.family)
           return;
         nearest = across;
@@ -99,6 +106,7 @@ std::vector<NextPiece> next_pieces(const Camera& camera, const GridGraph& graph,
 }
 
 float next_piece_cost(const PieceLabel& a, const PieceLabel& b, int order) {
+  // Of lines between the two that were not detected. Chosen like kNext.
   constexpr float kOneMissed = 0.5F;
   constexpr float kMoreMissed = 2;
   if (order == 0) return 0;

@@ -45,9 +45,10 @@ OtherViews::View OtherViews::make_view(std::size_t g) const {
 
 int OtherViews::find(const FamilyView& view, const Eigen::Vector2f& position,
                      const Eigen::Vector2f& tangent) {
-  constexpr float kMaxAcross = 1.8F;
-  constexpr float kMaxAlong = 1;
-  constexpr float kMinCosine = 0.9F;
+  // What the place may be off by errors of rig and depth is chosen, no fit of it is kept.
+  constexpr float kMaxAcross = 1.8F;  // px
+  constexpr float kMaxAlong = 1;      // px: points of a curve lie so far apart
+  constexpr float kMinCosine = 0.9F;  // 26 degrees
   float best = kMaxAcross;
   int piece = -1;
   const float reach = std::sqrt(kMaxAcross * kMaxAcross + kMaxAlong * kMaxAlong);
@@ -79,7 +80,7 @@ OtherViews::Voices OtherViews::voices_of(std::size_t g) const {
     return result;
   };
   std::vector<std::size_t> near = graphs_of(adjacent_cameras(rig_, graphs_[g].camera));
-  if (!near.empty()) return {std::move(near), 0.7F};
+  if (!near.empty()) return {std::move(near), 0.7F};  // see below: .67 at 60 degrees
   // Wide apart, much of the surface that one sees turns away from the other or is hidden from it,
   // and whole patches at once. Of the surest labels .67 are seen from 60 degrees apart and .43 from
   // 90 (bunny and hand before six and six, bunny before four and four); of .25, .3, .35 and .43
@@ -94,7 +95,7 @@ std::vector<OtherViews::Sighting> OtherViews::look_from_others(std::size_t g,
                                                                std::span<const View> views) const {
   const Camera& camera = rig_.camera(graphs_[g].camera);
   const RigidTransform world_from_camera = camera.device_from_world.inverse();
-  constexpr float kPixels = 3;
+  constexpr float kPixels = 3;  // along the piece, to see its direction there
   const float ahead = kPixels / static_cast<float>(camera.focal_px());
   std::vector<Sighting> sightings;
   for (std::size_t p = 0; p < pieces_[g].labels.size(); ++p) {
@@ -144,7 +145,9 @@ void OtherViews::forget(std::span<const std::vector<std::vector<int>>> new_index
 
 std::vector<std::vector<float>> OtherViews::costs(std::size_t g,
                                                   std::span<const PieceBeliefs> beliefs) const {
-  // A wrong label is hit by chance.
+  // Probabilities that the other camera sees a curve where a wrong label lies, that the curve it
+  // sees has the label of a true one, and that it has that of a wrong one. All three are chosen, no
+  // fit of them is kept.
   constexpr float kHitByChance = 0.2F;
   constexpr float kSameIfTrue = 0.85F;
   constexpr float kSameByChance = 0.03F;

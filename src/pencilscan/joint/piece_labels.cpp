@@ -275,7 +275,7 @@ float CrossingCost::lit_share(const PieceLabel& a, const PieceLabel& b,
   const auto square_to = [](const Eigen::Vector2f& t) { return Eigen::Vector2f(-t.y(), t.x()); };
   const Eigen::Vector2f& ta = crossing.along_a.tangent;
   const Eigen::Vector2f& tb = crossing.along_b.tangent;
-  constexpr float kLeastSine = 0.05F;
+  constexpr float kLeastSine = 0.05F;  // 3 degrees
   const float sine = ta.x() * tb.y() - ta.y() * tb.x();
   if (std::abs(sine) < kLeastSine) return 1;  // nearly the same direction: g is open
   const Eigen::Vector2f qa = a.q.head<2>();

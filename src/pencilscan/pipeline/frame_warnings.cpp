@@ -68,10 +68,11 @@ std::optional<Warning> interpolation_warning(const Rig& rig,
 std::optional<Warning> gamma_warning(const Rig& rig, const Frame& frame,
                                      std::span<const CameraDetection> detections,
                                      std::span<const GridGraph> graphs) {
+  // Pictures whose gamma is stated have .86 to 1.03 of it here (docs/sensors.md, "Gamma").
   constexpr double kWorthSaying = 1.3;
   // Of colours that a mosaic or a JPEG leaves out: these look like a factor of up to 1.4.
   constexpr double kOfFilledIn = 1.5;
-  constexpr double kDeviations = 4;
+  constexpr double kDeviations = 4;  // of the median of all crossings
   std::vector<double> gammas(rig.cameras.size(), 0);
   parallel_for(rig.cameras.size(), [&](std::size_t c) {
     const Camera& camera = rig.cameras[c];
@@ -162,7 +163,7 @@ std::vector<Warning> missing_lines_warnings(const Rig& rig,
   // Of 60 rigs drawn at random, right projectors have a third of the others' share and more; one
   // whose offset or pitch is another than the rig's has a tenth and less.
   constexpr double kHardly = 0.15;
-  constexpr std::size_t kEnough = 2000;
+  constexpr std::size_t kEnough = 2000;  // points that are expected; of few the share is chance
   const auto share = [](const ExpectedLines& lines) {
     return static_cast<double>(lines.named) / static_cast<double>(lines.points);
   };

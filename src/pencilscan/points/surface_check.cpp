@@ -50,7 +50,7 @@ class SurfaceCheck {
 
   /// Standard deviation of the surface where a ray meets it, along the ray.
   [[nodiscard]] double sigma_along(const Ray& ray, const RayScene::Hit& hit) const {
-    constexpr double kLeastCosine = 0.2;
+    constexpr double kLeastCosine = 0.2;  // 78 degrees: bounds sigma at grazing rays
     const TriangleMesh& mesh = surface_.mesh();
     double across = 0;
     for (std::size_t k = 0; k < 3; ++k)
@@ -83,7 +83,7 @@ class SurfaceCheck {
 
  private:
   [[nodiscard]] RayVerdict verdict_of(const Hit& hit, PatternRef ref, int line) const {
-    constexpr double kSameLine = 0.5;
+    constexpr double kSameLine = 0.5;  // lines: the next one is no nearer
     if (!hit) return RayVerdict::kUnseen;
     const Projector& projector = rig_.projector(ref.projector);
     const LinePattern& pattern = rig_.pattern(ref);
@@ -192,9 +192,11 @@ std::size_t drop_contradicted(const Rig& rig, const RayScene& surface,
 SettledPoints settle_on_surface(const Rig& rig, const RayScene& surface,
                                 std::span<const MeasuredPoint> points, float min_alone_confidence,
                                 std::span<const std::array<float, 3>> colors) {
-  constexpr double kFarthest = 4;  // deviations of the difference
+  // Deviations of the difference within which point and surface may be one place.
+  constexpr double kFarthest = 4;
   // Beyond, one of both is wrong, and the surface rests on the light of all pixels and cameras
-  // around; as many as settle_points() allows.
+  // around; as many as settle_points() allows (SettleOptions::max_deviations). Such points made the
+  // form error of a ball (docs/experiments.md, "Acceptance").
   constexpr double kLeftOut = 6;
   const TriangleMesh& mesh = surface.mesh();
   PENCILSCAN_CHECK(mesh.sigma.size() == mesh.vertices.size() &&

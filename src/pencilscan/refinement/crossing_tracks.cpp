@@ -267,11 +267,12 @@ std::vector<CrossingDisagreement> device_disagreements(const Rig& rig,
 }
 
 bool are_enough(const CrossingDisagreement& crossings) {
-  constexpr std::size_t kEnough = 30;
+  constexpr std::size_t kEnough = 30;  // as RefineRigOptions::min_tracks
   return crossings.crossings >= kEnough;
 }
 
 bool disagrees(const CrossingDisagreement& crossings) {
+  // Single devices of right rigs reach 1.8 times (device_warning() in pipeline/frame_warnings.cpp).
   constexpr double kFactor = 2;
   return are_enough(crossings) &&
          crossings.median_px > kFactor * std::max(0.05, crossings.expected_px);
