@@ -23,6 +23,7 @@ struct JudgementOptions {
 [[nodiscard]] std::string judge(const TriangleMesh& truth, const Rig& rig,
                                 const std::vector<MeasuredPoint>* points,
                                 const TriangleMesh* measured, const JudgementOptions& options = {});
+/// The same of all that a frame gave: its points, and its measured mesh if it has one.
 [[nodiscard]] std::string judge(const TriangleMesh& truth, const Rig& rig,
                                 const Reconstruction& result, const JudgementOptions& options = {});
 

@@ -14,8 +14,9 @@ namespace pencilscan {
 struct GrayCaptureOptions {
   bool inverses = true;
   bool solids = false;  ///< also the even colours, for crosstalk (cameras in colour)
-  /// Per projector: from show() to the first picture that shows all of it, ms, as measured by
-  /// measure_delays(); empty or 0: not measured, a careful guess is taken.
+  /// Per projector: from show() to the first picture that shows all of it, ms, as
+  /// test_projectors() measures it (ProjectorTiming::use_ms); empty or 0: not measured, a careful
+  /// guess is taken.
   std::vector<double> delay_ms;
   int retakes = 3;        ///< of a picture that fails its check, >= 0
   double patience_s = 3;  ///< for a picture of every camera, > 0

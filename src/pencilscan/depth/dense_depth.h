@@ -13,15 +13,16 @@
 namespace pencilscan {
 
 struct DepthOptions {
-  int stride = 4;  ///< px between nodes, in [1, 8]
-  int half = 5;    ///< radius of a window, px, in [2, 10]
-  double seed_radius_px = 10;
-  double max_misfit = 8;                ///< chi^2 per degree of freedom
-  double max_relative_residual = 0.25;  ///< or twice the usual one (JPEG), if that is more
-  double max_sigma_lines = 0.08;        ///< of the best pattern
-  double min_cosine = 0.2;              ///< of the incidence to the camera
-  double max_move = 2;                  ///< footprints; of a node started from the closed surface
-  double max_move_lines = 0.16;         ///< line spacings, if that is more
+  int stride = 4;              ///< px between nodes, in [1, 8]
+  int half = 5;                ///< radius of a window, px, in [2, 10]
+  double seed_radius_px = 10;  ///< around a node: labelled points that it may start from
+  double max_misfit = 8;       ///< chi^2 per degree of freedom
+  /// Root mean square over the largest amplitude; or twice the usual one (JPEG), if that is more.
+  double max_relative_residual = 0.25;
+  double max_sigma_lines = 0.08;  ///< deviation of the depth, lines of the best pattern
+  double min_cosine = 0.2;        ///< of the incidence to the camera, in [0, 1]
+  double max_move = 2;            ///< footprints; of a node started from the closed surface
+  double max_move_lines = 0.16;   ///< line spacings, if that is more
 };
 
 /// The options as they are for one camera's pictures: windows behind a mosaic are wider, and so are
@@ -48,6 +49,9 @@ struct PilotWindow {
 void measure_light(std::span<const PilotWindow> pilots, const DepthOptions& options,
                    CameraLight& light);
 
+/// The depth map of camera `camera` (index in the rig), one node every options.stride px. Windows
+/// of nodes near labelled curve points start from these; grow() goes on from there. Of `points`,
+/// those of this camera count. What lies outside `space` has no depth.
 [[nodiscard]] DepthMap dense_depth(const CameraLight& light, int camera,
                                    std::span<const MeasuredPoint> points, const ObjectSpace& space,
                                    const DepthOptions& options);

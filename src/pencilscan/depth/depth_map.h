@@ -50,7 +50,7 @@ struct DepthNode {
   float w = 0;  ///< 1 / camera z, 1/mm; 0: no depth
   float wx = 0, wy = 0, wxx = 0, wxy = 0, wyy = 0;
   float sigma = 0;        ///< mm of camera z, one standard deviation
-  float misfit = 0;       ///< residual over what noise explains (1 = only noise)
+  float misfit = 0;       ///< chi^2 per degree of freedom (1 = only noise)
   float support = 0;      ///< number of other cameras that agree, each by its own confidence
   float confidence = 0;   ///< 0..1: what the other views say
   std::uint32_t lit = 0;  ///< whose light was found: place in the map's sets

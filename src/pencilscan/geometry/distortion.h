@@ -8,8 +8,8 @@
 
 namespace pencilscan {
 
-/// The same for numbers and for Ceres' jets: normalised coordinates (x, y) as the lens shows them.
-/// `k`: kCoefficients of Distortion, in its order.
+/// distort() below for numbers and for Ceres' jets: normalised coordinates (x, y) as the lens shows
+/// them, in `shown[0]` and `shown[1]`. `k`: kCoefficients of Distortion, in its order.
 template <typename T>
 void distort_coordinates(const T* k, const T& x, const T& y, T* shown);
 

@@ -27,6 +27,8 @@ struct PencilOfPlanes {
   [[nodiscard]] Vec3 paper_plane(double c) const;
 };
 
+/// The planes of the projector's columns (or rows) in the camera's frame, mm. Lens distortion of
+/// the projector is left out.
 [[nodiscard]] PencilOfPlanes pencil_of_planes(const Device& camera, const Device& projector,
                                               Axis axis);
 

@@ -19,11 +19,13 @@ struct TriangleMesh {
   std::vector<std::uint8_t> hole;           ///< why nobody measured it (HoleReason of depth)
 };
 
+/// Along the axes, mm.
 struct BoundingBox {
   Vec3 low = Vec3::Zero();
   Vec3 high = Vec3::Zero();
 };
 
+/// Of all vertices; of none, both corners are the origin.
 [[nodiscard]] BoundingBox bounding_box(const TriangleMesh& mesh);
 [[nodiscard]] double surface_area(const TriangleMesh& mesh);   ///< mm^2
 [[nodiscard]] double signed_volume(const TriangleMesh& mesh);  ///< mm^3, > 0 for outward faces

@@ -22,6 +22,7 @@ struct MeasuredPoint {
   std::uint8_t red = 0, green = 0, blue = 0;
 };
 
+/// World, mm.
 [[nodiscard]] inline Vec3 position_of(const MeasuredPoint& p) {
   return {static_cast<double>(p.x), static_cast<double>(p.y), static_cast<double>(p.z)};
 }

@@ -21,7 +21,7 @@ double plane_error_px(const CrossingDisagreement& crossings) {
   return kDeviationPerMedian * std::sqrt(std::max(0.0, devices2) / 2);
 }
 
-/// The nodes of all depth maps.
+/// A place of the dense surface as a camera sees it: a point of no line.
 MeasuredPoint point_at(const DepthMap& map, const Vec2& pixel, const Vec3& position, float sigma) {
   MeasuredPoint p;
   set_position(position, p);

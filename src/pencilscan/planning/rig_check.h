@@ -96,6 +96,8 @@ struct RigCheck {
   std::vector<RigWarning> warnings;  ///< severe ones first
 };
 
+/// Every camera but those for texture, every line family, and every two of these families, over
+/// options.points_per_sphere points on each of options.spheres. Poses and volume in mm.
 [[nodiscard]] RigCheck check_rig(const Rig& rig, const RigCheckOptions& options = {});
 
 /// The warnings for finished figures, severe ones first.

@@ -35,6 +35,10 @@ struct RingOptions {
   std::vector<double> rolls_rad{0};  ///< about its optical axis: its lines are tilted by so much
 };
 
+/// Cameras cam0, cam1, ... and projectors proj0, proj1, ..., each with one pattern. Azimuths grow
+/// from x towards y: from cam0 at 0 all around, projectors half a step of theirs further, or
+/// over an arc with 0 in its middle. The volume's centre is the origin. It is a bug where an option
+/// is out of its range.
 [[nodiscard]] Rig make_ring(const RingOptions& options = {});
 
 }  // namespace pencilscan

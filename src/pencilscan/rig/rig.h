@@ -13,6 +13,7 @@
 
 namespace pencilscan {
 
+/// A camera: where it stands, and what its pictures' values mean.
 struct Camera : Device {
   /// camera RGB = matrix * projector RGB, for every projector or by projector name.
   std::optional<Mat3> color_matrix;
@@ -30,6 +31,7 @@ struct Camera : Device {
   }
 };
 
+/// A projector: where it stands, and what it shows.
 struct Projector : Device {
   std::vector<LinePattern> patterns;  ///< empty where nothing needs it (calibration)
   ColorRegistration color_registration;
