@@ -4,21 +4,15 @@
 #include <cmath>
 #include <cstdlib>
 #include <limits>
-#include <map>
 #include <tuple>
 #include <utility>
 
 #include "pencilscan/core/median.h"
+#include "pencilscan/recording/camera_turns.h"
+#include "pencilscan/recording/untimed_pictures.h"
 
 namespace pencilscan {
 namespace {
-
-/// A picture with its time by the common clock.
-struct Shot {
-  double time_ns = 0;  ///< after the first picture of the reference
-  std::size_t camera = 0;
-  std::size_t row = 0;
-};
 
 /// The known times of a camera in order of rows, after `origin`.
 struct Track {
@@ -131,7 +125,7 @@ double drift_ppm(const Track& track, const std::vector<double>& lead) {
 }
 
 /// When each camera begins its next picture after each shot; shots are in order of time.
-std::vector<double> next_times(const std::vector<Shot>& shots, std::size_t cameras) {
+std::vector<double> next_times(const std::vector<TimedShot>& shots, std::size_t cameras) {
   std::vector<double> next(cameras, std::numeric_limits<double>::infinity());
   std::vector<double> result(shots.size());
   for (std::size_t i = shots.size(); i-- > 0;) {
@@ -143,16 +137,16 @@ std::vector<double> next_times(const std::vector<Shot>& shots, std::size_t camer
 
 /// Shots in order of time fall into sets: a set ends where the next shot is half a period after its
 /// first one, of a camera that it holds already, or nearer to the next picture of a camera of it.
-std::vector<std::vector<Shot>> fall_into_sets(std::vector<Shot> shots, std::size_t cameras,
-                                              double period) {
-  std::sort(shots.begin(), shots.end(), [](const Shot& a, const Shot& b) {
+std::vector<std::vector<TimedShot>> fall_into_sets(std::vector<TimedShot> shots,
+                                                   std::size_t cameras, double period) {
+  std::sort(shots.begin(), shots.end(), [](const TimedShot& a, const TimedShot& b) {
     return std::tie(a.time_ns, a.camera) < std::tie(b.time_ns, b.camera);
   });
   const std::vector<double> next = next_times(shots, cameras);
-  std::vector<std::vector<Shot>> sets;
+  std::vector<std::vector<TimedShot>> sets;
   std::size_t first = 0;
   for (std::size_t i = 0; i < shots.size(); ++i) {
-    const Shot& shot = shots[i];
+    const TimedShot& shot = shots[i];
     bool fits = !sets.empty() && shot.time_ns - shots[first].time_ns < period / 2;
     for (std::size_t k = first; fits && k < i; ++k) {
       fits = shots[k].camera != shot.camera &&
@@ -167,60 +161,9 @@ std::vector<std::vector<Shot>> fall_into_sets(std::vector<Shot> shots, std::size
   return sets;
 }
 
-/// Where the widest step between the shots of a set is: the first shot after it.
-std::size_t widest_step(const std::vector<Shot>& set) {
-  std::size_t widest = 1;
-  for (std::size_t i = 2; i < set.size(); ++i) {
-    if (set[i].time_ns - set[i - 1].time_ns > set[widest].time_ns - set[widest - 1].time_ns)
-      widest = i;
-  }
-  return widest;
-}
-
-/// The cameras of each half of a set, in order; nothing where it is one moment (frame_sets.h).
-using Halves = std::pair<std::vector<std::size_t>, std::vector<std::size_t>>;
-std::optional<Halves> halves_of(const std::vector<Shot>& set, double period) {
-  constexpr std::size_t kPair = 2;  // cameras that see one moment
-  if (set.size() < 2 * kPair) return std::nullopt;
-  const std::size_t step = widest_step(set);
-  if (set[step].time_ns - set[step - 1].time_ns <= period / 4) return std::nullopt;
-  if (step < kPair || set.size() - step < kPair) return std::nullopt;
-  Halves halves;
-  for (std::size_t i = 0; i < set.size(); ++i)
-    (i < step ? halves.first : halves.second).push_back(set[i].camera);
-  std::sort(halves.first.begin(), halves.first.end());
-  std::sort(halves.second.begin(), halves.second.end());
-  return halves;
-}
-
-/// Sets of cameras that take turns, most of which have the same two halves, become two each.
-void split_turns(std::vector<std::vector<Shot>>& sets, double period) {
-  std::map<Halves, std::size_t> counts;
-  for (const std::vector<Shot>& set : sets) {
-    if (const auto halves = halves_of(set, period)) ++counts[*halves];
-  }
-  const auto most =
-      std::max_element(counts.begin(), counts.end(),
-                       [](const auto& a, const auto& b) { return a.second < b.second; });
-  if (most == counts.end() || 2 * most->second <= sets.size()) return;
-  std::vector<std::vector<Shot>> result;
-  for (std::vector<Shot>& set : sets) {
-    // One that lacks pictures is split where its widest step is as well.
-    const std::size_t step = set.size() > 1 ? widest_step(set) : 0;
-    if (step == 0 || set[step].time_ns - set[step - 1].time_ns <= period / 4) {
-      result.push_back(std::move(set));
-      continue;
-    }
-    const auto middle = set.begin() + static_cast<std::ptrdiff_t>(step);
-    result.emplace_back(set.begin(), middle);
-    result.emplace_back(middle, set.end());
-  }
-  sets = std::move(result);
-}
-
 /// Median step from set to set, of two at a time: those of cameras that take turns need not be
 /// even. `fallback` where there are fewer.
-double period_of_sets(const std::vector<std::vector<Shot>>& sets, double fallback) {
+double period_of_sets(const std::vector<std::vector<TimedShot>>& sets, double fallback) {
   std::vector<double> steps;
   for (std::size_t k = 2; k < sets.size(); ++k)
     steps.push_back((sets[k].front().time_ns - sets[k - 2].front().time_ns) / 2);
@@ -228,12 +171,12 @@ double period_of_sets(const std::vector<std::vector<Shot>>& sets, double fallbac
 }
 
 /// The row that all shots of each set share, increasing; nothing where that is not so.
-bool are_rows(const std::vector<std::vector<Shot>>& sets) {
+bool are_rows(const std::vector<std::vector<TimedShot>>& sets) {
   std::ptrdiff_t last = -1;
-  for (const std::vector<Shot>& set : sets) {
+  for (const std::vector<TimedShot>& set : sets) {
     const auto row = static_cast<std::ptrdiff_t>(set.front().row);
     if (row <= last) return false;
-    for (const Shot& shot : set) {
+    for (const TimedShot& shot : set) {
       if (static_cast<std::ptrdiff_t>(shot.row) != row) return false;
     }
     last = row;
@@ -261,13 +204,13 @@ void take_rows(std::span<const ShotTimes> cameras, FrameSets& result) {
   }
 }
 
-void note_offsets(const std::vector<Shot>& shots, FrameSet& set) {
+void note_offsets(const std::vector<TimedShot>& shots, FrameSet& set) {
   std::vector<double> times;
-  for (const Shot& shot : shots) times.push_back(shot.time_ns);
+  for (const TimedShot& shot : shots) times.push_back(shot.time_ns);
   const auto [low, high] = std::minmax_element(times.begin(), times.end());
   set.spread_ns = *high - *low;
   const double middle = upper_median(times);
-  for (const Shot& shot : shots) set.offset_ns[shot.camera] = shot.time_ns - middle;
+  for (const TimedShot& shot : shots) set.offset_ns[shot.camera] = shot.time_ns - middle;
 }
 
 void name_dropped_and_late(std::span<const ShotTimes> cameras, FrameSets& result) {
@@ -288,7 +231,7 @@ void name_dropped_and_late(std::span<const ShotTimes> cameras, FrameSets& result
 }
 
 /// All shots by the clock of the reference, and what each clock does.
-std::vector<Shot> common_clock(std::span<const ShotTimes> cameras, FrameSets& result) {
+std::vector<TimedShot> common_clock(std::span<const ShotTimes> cameras, FrameSets& result) {
   std::size_t reference = 0;
   std::vector<Track> tracks;
   std::int64_t origin = kUnknownTime;
@@ -308,7 +251,7 @@ std::vector<Shot> common_clock(std::span<const ShotTimes> cameras, FrameSets& re
     if (result.clocks[c].period_ns > 0) periods.push_back(result.clocks[c].period_ns);
   }
   result.period_ns = upper_median(std::move(periods));
-  std::vector<Shot> shots;
+  std::vector<TimedShot> shots;
   if (result.period_ns <= 0) return shots;
   for (std::size_t c = 0; c < cameras.size(); ++c) {
     const Track& track = tracks[c];
@@ -334,7 +277,7 @@ std::vector<Shot> common_clock(std::span<const ShotTimes> cameras, FrameSets& re
 
 /// Moments that no camera has, by the time between sets. Of rows that are the moments, those
 /// without a time between two are no gap: they are sets.
-void name_gaps(const std::vector<std::vector<Shot>>& sets, FrameSets& result) {
+void name_gaps(const std::vector<std::vector<TimedShot>>& sets, FrameSets& result) {
   for (std::size_t k = 1; k < sets.size(); ++k) {
     const double step = (sets[k].front().time_ns - sets[k - 1].front().time_ns) / result.period_ns;
     const std::size_t at = result.by_row ? sets[k].front().row : k;
@@ -344,56 +287,18 @@ void name_gaps(const std::vector<std::vector<Shot>>& sets, FrameSets& result) {
   }
 }
 
-/// The sets between those of the timed rows before and after `rows`, if they are as many and hold
-/// nothing of camera c.
-std::vector<std::size_t> sets_for(const FrameSets& result, std::size_t c,
-                                  std::optional<std::size_t> before,
-                                  std::optional<std::size_t> after, std::size_t rows) {
-  std::vector<std::size_t> between;
-  if (!before || !after || *after <= *before || *after - *before - 1 != rows) return between;
-  for (std::size_t k = *before + 1; k < *after; ++k) {
-    if (result.sets[k].rows[c]) return {};
-    between.push_back(k);
-  }
-  return between;
-}
-
-/// Gives the pictures of camera c that have no time stamp to the sets between those of the timed
-/// ones around them, or leaves them out. `set_of`: the sets of its timed rows.
-void place_untimed(const ShotTimes& camera, std::size_t c,
-                   const std::vector<std::optional<std::size_t>>& set_of, FrameSets& result) {
-  std::vector<std::size_t>& left_out = result.clocks[c].left_out;
-  std::optional<std::size_t> before;
-  std::vector<std::size_t> untimed;
-  const auto place = [&](std::optional<std::size_t> after) {
-    const std::vector<std::size_t> sets = sets_for(result, c, before, after, untimed.size());
-    if (sets.empty()) left_out.insert(left_out.end(), untimed.begin(), untimed.end());
-    for (std::size_t i = 0; i < sets.size(); ++i) result.sets[sets[i]].rows[c] = untimed[i];
-    untimed.clear();
-  };
-  for (std::size_t row = 0; row < camera.valid.size(); ++row) {
-    if (set_of[row]) {
-      place(set_of[row]);
-      before = set_of[row];
-    } else if (camera.valid[row] != 0) {
-      untimed.push_back(row);
-    }
-  }
-  place(std::nullopt);
-}
-
 /// Set k is what was taken at one time.
-void take_moments(std::span<const ShotTimes> cameras, const std::vector<std::vector<Shot>>& sets,
-                  FrameSets& result) {
+void take_moments(std::span<const ShotTimes> cameras,
+                  const std::vector<std::vector<TimedShot>>& sets, FrameSets& result) {
   result.by_row = false;
   std::vector<std::vector<std::optional<std::size_t>>> set_of(cameras.size());
   for (std::size_t c = 0; c < cameras.size(); ++c) set_of[c].resize(cameras[c].valid.size());
-  for (const std::vector<Shot>& shots : sets) {
-    for (const Shot& shot : shots) set_of[shot.camera][shot.row] = result.sets.size();
+  for (const std::vector<TimedShot>& shots : sets) {
+    for (const TimedShot& shot : shots) set_of[shot.camera][shot.row] = result.sets.size();
     FrameSet& set = result.sets.emplace_back();
     set.rows.resize(cameras.size());
     set.offset_ns.resize(cameras.size(), 0);
-    for (const Shot& shot : shots) {
+    for (const TimedShot& shot : shots) {
       if (cameras[shot.camera].valid[shot.row] != 0) set.rows[shot.camera] = shot.row;
     }
     note_offsets(shots, set);
@@ -406,14 +311,14 @@ void take_moments(std::span<const ShotTimes> cameras, const std::vector<std::vec
 FrameSets group_frames(std::span<const ShotTimes> cameras) {
   FrameSets result;
   result.clocks.resize(cameras.size());
-  std::vector<Shot> shots_in_time = common_clock(cameras, result);
-  std::vector<std::vector<Shot>> sets =
+  std::vector<TimedShot> shots_in_time = common_clock(cameras, result);
+  std::vector<std::vector<TimedShot>> sets =
       fall_into_sets(std::move(shots_in_time), cameras.size(), result.period_ns);
   split_turns(sets, result.period_ns);
   result.period_ns = period_of_sets(sets, result.period_ns);
   if (sets.empty() || are_rows(sets)) {
     take_rows(cameras, result);
-    for (const std::vector<Shot>& set : sets) note_offsets(set, result.sets[set.front().row]);
+    for (const std::vector<TimedShot>& set : sets) note_offsets(set, result.sets[set.front().row]);
   } else {
     take_moments(cameras, sets, result);
   }
