@@ -9,11 +9,12 @@
 #include <iostream>
 #include <mutex>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <thread>
 
-#include "pencilscan/capture/live_figures.h"
 #include "pencilscan/capture/projector_tests.h"
 #include "pencilscan/cli/interruption.h"
+#include "pencilscan/cli/lab_camera_view.h"
 #include "pencilscan/cli/lab_devices.h"
 #include "pencilscan/cli/lab_work.h"
 #include "pencilscan/cli/own_command.h"
@@ -30,7 +31,6 @@ namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 using Values = std::map<std::string, std::string>;
 
-constexpr int kPreviewWidth = 640;                       ///< px
 constexpr auto kPulse = std::chrono::milliseconds(250);  ///< between previews that we trigger
 /// One picture that is told to be taken may take its time.
 constexpr double kCalmRateHz = 1;
@@ -58,17 +58,10 @@ class Desk final : public LabDesk {
   ~Desk() override;
 
   Json status() override;
-  std::string preview(std::size_t camera) override;
+  std::string preview(std::size_t camera) override { return view_->preview(camera); }
   std::string act(const std::string& action, const Values& values) override;
 
  private:
-  /// The figures of a picture that was looked at already.
-  struct Figured {
-    std::int64_t time_ns = -1;
-    LiveFigures figures;
-  };
-
-  [[nodiscard]] Json camera_status(std::size_t camera);
   [[nodiscard]] std::string next_step() const;
   void pulse();
   void show(const ProjectorPicture& picture, const std::string& projector);
@@ -86,8 +79,7 @@ class Desk final : public LabDesk {
   Rig rig_;
   std::unique_ptr<LiveCameras> cameras_;
   std::unique_ptr<ProjectorScreen> screen_;
-  std::mutex figures_mutex_;
-  std::vector<Figured> figured_;
+  std::optional<LabCameraView> view_;
 
   mutable std::mutex mutex_;  ///< of what follows
   std::string showing_;
@@ -106,7 +98,7 @@ Desk::Desk(LabDeskOptions options)
   fs::create_directories(options_.out / "logs");
   cameras_ = start_lab_cameras(rig_, options_.lab, options_.lab_source);
   screen_ = open_lab_screen(rig_, options_.lab, options_.rig.string());
-  figured_.resize(rig_.cameras.size());
+  view_.emplace(rig_, *cameras_);
   calibration_ = {{"verdict", ""}, {"rms_px", 0}, {"poses", 0}, {"reasons", Json::array()}};
   frame_ = {{"points", 0}, {"labelled_share", 0}, {"folder", ""}};
   while (fs::exists(options_.out / ("pose" + std::to_string(poses_ + 1)))) ++poses_;
@@ -138,45 +130,6 @@ void Desk::show(const ProjectorPicture& picture, const std::string& projector) {
   showing_ = to_string(picture) + (projector.empty() ? "" : " on " + projector);
 }
 
-Json Desk::camera_status(std::size_t camera) {
-  const TimedFrame latest = cameras_->latest(camera);
-  LiveFigures figures;
-  {
-    const std::lock_guard lock(figures_mutex_);
-    Figured& known = figured_[camera];
-    if (latest.frame && known.time_ns != latest.time_ns)
-      known = {latest.time_ns, live_figures(*latest.frame, rig_.cameras[camera].black_level)};
-    figures = known.figures;
-  }
-  const LiveCameras::Count count = cameras_->count(camera);
-  const CameraSettings settings = cameras_->group().settings(camera);
-  std::vector<std::string> advice;
-  for (const Fault& fault : cameras_->group().faults())
-    if (fault.device == rig_.cameras[camera].name) advice.push_back(fault.what);
-  std::string shown;
-  {
-    const std::lock_guard lock(mutex_);
-    shown = showing_;
-  }
-  if (latest.frame && shown != "black")
-    for (std::string& line : advice_for(figures, shown.starts_with("lines")))
-      advice.push_back(std::move(line));
-  return {{"name", rig_.cameras[camera].name},
-          {"address", cameras_->group().info(camera).address},
-          {"whole", count.whole},
-          {"incomplete", count.incomplete},
-          {"rate_hz", count.rate_hz},
-          {"exposure_ms", settings.exposure_us.value_or(0) / 1000},
-          {"gain", settings.gain.value_or(0)},
-          {"figures",
-           {{"brightest", figures.brightest},
-            {"saturated", figures.saturated},
-            {"lit", figures.lit},
-            {"edge_px", figures.edge_px},
-            {"line_contrast", figures.line_contrast}}},
-          {"advice", advice}};
-}
-
 std::string Desk::next_step() const {
   if (poses_ == 0)
     return "Put something with depth into the volume (a heap of matt light things), and capture "
@@ -188,10 +141,15 @@ std::string Desk::next_step() const {
 }
 
 Json Desk::status() {
+  std::string showing;
+  {
+    const std::lock_guard lock(mutex_);
+    showing = showing_;
+  }
   Json status;
   status["cameras"] = Json::array();
   for (std::size_t c = 0; c < rig_.cameras.size(); ++c)
-    status["cameras"].push_back(camera_status(c));
+    status["cameras"].push_back(view_->status(c, showing));
   status["projectors"] = Json::array();
   for (const Projector& projector : rig_.projectors) status["projectors"].push_back(projector.name);
   status["pictures"] = shown_names();
@@ -205,13 +163,6 @@ Json Desk::status() {
   status["frame"] = frame_;
   status["said"] = work_.said();
   return status;
-}
-
-std::string Desk::preview(std::size_t camera) {
-  if (camera >= rig_.cameras.size()) return "";
-  const TimedFrame latest = cameras_->latest(camera);
-  if (!latest.frame) return "";
-  return preview_jpeg(*latest.frame, kPreviewWidth);
 }
 
 std::string Desk::act(const std::string& action, const Values& values) {
