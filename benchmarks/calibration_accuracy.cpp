@@ -8,10 +8,13 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <exception>
+#include <string>
 #include <vector>
 
 #include "pencilscan/bundle/bundle_device.h"
 #include "pencilscan/bundle/triangulation.h"
+#include "pencilscan/core/error.h"
 #include "pencilscan/core/random.h"
 #include "pencilscan/geometry/least_squares.h"
 #include "pencilscan/rig/device_list.h"
@@ -30,6 +33,16 @@ std::vector<Vec3> points_in(const Sphere& volume) {
     if (x.norm() <= 1) points.push_back(volume.center + volume.radius * x);
   }
   return points;
+}
+
+void require_same_devices(const Rig& truth, const Rig& found, const std::string& source) {
+  bool is_same = truth.cameras.size() == found.cameras.size() &&
+                 truth.projectors.size() == found.projectors.size();
+  for (std::size_t d = 0; is_same && d < device_count(truth); ++d)
+    is_same = device_at(truth, d).name == device_at(found, d).name;
+  if (!is_same)
+    throw InputError(source, "devices", std::to_string(device_count(found)),
+                     "must be those of the true rig, in its order");
 }
 
 void compare(const Rig& truth, const Rig& found) {
@@ -90,6 +103,14 @@ int main(int argc, char** argv) {
     std::fprintf(stderr, "usage: calibration_accuracy <true rig.json> <found rig.json>\n");
     return 2;
   }
-  compare(pencilscan::read_rig(argv[1]), pencilscan::read_rig(argv[2]));
+  try {
+    const Rig truth = read_rig(argv[1]);
+    const Rig found = read_rig(argv[2]);
+    require_same_devices(truth, found, argv[2]);
+    compare(truth, found);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "calibration_accuracy: %s\n", error.what());
+    return 1;
+  }
   return 0;
 }

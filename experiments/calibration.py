@@ -162,13 +162,20 @@ def calibrate(args, program, truth, folders, out, *more):
         row["memory_gb"] = int(memory[1]) / 1e6
     if report["verdict"] != "unusable":
         row.update(compare(truth, report))
-        accuracy = args.program.parent / "benchmarks/calibration_accuracy"
-        if accuracy.exists():
-            text = subprocess.run([accuracy, out.parent / "truth.json", out / "rig.json"],
-                                  capture_output=True, text=True).stdout
-            for key in ("projection_median_px", "projection_p95_px"):
-                row[key] = float(re.search(key + r"\s+(\S+)", text)[1])
+        apart = projections_apart(args, out.parent / "truth.json", out / "rig.json")
+        row.update({key: apart[key] for key in ("projection_median_px", "projection_p95_px") if key in apart})
     return row
+
+
+def projections_apart(args, first, second):
+    """What benchmarks/calibration_accuracy says of two rigs; nothing where it is not built."""
+    accuracy = args.program.parent / "benchmarks/calibration_accuracy"
+    if not accuracy.exists():
+        return {}
+    run = subprocess.run([accuracy, first, second], capture_output=True, text=True)
+    if run.returncode != 0:
+        raise SystemExit(run.stderr)
+    return {key: float(px) for key, px in re.findall(r"^(projection_\w+)\s+(\S+)", run.stdout, re.MULTILINE)}
 
 
 def show(name, row):
@@ -213,10 +220,9 @@ def from_guesses(args, program, truth, noise):
         row = calibrate(args, program, truth, folders, args.out / f"found_guess{k}", "--devices", devices,
                         "--max-tracks", args.broken_tracks)
         first = args.out / "found_guess0" / "rig.json"
-        if k > 0 and row["verdict"] != "unusable":
-            text = subprocess.run([args.program.parent / "benchmarks/calibration_accuracy", first,
-                                   args.out / f"found_guess{k}" / "rig.json"], capture_output=True, text=True)
-            row["from_first_max_px"] = float(re.search(r"max_px\s+(\S+)", text.stdout)[1])
+        if k > 0 and row["verdict"] != "unusable" and first.exists():
+            apart = projections_apart(args, first, args.out / f"found_guess{k}" / "rig.json")
+            row["from_first_max_px"] = apart.get("projection_max_px")
         rows[f"K times {factor}"] = row
         show(f"K times {factor}", row)
         if k > 0:
