@@ -7,6 +7,7 @@
 #include <fstream>
 #include <functional>
 #include <iostream>
+#include <memory>
 #include <mutex>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -345,13 +346,9 @@ void Desk::record() {
 
 }  // namespace
 
-std::unique_ptr<LabDesk> open_lab_desk(LabDeskOptions options) {
-  return std::make_unique<Desk>(std::move(options));
-}
-
 void serve_lab(LabDeskOptions options, LabServer& server, Interruption& interruption) {
-  const auto desk = open_lab_desk(std::move(options));
-  server.set_desk(*desk);
+  Desk desk(std::move(options));
+  server.set_desk(desk);
   std::thread serving([&] { server.run(); });
   std::cout << "address " << server.link() << std::endl;
   std::cerr << "pencilscan: open " << server.link() << " in a browser; Ctrl-C stops\n";

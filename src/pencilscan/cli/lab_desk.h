@@ -2,7 +2,6 @@
 
 #include <filesystem>
 #include <functional>
-#include <memory>
 #include <string>
 #include <vector>
 
@@ -26,13 +25,10 @@ struct LabDeskOptions {
   std::function<void(int pose)> arrange;
 };
 
-/// A laboratory with its devices opened: previews and figures of all cameras, pictures on the
-/// projectors, and one piece of work at a time on a thread of its own: flashes, captures of poses
-/// with the calibration after each, frames with what was named in them. Devices are put back as
-/// they were when it ends.
-[[nodiscard]] std::unique_ptr<LabDesk> open_lab_desk(LabDeskOptions options);
-
-/// Opens it, prints the page's link, and serves it until interrupted.
+/// Opens the devices of a laboratory, prints the page's link, and serves it until interrupted. The
+/// page has previews and figures of all cameras, pictures on the projectors, and one piece of work
+/// at a time on a thread of its own: flashes, captures of poses with the calibration after each,
+/// frames with what was named in them. Devices are put back as they were when it ends.
 void serve_lab(LabDeskOptions options, LabServer& server, Interruption& interruption);
 
 }  // namespace pencilscan::cli

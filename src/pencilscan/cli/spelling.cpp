@@ -1,6 +1,7 @@
 #include "pencilscan/cli/spelling.h"
 
 #include <algorithm>
+#include <optional>
 #include <sstream>
 
 namespace pencilscan::cli {
@@ -35,8 +36,7 @@ bool begins_alike(const std::string& a, const std::string& b) {
   return std::min(a.size(), b.size()) >= kLeast && (a.starts_with(b) || b.starts_with(a));
 }
 
-}  // namespace
-
+/// The candidate of did_you_mean().
 std::optional<std::string> nearest_word(const std::string& word,
                                         const std::vector<std::string>& candidates) {
   const std::string typed = without_dashes(word);
@@ -55,6 +55,8 @@ std::optional<std::string> nearest_word(const std::string& word,
   }
   return best;
 }
+
+}  // namespace
 
 std::string did_you_mean(const std::string& word, const std::vector<std::string>& candidates) {
   const auto nearest = nearest_word(word, candidates);

@@ -63,13 +63,15 @@ std::vector<CurvePoint> doubled(const std::vector<CurvePoint>& points) {
   return result;
 }
 
-}  // namespace
-
+/// Size at which a profile of this width (px of the full image) is fitted: the largest that holds
+/// it.
 std::size_t size_of_width(float width_px) {
   std::size_t size = 0;
   for (; width_px > kWidestProfilePx && size < kMostSizes; ++size) width_px *= 0.5F;
   return size;
 }
+
+}  // namespace
 
 float median_width(std::span<const CurvePoint> points) {
   std::vector<float> widths;

@@ -17,14 +17,11 @@ namespace pencilscan {
 /// has ended.
 constexpr float kWidestProfilePx = static_cast<float>(kMaxHalf) / 2.4F;
 
-/// Size at which a profile of this width (px of the full image) is fitted: the largest that holds
-/// it.
-[[nodiscard]] std::size_t size_of_width(float width_px);
-
 /// px of the size that the points are given at; 0 of no points.
 [[nodiscard]] float median_width(std::span<const CurvePoint> points);
 
-/// The same for a curve that is given at `size`, by its median width.
+/// Size at which a curve that is given at `size` is fitted: the largest that holds a profile of its
+/// median width.
 [[nodiscard]] std::size_t size_of_curve(const Curve& curve, std::size_t size);
 
 /// A curve from one size to another: points about 1 px of that size apart. Doubling puts points

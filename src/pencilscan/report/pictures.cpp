@@ -13,6 +13,18 @@
 namespace pencilscan {
 namespace {
 
+struct Side {
+  std::string name;
+  Vec3 direction;  ///< towards the eye, world
+};
+/// The views of a sheet: four from a little above the horizon, one from above, one from below.
+const std::vector<Side>& six_sides() {
+  static const std::vector<Side> kSides = {{"from +x", {1, 0, 0.25}},  {"from +y", {0, 1, 0.25}},
+                                           {"from -x", {-1, 0, 0.25}}, {"from -y", {0, -1, 0.25}},
+                                           {"from above", {0, 0, 1}},  {"from below", {0, 0, -1}}};
+  return kSides;
+}
+
 std::vector<std::string> side_names() {
   std::vector<std::string> names;
   for (const Side& side : six_sides()) names.push_back(side.name);
@@ -152,13 +164,6 @@ void add_mesh_sheets(const FrameResults& results, const PictureOptions& options,
 }
 
 }  // namespace
-
-const std::vector<Side>& six_sides() {
-  static const std::vector<Side> kSides = {{"from +x", {1, 0, 0.25}},  {"from +y", {0, 1, 0.25}},
-                                           {"from -x", {-1, 0, 0.25}}, {"from -y", {0, -1, 0.25}},
-                                           {"from above", {0, 0, 1}},  {"from below", {0, 0, -1}}};
-  return kSides;
-}
 
 std::vector<Picture> make_pictures(const FrameResults& results, const PictureOptions& options) {
   std::vector<Picture> pictures;

@@ -43,12 +43,4 @@ struct PictureOptions {
 /// Writes <folder>/<name>.png each. StageError when that fails.
 void write_pictures(const std::filesystem::path& folder, std::span<const Picture> pictures);
 
-/// The sides of the six views of a sheet: front, right, back, left, above, below, as seen from a
-/// little above the horizon.
-struct Side {
-  std::string name;
-  Vec3 direction;  ///< towards the eye, world
-};
-[[nodiscard]] const std::vector<Side>& six_sides();
-
 }  // namespace pencilscan
