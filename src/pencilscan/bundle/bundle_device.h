@@ -31,6 +31,7 @@ struct BundleDevice {
   bool present = false;  ///< has a pose and takes part
 };
 
+/// With its values as prior, held exactly, and not present.
 [[nodiscard]] BundleDevice bundle_device(const Device& device);
 /// Writes K, distortion and pose back.
 void set_device(const BundleDevice& from, Device& device);

@@ -27,6 +27,7 @@ struct CaptureNote {
 /// The note of a capture with all cameras of the rig.
 [[nodiscard]] CaptureNote capture_note(const Projector& projector, const std::vector<Camera>& all,
                                        bool inverses, bool solids);
+/// `folder`/capture.json; StageError when it cannot be written.
 void write_capture_note(const std::filesystem::path& folder, const CaptureNote& note);
 
 /// True where the folder of a projector has a note.

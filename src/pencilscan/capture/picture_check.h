@@ -18,6 +18,7 @@ struct LitView {
   double brightest = 0;  ///< 95th percentile of `light` over lit blocks
   double saturated = 0;  ///< share of the lit blocks whose white reaches the end of the range
 };
+/// Both as coarse_picture() makes them, of one size.
 [[nodiscard]] LitView lit_view(const cv::Mat& white, const cv::Mat& black);
 
 /// What is wrong with a pattern and its inverse in one camera; empty: nothing.

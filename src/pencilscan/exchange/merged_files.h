@@ -39,6 +39,8 @@ struct MergedFiles {
   std::vector<PoseConflict> conflicts;
   std::vector<std::string> warnings;  ///< other values that differ
 };
+/// Where two files describe a device, the first one is used and differences are told. InputError
+/// where they state different sizes of its picture.
 [[nodiscard]] MergedFiles merge_files(ExchangedRig files, const ExchangeOptions& options);
 
 /// The device of this name; null: there is none.

@@ -63,6 +63,7 @@ struct DecodedView {
   [[nodiscard]] double valid_share() const;
 };
 
+/// All images of the stack are CV_32FC1 and of one size, which is that of the result.
 [[nodiscard]] DecodedView decode_gray_stack(const GrayStack& stack,
                                             const GrayDecodeOptions& options = {});
 

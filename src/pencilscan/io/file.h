@@ -20,6 +20,7 @@ enum class Durability : std::uint8_t { kProcess, kDisk };
 void write_atomically(const std::filesystem::path& path,
                       const std::function<void(std::ostream&)>& write,
                       Durability durability = Durability::kDisk);
+/// The text as it is, as write_atomically() does.
 void write_text(const std::filesystem::path& path, const std::string& text,
                 Durability durability = Durability::kDisk);
 /// What is not UTF-8 becomes U+FFFD.

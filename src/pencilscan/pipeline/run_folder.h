@@ -20,6 +20,7 @@ struct RunInputs {
   [[nodiscard]] std::string settings() const;
 };
 
+/// True where `out` has an inputs.json, readable or not.
 [[nodiscard]] bool has_run_inputs(const std::filesystem::path& out);
 /// True for a folder that is not there or holds nothing but an inputs.json that another program is
 /// writing, or was writing when it was killed.

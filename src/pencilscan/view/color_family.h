@@ -20,6 +20,7 @@ struct ColorFamily {
   [[nodiscard]] std::vector<int> color_of_symbol(const LinePattern& pattern) const;
 };
 
+/// In the order in which the rig's patterns first have their colours.
 [[nodiscard]] std::vector<ColorFamily> color_families(const Rig& rig);
 /// Index of the family that has a pattern; -1: none.
 [[nodiscard]] int family_of(const std::vector<ColorFamily>& families, PatternRef pattern);
