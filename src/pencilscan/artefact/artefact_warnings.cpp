@@ -5,6 +5,7 @@
 #include "pencilscan/artefact/find_shapes.h"
 #include "pencilscan/core/formatted.h"
 #include "pencilscan/core/length_units.h"
+#include "pencilscan/core/name_list.h"
 
 namespace pencilscan {
 namespace {
@@ -38,7 +39,7 @@ bool has_stated_size(const BallFigures& ball, double diameter_mm) {
 std::string sizes_of(const std::vector<BallFigures>& balls) {
   std::string text;
   for (const BallFigures& ball : balls)
-    text += (text.empty() ? "" : " and ") + formatted(2 * ball.trimmed.radius, "%.4g");
+    add_name(text, formatted(2 * ball.trimmed.radius, "%.4g"), " and ");
   return text;
 }
 

@@ -272,7 +272,7 @@ class Judge {
           static_cast<std::size_t>(std::max_element(moved.begin(), moved.end()) - moved.begin());
       const std::string by = kIntrinsicNames[most] + std::string(" ") + formatted(moved[most]);
       if (is_given(d) && moved[most] <= kContradictsDeviations) {
-        moved_within += (moved_within.empty() ? "" : ", ") + name(d) + " by " + by;
+        add_name(moved_within, name(d) + " by " + by);
         continue;
       }
       const bool is_free = result_.given[d] == GivenUse::kContradicted;

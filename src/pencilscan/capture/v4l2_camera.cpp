@@ -20,6 +20,7 @@
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/formatted.h"
 #include "pencilscan/core/host_clock.h"
+#include "pencilscan/core/name_list.h"
 
 namespace pencilscan {
 
@@ -174,7 +175,7 @@ void VideoCamera::choose_format(const CameraSettings& settings, CameraSettings& 
   const Format* chosen = nullptr;
   for (const Format& format : kFormats) {
     if (std::find(offered.begin(), offered.end(), format.code) == offered.end()) continue;
-    names += (names.empty() ? "" : ", ") + std::string(format.name);
+    add_name(names, format.name);
     const bool wanted = !settings.pixel_format || *settings.pixel_format == format.name;
     if (wanted && chosen == nullptr) chosen = &format;
   }

@@ -22,6 +22,7 @@
 #include "pencilscan/cli/pose_cover.h"
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/formatted.h"
+#include "pencilscan/core/name_list.h"
 #include "pencilscan/io/file.h"
 #include "pencilscan/report/labelled_share.h"
 
@@ -233,8 +234,8 @@ void Desk::flash() {
     std::string seen;
     for (std::size_t c = 0; c < timing.views.size(); ++c)
       if (timing.views[c].share > 0)
-        seen += (seen.empty() ? "" : ", ") + rig_.cameras[c].name + " " +
-                std::to_string(std::lround(100 * timing.views[c].share)) + " %";
+        add_name(seen, rig_.cameras[c].name + " " +
+                           std::to_string(std::lround(100 * timing.views[c].share)) + " %");
     work_.say(name + ": its light comes after " + std::to_string(std::lround(timing.most_ms)) +
               " ms; of their pictures it lights: " + seen);
   }

@@ -8,6 +8,7 @@
 #include "pencilscan/cli/command.h"
 #include "pencilscan/cli/command_table.h"
 #include "pencilscan/cli/help_format.h"
+#include "pencilscan/core/name_list.h"
 #include "pencilscan/io/file.h"
 
 // Man pages in the macros of man(7), from the same tables as help: one of the program and one of
@@ -51,7 +52,7 @@ std::string options_section(const CommandEntry& command) {
   for (const OptionEntry& option : command.options) {
     std::string names;
     for (const std::string& name : option.names)
-      names += (names.empty() ? "" : ", ") + (option.is_argument ? italic(name) : bold(name));
+      add_name(names, option.is_argument ? italic(name) : bold(name));
     if (!option.is_argument && option.takes_value()) names += " " + italic(option.takes);
     (option.is_argument ? arguments : options) += ".TP\n" + names + "\n" + lines(option.text);
   }

@@ -10,6 +10,7 @@
 
 #include "pencilscan/cli/device_arguments.h"
 #include "pencilscan/core/error.h"
+#include "pencilscan/core/name_list.h"
 #include "pencilscan/exchange/colmap_model.h"
 #include "pencilscan/exchange/opencv_file.h"
 #include "pencilscan/exchange/unheld.h"
@@ -131,8 +132,7 @@ std::string missing_values(const UncalibratedRig& rig) {
     if (!given.K) lacks += " K";
     if (!given.distortion) lacks += " distortion";
     if (!given.pose) lacks += " R t";
-    if (!lacks.empty())
-      text += (text.empty() ? "" : "; ") + device_at(rig.rig, d).name + " lacks" + lacks;
+    if (!lacks.empty()) add_name(text, device_at(rig.rig, d).name + " lacks" + lacks, "; ");
   }
   return text;
 }
@@ -243,8 +243,8 @@ std::size_t export_opencv(const ExportCommand& command, const Rig& rig) {
 void tell_what_is_lost(const ExportCommand& command, const Rig& rig) {
   const bool is_stereo = !command.stereo.empty();
   std::string lost;
-  for (const std::string& key : unheld_values(rig)) lost += (lost.empty() ? "" : ", ") + key;
-  if (is_stereo) lost += std::string(lost.empty() ? "" : ", ") + "R and t in the rig's world";
+  for (const std::string& key : unheld_values(rig)) add_name(lost, key);
+  if (is_stereo) add_name(lost, "R and t in the rig's world");
   const std::string format = command.opencv.empty() ? "COLMAP" : "OpenCV";
   if (!lost.empty())
     note(format + " files do not hold " + lost + ": rig import --base " + command.rig_path +

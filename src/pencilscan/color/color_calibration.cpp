@@ -7,6 +7,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "pencilscan/core/median.h"
+#include "pencilscan/core/name_list.h"
 #include "pencilscan/io/linear_light.h"
 #include "pencilscan/pattern/gray_code.h"
 
@@ -172,7 +173,7 @@ void ColorCollector::remark_on(ColorCalibration& result) const {
   std::string without;
   for (const auto& [pair, color] : pairs_)
     if (color.in_color && !color.response)
-      without += (without.empty() ? "" : ", ") + pair_name(rig_, pair.first, pair.second);
+      add_name(without, pair_name(rig_, pair.first, pair.second));
   if (!without.empty())
     say("no solid colours, or too few lit pixels (pattern --gray-code --solids): " + without +
         ". Crosstalk is read off every frame; lateral colour comes out smaller by about the share "
@@ -190,7 +191,7 @@ void ColorCollector::remark_on(ColorCalibration& result) const {
     const auto& colors = result.lateral.devices[d];
     if (std::any_of(colors.begin(), colors.end(),
                     [](const ColorDisplacementEstimate& e) { return !e.is_determined; }))
-      open += (open.empty() ? "" : ", ") + device_at(rig_, d).name;
+      add_name(open, device_at(rig_, d).name);
   }
   if (!open.empty())
     say("only how the colours of cameras and projectors add up is known, not the share of: " +

@@ -6,6 +6,7 @@
 
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/formatted.h"
+#include "pencilscan/core/name_list.h"
 
 namespace pencilscan {
 namespace {
@@ -104,7 +105,7 @@ std::vector<OutputUse> uses_of(const Rig& rig, std::span<const DisplayOutput> ou
                                const std::string& source) {
   std::string names;
   for (const DisplayOutput& output : outputs)
-    if (output.connected) names += (names.empty() ? "" : ", ") + output.name;
+    if (output.connected) add_name(names, output.name);
   const std::string there = "; connected are: " + (names.empty() ? "none" : names);
   for (const auto& [projector, output] : named) {
     if (std::none_of(rig.projectors.begin(), rig.projectors.end(),

@@ -6,6 +6,7 @@
 #include "pencilscan/core/check.h"
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/formatted.h"
+#include "pencilscan/core/name_list.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/io/found_files.h"
 #include "pencilscan/io/image.h"
@@ -54,7 +55,7 @@ std::string what_is_missing(const fs::path& folder, const std::vector<fs::path>&
 template <typename DeviceT>
 std::string names_of(const std::vector<DeviceT>& devices) {
   std::string names;
-  for (const DeviceT& device : devices) names += (names.empty() ? "" : ", ") + device.name;
+  for (const DeviceT& device : devices) add_name(names, device.name);
   return names;
 }
 

@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "pencilscan/core/formatted.h"
+#include "pencilscan/core/name_list.h"
 #include "pencilscan/io/file.h"
 #include "pencilscan/jobs/finish.h"
 
@@ -74,7 +75,7 @@ Columns columns_of(const FrameRow& row, const SequenceDevices& devices) {
 
 std::string joined(const std::vector<std::string>& texts) {
   std::string all;
-  for (const std::string& text : texts) all += (all.empty() ? "" : "; ") + text;
+  for (const std::string& text : texts) add_name(all, text, "; ");
   return all;
 }
 

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "pencilscan/core/error.h"
+#include "pencilscan/core/name_list.h"
 #include "pencilscan/evaluation/evaluate.h"
 #include "pencilscan/evaluation/truth_check.h"
 #include "pencilscan/io/file.h"
@@ -94,7 +95,7 @@ void ResultReader::note_missing_files() {
     const auto& name = rig_->cameras[c].name;
     const bool there = is_file(files_.entry().folder / "pictures" / (name + ".jpg")) ||
                        !files_.entry().captured.empty();
-    if (!there) without += (without.empty() ? "" : ", ") + name;
+    if (!there) add_name(without, name);
   }
   if (!without.empty()) {
     note("pictures",

@@ -4,6 +4,7 @@
 
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/lower_case.h"
+#include "pencilscan/core/name_list.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/io/file.h"
 #include "pencilscan/io/found_files.h"
@@ -30,7 +31,7 @@ void refuse_other_case(const std::filesystem::path& folder, const std::string& c
 
 std::string camera_names(const Rig& rig) {
   std::string names;
-  for (const Camera& camera : rig.cameras) names += (names.empty() ? "" : ", ") + camera.name;
+  for (const Camera& camera : rig.cameras) add_name(names, camera.name);
   return names;
 }
 

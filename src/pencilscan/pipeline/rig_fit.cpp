@@ -75,8 +75,7 @@ std::string verdict_text(const RigFit& fit) {
   std::string moved;
   for (const DeviceFit& device : fit.devices) {
     if (device.has_moved)
-      moved += (moved.empty() ? "" : ", ") + full_name(device) +
-               formatted(device.shift_px, " by %.2f px");
+      add_name(moved, full_name(device) + formatted(device.shift_px, " by %.2f px"));
   }
   const std::string misses =
       "crossing lines miss each other by " + formatted(fit.before.median_px, "%.3f px (median), ") +

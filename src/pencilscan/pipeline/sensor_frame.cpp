@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "pencilscan/core/name_list.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/detection/mosaic_trace.h"
 #include "pencilscan/rig/camera_light.h"
@@ -77,7 +78,7 @@ SensorFrame sensor_frame(Rig rig, Frame frame) {
   for (std::size_t c = 0; c < cameras.size(); ++c) {
     if (!mosaics[c]) continue;
     cameras[c].mosaic = mosaics[c];
-    names += (names.empty() ? "" : ", ") + cameras[c].name + " (" + mosaics[c]->name() + ")";
+    add_name(names, cameras[c].name + " (" + mosaics[c]->name() + ")");
   }
   if (!names.empty()) {
     result.frame.notes.push_back(

@@ -5,6 +5,7 @@
 #include "pencilscan/core/counted_progress.h"
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/fields.h"
+#include "pencilscan/core/name_list.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/io/file.h"
 #include "pencilscan/io/hash.h"
@@ -100,7 +101,7 @@ std::vector<std::string> repetitions(const Rig& rig, const FrameSource& frames,
 std::optional<std::string> strangers_warning(const FrameSource& frames) {
   if (frames.strangers().empty()) return std::nullopt;
   std::string names;
-  for (const std::string& name : frames.strangers()) names += (names.empty() ? "" : ", ") + name;
+  for (const std::string& name : frames.strangers()) add_name(names, name);
   return "the frames hold pictures that are named like no camera of the rig, and nobody looks at "
          "them: " +
          names;
