@@ -8,6 +8,7 @@
 #include "pencilscan/detection/code_evidence.h"
 #include "pencilscan/joint/floor_cost.h"
 #include "pencilscan/joint/next_lines.h"
+#include "pencilscan/rig/object_space.h"
 
 namespace pencilscan {
 namespace {

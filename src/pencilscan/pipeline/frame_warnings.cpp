@@ -10,6 +10,7 @@
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/grid/gamma_trace.h"
 #include "pencilscan/rig/camera_light.h"
+#include "pencilscan/rig/device_list.h"
 
 namespace pencilscan {
 
