@@ -187,6 +187,8 @@ if __name__ == "__main__":
     for sensor in arguments.sensors.split(","):
         rig_for(arguments, run, sensor)
         for motion in ("still", "moving"):
+            if arguments.small and (sensor == "raw") != (motion == "moving"):
+                continue  # each of the four once
             for position in range(arguments.positions):
                 for artefact in ARTEFACTS:
                     if results.has(artefact=artefact, sensor=sensor, motion=motion, position=position,

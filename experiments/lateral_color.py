@@ -74,12 +74,13 @@ def main():
         return out
 
     bunny = (common.BUNNY, "--up", "y", "--fit")
-    scenes = {"plain": render("scene_plain", args.out / "plain.json", *bunny),
-              "shifted": render("scene_shifted", args.out / "truth.json", *bunny)}
+    scenes = {"shifted": render("scene_shifted", args.out / "truth.json", *bunny)}
+    if not args.small:
+        scenes["plain"] = render("scene_plain", args.out / "plain.json", *bunny)
     calibration.RADIUS = 0.97 * plain["volume"]["radius"]
     common.write_ply(args.out / "heap.ply", *calibration.heap(0))
     captures = render("captures", args.out / "truth.json", args.out / "heap.ply", "--gray-code", "--color-captures",
-                      "--samples", 2)
+                      "--samples", 1 if args.small else 2)
     # Poses of the cameras give the frame.
     devices = with_keys(plain, {"cameras": plain["cameras"], "projectors": [{}] * len(plain["projectors"])},
                         ["K", "distortion", "R", "t"])

@@ -21,7 +21,7 @@ bool has_aravis() { return true; }
 
 namespace {
 
-constexpr int kBuffers = 16;  ///< pictures that may wait for us: 1.6 s at 10 a second
+constexpr int kAravisBuffers = 16;  ///< pictures that may wait for us: 1.6 s at 10 a second
 
 class AravisCamera final : public CameraDevice {
  public:
@@ -220,7 +220,7 @@ void AravisCamera::start() {
                  ARV_GV_STREAM_PACKET_RESEND_ALWAYS, nullptr);
   const auto payload =
       static_cast<std::size_t>(arv_camera_get_payload(camera_.get(), failure.out()));
-  for (int i = 0; i < kBuffers; ++i)
+  for (int i = 0; i < kAravisBuffers; ++i)
     arv_stream_push_buffer(stream_.get(), arv_buffer_new_allocate(payload));
   utc_minus_host_ = utc_minus_host_ns();
   arv_camera_start_acquisition(camera_.get(), failure.out());

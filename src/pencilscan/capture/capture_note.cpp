@@ -14,7 +14,7 @@ namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
 constexpr const char* kFile = "capture.json";
-constexpr const char* kFormat = "capture/1";
+constexpr const char* kNoteFormat = "capture/1";
 
 /// `rule` ends the sentence "must ...".
 [[noreturn]] void refuse(const JsonField& field, const std::string& rule) {
@@ -52,7 +52,7 @@ CaptureNote capture_note(const Projector& projector, const std::vector<Camera>& 
 
 void write_capture_note(const fs::path& folder, const CaptureNote& note) {
   Json json;
-  json["format"] = kFormat;
+  json["format"] = kNoteFormat;
   json["projector"] = {{"name", note.projector}, {"width", note.width}, {"height", note.height}};
   json["inverses"] = note.inverses;
   json["solids"] = note.solids;
@@ -70,8 +70,8 @@ void check_capture_note(const fs::path& folder, const CaptureNote& wanted) {
   const nlohmann::json json = read_json(path);
   const JsonField root(path.string(), json);
   root.check_keys({"format", "projector", "inverses", "solids", "cameras"}, {});
-  if (root.at("format").text() != kFormat)
-    root.at("format").fail(std::string("must be \"") + kFormat + "\"");
+  if (root.at("format").text() != kNoteFormat)
+    root.at("format").fail(std::string("must be \"") + kNoteFormat + "\"");
   if (root.at("projector").at("name").text() != wanted.projector)
     refuse(root.at("projector").at("name"), "be " + wanted.projector);
   expect_size(root.at("projector"), wanted.width, wanted.height);

@@ -8,7 +8,7 @@ namespace {
 
 constexpr std::int64_t kBlockNs = 500'000'000;  ///< some pictures each
 constexpr std::size_t kBlocks = 120;            ///< a minute: temperature moves a crystal slower
-constexpr std::size_t kLeastBlocks = 4;         ///< for a line
+constexpr std::size_t kLeastClockBlocks = 4;    ///< for a line
 constexpr std::int64_t kLeastSpan = 3'000'000'000;  ///< ns: jitter of 1 ms is then 300 ppm at most
 
 }  // namespace
@@ -32,7 +32,7 @@ void ClockFit::add(std::int64_t timestamp_ns, std::int64_t arrival_ns) {
 
 void ClockFit::fit() {
   line_.reset();
-  if (blocks_.size() < kLeastBlocks) return;
+  if (blocks_.size() < kLeastClockBlocks) return;
   const double first = static_cast<double>(blocks_.front().timestamp_ns);
   const double base = static_cast<double>(blocks_.front().offset_ns);
   const double count = static_cast<double>(blocks_.size());

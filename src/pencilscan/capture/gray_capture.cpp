@@ -22,12 +22,9 @@ namespace {
 namespace fs = std::filesystem;
 using Kind = ProjectorPicture::Kind;
 
-/// A camera sees a projector where so much of its picture is lit: a hand at arm's length.
-constexpr double kLeastSeen = 0.002;
 /// Where nobody measured: projectors of three frames' delay, and a slow network.
 constexpr double kGuessedFrames = 3;
 constexpr double kGuessedTransferMs = 60;
-constexpr double kUsualRefreshHz = 60;
 /// Added to the delay when a picture is taken again.
 constexpr double kRetakeMs = 50;
 /// A camera without a picture so many times in a row gives none any more.
@@ -134,8 +131,8 @@ double ProjectorRun::delay_ms() const {
   for (std::size_t c = 0; c < cameras_.group().size(); ++c)
     exposure_ms =
         std::max(exposure_ms, cameras_.group().settings(c).exposure_us.value_or(0) / 1000);
-  return 1000 * kGuessedFrames / (refresh > 0 ? refresh : kUsualRefreshHz) + exposure_ms +
-         kGuessedTransferMs;
+  return 1000 * kGuessedFrames / (refresh > 0 ? refresh : ProjectorScreen::kUsualRefreshHz) +
+         exposure_ms + kGuessedTransferMs;
 }
 
 void ProjectorRun::take(std::size_t i, int again) {
@@ -216,8 +213,8 @@ std::set<std::size_t> ProjectorRun::failed(bool last) {
       if (last) give_up(c, i, why_missing(c));
     }
     // A camera that sees nothing between white and black, and then something: these came late.
-    if (views_[c].share < kLeastSeen) {
-      if (changing_share(c) < kLeastSeen) continue;
+    if (!views_[c].is_seen()) {
+      if (changing_share(c) < LitView::kLeastSeen) continue;
       // Then every picture may show the one before: pairs would not tell.
       for (std::size_t i = 0; i <= white_again; ++i) again.insert(i);
       if (last) give_up(c, 0, "white and black came late");
@@ -252,7 +249,7 @@ double ProjectorRun::changing_share(std::size_t camera) const {
 void ProjectorRun::judge_stillness() {
   for (std::size_t c = 0; c < views_.size(); ++c) {
     const cv::Mat& again = coarse_[shots_.size()][c];
-    if (views_[c].share < kLeastSeen || again.empty()) continue;
+    if (!views_[c].is_seen() || again.empty()) continue;
     const WhiteTrouble trouble = white_again_trouble(coarse_[0][c], again, views_[c]);
     if (trouble.why.empty()) continue;
     moved_ = moved_ || trouble.moved;
@@ -287,8 +284,8 @@ bool ProjectorRun::run(const std::function<bool(double share)>& watch) {
   (void)failed(true);
   judge_stillness();
   report_.views[projector_] = views_;
-  const bool seen = std::any_of(views_.begin(), views_.end(),
-                                [](const LitView& view) { return view.share >= kLeastSeen; });
+  const bool seen =
+      std::any_of(views_.begin(), views_.end(), [](const LitView& view) { return view.is_seen(); });
   if (!seen)
     report_.faults.push_back({"unseen", screen_.projectors()[projector_].name,
                               "no camera sees any of its light",
@@ -306,7 +303,7 @@ bool ProjectorRun::usable() const {
 
 void ProjectorRun::drop_unseen() const {
   for (std::size_t c = 0; c < views_.size(); ++c)
-    if (views_[c].share < kLeastSeen) fs::remove_all(folder_ / name_of(c));
+    if (!views_[c].is_seen()) fs::remove_all(folder_ / name_of(c));
 }
 
 /// Where a projector's pictures are until they are complete.

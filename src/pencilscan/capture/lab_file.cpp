@@ -17,7 +17,7 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-constexpr const char* kFormat = "lab/1";
+constexpr const char* kLabFormat = "lab/1";
 constexpr const char* kAravis = "aravis:";
 constexpr const char* kVideo = "v4l2:";
 
@@ -75,8 +75,8 @@ Lab read_lab(const fs::path& path) {
   const JsonField root(path.string(), json);
   root.check_keys({"format", "cameras"},
                   {"trigger", "rate_hz", "patience_s", "max_spread_ms", "projectors"});
-  if (root.at("format").text() != kFormat)
-    root.at("format").fail(std::string("must be \"") + kFormat + "\"");
+  if (root.at("format").text() != kLabFormat)
+    root.at("format").fail(std::string("must be \"") + kLabFormat + "\"");
   Lab lab;
   for (const auto& [name, field] : root.at("cameras").members())
     lab.cameras[name] = parse_camera(field, path.parent_path());
@@ -95,7 +95,7 @@ Lab read_lab(const fs::path& path) {
 
 void write_lab(const Lab& lab, const fs::path& path) {
   Json json;
-  json["format"] = kFormat;
+  json["format"] = kLabFormat;
   json["trigger"] = {{"kind", to_string(lab.trigger)}};
   if (lab.trigger == Trigger::kWire) json["trigger"]["line"] = lab.line;
   json["rate_hz"] = lab.rate_hz;

@@ -17,6 +17,10 @@ struct LitView {
   double share = 0;      ///< of the blocks, lit
   double brightest = 0;  ///< 95th percentile of `light` over lit blocks
   double saturated = 0;  ///< share of the lit blocks whose white reaches the end of the range
+
+  /// The camera sees the projector: as much is lit as a hand at arm's length covers.
+  [[nodiscard]] bool is_seen() const { return share >= kLeastSeen; }
+  static constexpr double kLeastSeen = 0.002;
 };
 /// Both as coarse_picture() makes them, of one size.
 [[nodiscard]] LitView lit_view(const cv::Mat& white, const cv::Mat& black);

@@ -14,15 +14,13 @@ namespace {
 
 using Kind = ProjectorPicture::Kind;
 
-constexpr double kLeastSeen = 0.002;  ///< of a camera's picture
-constexpr double kAllLight = 0.95;    ///< of a change: what is left is noise and scattered light
+constexpr double kAllLight = 0.95;  ///< of a change: what is left is noise and scattered light
 /// Nothing takes longer from show() to a picture: projectors of three frames, exposures of 100 ms,
 /// networks that are busy.
 constexpr double kLongestMs = 400;
 constexpr int kSteps = 7;  ///< halvings of that, with a software trigger
 /// What lamps and sensors of usable projectors change by from picture to picture.
 constexpr double kSteadyLight = 0.02;
-constexpr double kUsualRefreshHz = 60;
 /// Exposures this far from a whole number of periods, in periods, show it: 2 % of light at one
 /// period.
 constexpr double kPeriodSlack = 0.02;
@@ -100,7 +98,7 @@ class Tester {
   void measure_delay(std::size_t projector, ProjectorTiming& timing, std::vector<Fault>& faults);
   [[nodiscard]] double refresh(std::size_t projector) const {
     const double stated = screen_.refresh_hz(projector);
-    return stated > 0 ? stated : kUsualRefreshHz;
+    return stated > 0 ? stated : ProjectorScreen::kUsualRefreshHz;
   }
 
   LiveCameras& cameras_;
@@ -138,7 +136,7 @@ void Tester::judge_flicker(std::size_t projector, ProjectorTiming& timing,
     // Triggered at any phase of the refresh.
     const auto frames = pictures_after(software_ ? random_.uniform(0, 40) : 0);
     for (std::size_t c = 0; c < frames.size(); ++c)
-      if (frames[c].frame && timing.views[c].share >= kLeastSeen)
+      if (frames[c].frame && timing.views[c].is_seen())
         levels[c].push_back(level_of(coarse_picture(frames[c].frame->image), timing.views[c]));
   }
   std::size_t worst = 0;
@@ -175,7 +173,7 @@ void Tester::flash(std::size_t projector, bool white, const ProjectorTiming& tim
   while (host_now_ns() < until) {
     bool all = true;
     for (std::size_t c = 0; c < bounds.size(); ++c) {
-      if (timing.views[c].share < kLeastSeen || done[c] != 0) continue;
+      if (!timing.views[c].is_seen() || done[c] != 0) continue;
       all = false;
       const TimedFrame latest = cameras_.latest(c);
       if (!latest.frame || latest.time_ns <= seen_until[c]) continue;
@@ -204,7 +202,7 @@ bool Tester::flash_triggered(std::size_t projector, bool white, const ProjectorT
   const auto frames = cameras_.trigger(options_.patience_s);
   bool there = true;
   for (std::size_t c = 0; c < flashes.size(); ++c) {
-    if (timing.views[c].share < kLeastSeen || !frames[c].frame) continue;
+    if (!timing.views[c].is_seen() || !frames[c].frame) continue;
     const double level = level_of(coarse_picture(frames[c].frame->image), timing.views[c]);
     const bool late = (white ? level : 1 - level) < kAllLight;
     if (late)
@@ -263,7 +261,7 @@ ProjectorTiming Tester::test(std::size_t projector, std::vector<Fault>& faults) 
   ProjectorTiming timing;
   look(projector, timing);
   const bool seen = std::any_of(timing.views.begin(), timing.views.end(),
-                                [](const LitView& view) { return view.share >= kLeastSeen; });
+                                [](const LitView& view) { return view.is_seen(); });
   if (!seen) {
     faults.push_back({"unseen", screen_.projectors()[projector].name,
                       "no camera sees any of its light",
@@ -290,7 +288,8 @@ void compare_delays(const ProjectorScreen& screen, ProjectorTestReport& report) 
   for (std::size_t p = 0; fastest != nullptr && p < report.projectors.size(); ++p) {
     ProjectorTiming& timing = report.projectors[p];
     if (!timing.measured) continue;
-    const double refresh = screen.refresh_hz(p) > 0 ? screen.refresh_hz(p) : kUsualRefreshHz;
+    const double refresh =
+        screen.refresh_hz(p) > 0 ? screen.refresh_hz(p) : ProjectorScreen::kUsualRefreshHz;
     const double behind_ms = middle(timing) - middle(*fastest);
     timing.frames_behind = behind_ms * refresh / 1000;
     // Both are known between their bounds only.
@@ -326,7 +325,7 @@ void judge_exposures(const LiveCameras& cameras, const ProjectorScreen& screen,
     double saturated = 0;
     bool sees = false;
     for (const ProjectorTiming& timing : report.projectors) {
-      if (c >= timing.views.size() || timing.views[c].share < kLeastSeen) continue;
+      if (c >= timing.views.size() || !timing.views[c].is_seen()) continue;
       sees = true;
       brightest = std::max(brightest, timing.views[c].brightest);
       saturated = std::max(saturated, timing.views[c].saturated);

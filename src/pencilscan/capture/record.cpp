@@ -12,11 +12,11 @@
 namespace pencilscan {
 namespace {
 
-constexpr double kWatchInterval = 0.25;               ///< s
-constexpr double kLongestStart = 2;                   ///< s that cameras may take for those
-constexpr double kLongestSilence = 5;                 ///< s without a picture of any camera
-constexpr std::size_t kFirstPictures = 5;             ///< of each camera, for its clock
-constexpr auto kTurn = std::chrono::milliseconds(2);  ///< between looks at what came
+constexpr double kWatchInterval = 0.25;                    ///< s
+constexpr double kLongestStart = 2;                        ///< s that cameras may take for those
+constexpr double kLongestSilence = 5;                      ///< s without a picture of any camera
+constexpr std::size_t kFirstPictures = 5;                  ///< of each camera, for its clock
+constexpr auto kLookEvery = std::chrono::milliseconds(2);  ///< between looks at what came
 
 /// One recording while it runs.
 class Session {
@@ -177,7 +177,7 @@ RecordReport Session::run(const RecordWatch& watch) {
   const auto turn = [&] {
     collect();
     if (begin_ns_ >= 0) take_in(gathering_.take(host_now_ns()));
-    std::this_thread::sleep_for(kTurn);
+    std::this_thread::sleep_for(kLookEvery);
   };
   while (!stopped && !enough() && !silent() &&
          !(options_.seconds > 0 && seconds() >= options_.seconds)) {

@@ -26,6 +26,7 @@ class ProjectorScreen {
   [[nodiscard]] virtual std::vector<Fault> check() = 0;
   /// 0: unknown.
   [[nodiscard]] virtual double refresh_hz(std::size_t projector) const = 0;
+  static constexpr double kUsualRefreshHz = 60;  ///< where it is unknown
 
   void show_all(const ProjectorPicture& picture) {
     for (std::size_t p = 0; p < projectors().size(); ++p) show(p, picture);
