@@ -64,7 +64,7 @@ struct TwoProjectorScene {
         }
         if (curve.points.size() < 8) continue;
         graph.curves.push_back(curve);
-        graph.identities.push_back({PatternRef{p, 0}, 0, pattern.local_id(line), 1});
+        graph.identities.push_back({PatternRef{p, 0}, pattern.local_id(line), 1});
         true_lines[static_cast<std::size_t>(camera)].push_back(line);
       }
     }
