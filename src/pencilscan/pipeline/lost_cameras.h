@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "pencilscan/pipeline/rig_refinement.h"
+#include "pencilscan/pipeline/view_agreement.h"
 #include "pencilscan/refinement/correction.h"
 
 namespace pencilscan {
@@ -17,7 +18,8 @@ namespace pencilscan {
 /// A camera, and where it stands.
 struct FoundCamera {
   std::size_t camera = 0;
-  PoseCorrection correction;  ///< rotation only: to a few pixels
+  PoseCorrection correction;
+  double share = 0;  ///< of the places on lines that it should see, those that it does see
 };
 
 struct CameraSearchOptions {
@@ -25,8 +27,14 @@ struct CameraSearchOptions {
   double most_roll_degrees = 2;  ///< about the optical axis
 };
 
+/// What each camera's points, by the labels of all frames, say of those of the others.
+[[nodiscard]] std::vector<PairAgreement> agreement_of_cameras(const Rig& rig,
+                                                              std::span<const FrameCurves> frames,
+                                                              std::span<const Labeling> labelings);
+
 /// Cameras few of whose curves have names in `labelings`, or the wrong ones by their colours, that
-/// are found elsewhere. `rig`: in footprints, with registered patterns; a labeling per frame.
+/// are found elsewhere; where there are none, the one of those that contradict others which is
+/// found best. `rig`: in footprints, with registered patterns; a labeling per frame.
 [[nodiscard]] std::vector<FoundCamera> find_lost_cameras(const Rig& rig,
                                                          std::span<const FrameCurves> frames,
                                                          std::span<const Labeling> labelings,

@@ -10,6 +10,7 @@
 #include "pencilscan/core/formatted.h"
 #include "pencilscan/core/name_list.h"
 #include "pencilscan/pipeline/line_naming.h"
+#include "pencilscan/pipeline/lost_cameras.h"
 #include "pencilscan/pipeline/naming_doubt.h"
 
 namespace pencilscan {
@@ -147,8 +148,12 @@ RigFit check_rig_on_frames(const Rig& stated, std::span<const FrameCurves> frame
                            const MovedDevicesOptions& options) {
   const double unit = footprint(stated);
   const Rig rig = with_registered_patterns(scaled(stated, 1 / unit));
-  NamedCrossings named = named_crossings(rig, frames, labels_of(rig, frames));
-  if (!named.doubt.text().empty()) {
+  const std::vector<Labeling> labelings = labels_of(rig, frames);
+  NamedCrossings named = named_crossings(rig, frames, labelings);
+  const std::vector<PairAgreement> said = agreement_of_cameras(rig, frames, labelings);
+  const bool is_contradicted = std::any_of(
+      said.begin(), said.end(), [](const PairAgreement& views) { return views.is_doubtful(); });
+  if (is_contradicted || !named.doubt.text().empty()) {
     // All frames together, and colours, may tell where a device stands.
     RigRefinementOptions refinement;
     refinement.refine.max_remaining = std::numeric_limits<double>::infinity();

@@ -10,8 +10,6 @@
 #include "pencilscan/joint/joint.h"
 #include "pencilscan/pipeline/lost_cameras.h"
 #include "pencilscan/pipeline/view_agreement.h"
-#include "pencilscan/points/settle.h"
-#include "pencilscan/points/triangulate.h"
 #include "pencilscan/refinement/moved_devices.h"
 #include "pencilscan/refinement/shown_colors.h"
 
@@ -60,18 +58,7 @@ ShownColorCount shown_colors(const Rig& rig, std::span<const FrameCurves> frames
 /// names of other lines, at which crossings and colours agree. Empty: none.
 std::string contradicted_camera(const Rig& rig, std::span<const FrameCurves> frames,
                                 std::span<const Labeling> labelings) {
-  TriangulationOptions some;
-  some.used_of_seven = 1;
-  std::vector<PairAgreement> said(rig.cameras.size());
-  for (std::size_t f = 0; f < frames.size(); ++f) {
-    const ViewAgreement views(
-        rig, points_by_camera(rig, triangulate(rig, frames[f].graphs, labelings[f], some)));
-    for (std::size_t c = 0; c < said.size(); ++c) {
-      const PairAgreement of_frame = views.with_others(c);
-      said[c].same += of_frame.same;
-      said[c].apart += of_frame.apart;
-    }
-  }
+  const std::vector<PairAgreement> said = agreement_of_cameras(rig, frames, labelings);
   // A right camera beside a wrong one is contradicted too: the one with the least on its side.
   const auto least = std::min_element(
       said.begin(), said.end(),
