@@ -13,12 +13,14 @@
 #include <sstream>
 #include <string>
 
+#include "pencilscan/core/byte_order_mark.h"
 #include "pencilscan/core/check.h"
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/lower_case.h"
 #include "pencilscan/io/file.h"
 #include "pencilscan/io/little_endian.h"
 #include "pencilscan/io/ply.h"
+#include "pencilscan/io/polygon_mesh.h"
 #include "pencilscan/io/srgb.h"
 
 namespace pencilscan {
@@ -58,21 +60,6 @@ std::vector<std::array<float, 3>> optional_colors(const PlyElement& vertices) {
   return colors;
 }
 
-/// Appends a polygon as a fan of triangles.
-void append_polygon(const std::string& path, std::span<const double> corners, std::size_t face,
-                    TriangleMesh& mesh) {
-  for (const double corner : corners) {
-    if (!(corner >= 0) || corner >= static_cast<double>(mesh.vertices.size())) {
-      throw InputError(path, "face[" + std::to_string(face) + "]", std::to_string(corner),
-                       "vertex indices must lie below the number of vertices");
-    }
-  }
-  for (std::size_t k = 2; k < corners.size(); ++k) {
-    mesh.faces.push_back({static_cast<int>(corners[0]), static_cast<int>(corners[k - 1]),
-                          static_cast<int>(corners[k])});
-  }
-}
-
 /// PLY is read here rather than by Assimp to keep shared vertices, doubles, sigma and confidence.
 TriangleMesh read_ply_mesh(const std::filesystem::path& path) {
   const PlyFile file = read_ply(path);
@@ -101,7 +88,9 @@ TriangleMesh read_ply_mesh(const std::filesystem::path& path) {
   mesh.faces.reserve(faces->count);
   for (std::size_t f = 0; f < faces->count; ++f) {
     const std::size_t begin = corners->begin[f];
-    append_polygon(path.string(), all.subspan(begin, corners->begin[f + 1] - begin), f, mesh);
+    append_polygon(
+        path, [&] { return "face[" + std::to_string(f) + "]"; },
+        all.subspan(begin, corners->begin[f + 1] - begin), mesh);
   }
   return mesh;
 }
@@ -145,43 +134,97 @@ bool read_obj_line(std::istream& lines, std::string& line, int& number) {
   return !line.empty();
 }
 
-/// An OBJ as Assimp understands it. It passes over coordinates that begin with a point (".5",
-/// "-.5") or are no numbers, and takes those that follow for them.
-std::string with_leading_zeros(const std::filesystem::path& path, const std::string& obj) {
-  std::string text;
-  std::istringstream lines(obj);
-  std::string line;
-  for (int number = 0; read_obj_line(lines, line, number);) {
-    if (!line.starts_with("v ") && !line.starts_with("v\t")) {
-      text += line + "\n";
-      continue;
-    }
-    std::istringstream words(line.substr(1, line.find('#') - 1));
-    text += "v";
-    for (std::string word; words >> word;) {
-      char* end = nullptr;
-      if (!std::isfinite(std::strtod(word.c_str(), &end)) || *end != '\0')
-        throw InputError(path.string(), "line " + std::to_string(number), word,
-                         "must be a finite number");
-      const std::size_t first = word.find_first_not_of("+-");
-      if (word[first] == '.') word.insert(first, "0");
-      text += " " + word;
-    }
-    text += "\n";
+/// True for an OBJ's line of this kind: "v" or "f".
+bool is_obj_line(const std::string& line, char kind) {
+  return line.size() > 1 && line[0] == kind && (line[1] == ' ' || line[1] == '\t');
+}
+
+/// The line of a vertex as Assimp understands it: see assimp_obj().
+std::string vertex_line(const std::filesystem::path& path, const std::string& line, int number) {
+  std::istringstream stream(line.substr(1, line.find('#') - 1));
+  std::vector<std::string> words;
+  for (std::string word; stream >> word;) words.push_back(word);
+  if (words.size() < 3)
+    throw InputError(path.string(), "line " + std::to_string(number), line.substr(0, 40),
+                     "must be a vertex: v x y z");
+  // Four numbers are x y z w; more of them hold colours.
+  if (words.size() > 4) words.resize(3);
+  std::string text = "v";
+  for (std::string word : words) {
+    char* end = nullptr;
+    if (!std::isfinite(std::strtod(word.c_str(), &end)) || *end != '\0')
+      throw InputError(path.string(), "line " + std::to_string(number), word,
+                       "must be a finite number");
+    const std::size_t first = word.find_first_not_of("+-");
+    if (word[first] == '.') word.insert(first, "0");
+    text += " " + word;
   }
   return text;
 }
 
+/// An OBJ as Assimp understands it. It passes over coordinates that begin with a point (".5",
+/// "-.5") or are no numbers, and takes those that follow for them; it does not expect comments
+/// behind faces, more than three numbers of a colour, lines that are indented, nor the mark that
+/// editors of Windows put before the first one.
+std::string assimp_obj(const std::filesystem::path& path, const std::string& obj) {
+  std::string text;
+  std::istringstream lines(without_byte_order_mark(obj));
+  std::string line;
+  for (int number = 0; read_obj_line(lines, line, number);) {
+    line.erase(0, line.find_first_not_of(" \t"));
+    if (is_obj_line(line, 'v')) line = vertex_line(path, line, number);
+    if (is_obj_line(line, 'f')) line = line.substr(0, line.find('#'));
+    text += line + "\n";
+  }
+  return text;
+}
+
+/// An STL as Assimp understands it. It knows binary files by their very size, and text by its words
+/// in small letters. InputError where a binary file is of another size than its header says.
+std::string assimp_stl(const std::filesystem::path& path, std::string stl) {
+  constexpr std::size_t kHead = 84;   // the last four bytes are the number of facets
+  constexpr std::size_t kFacet = 50;  // bytes
+  const std::size_t first = std::min(stl.find_first_not_of(" \t\r\n"), stl.size());
+  const bool may_be_text = lower_case(stl.substr(first, 5)) == "solid";
+  std::uint32_t facets = 0;
+  for (std::size_t k = 4; k-- > 0 && stl.size() >= kHead;)
+    facets = facets << 8U | static_cast<std::uint8_t>(stl[kHead - 4 + k]);
+  const std::size_t whole = kHead + kFacet * facets;
+  if (stl.size() == whole) return stl;
+  if (may_be_text) return stl.compare(first, 5, "solid") == 0 ? stl : lower_case(stl);
+  if (stl.size() < kHead)
+    throw InputError(path.string(), "", "", "must be STL: text, or a binary file with a header");
+  if (stl.size() < whole || stl.size() - whole >= kFacet)
+    throw InputError(path.string(), "number of facets", std::to_string(facets),
+                     "must be what the file holds, " +
+                         std::to_string((stl.size() - kHead) / kFacet) + ": it may be truncated");
+  stl.resize(whole);  // some programs put a few bytes behind the last facet
+  return stl;
+}
+
+/// What Assimp is to read of a file.
+std::string assimp_bytes(const std::filesystem::path& path, const std::string& ending) {
+  std::string stored = read_file(path);
+  return ending == ".obj" ? assimp_obj(path, stored) : assimp_stl(path, std::move(stored));
+}
+
+/// What Assimp complains of. It calls a file that it reads from memory by a name of its own.
+std::string assimp_reason(std::string reason) {
+  std::replace(reason.begin(), reason.end(), '\n', ' ');
+  constexpr std::string_view kOwnName = "$$$___magic___$$$";
+  if (const auto at = reason.find(kOwnName); at != std::string::npos)
+    reason.replace(at, kOwnName.size(), "the file");
+  return reason;
+}
+
 TriangleMesh read_with_assimp(const std::filesystem::path& path, const std::string& ending) {
-  const std::string stored = read_file(path);
-  const std::string bytes = ending == ".obj" ? with_leading_zeros(path, stored) : stored;
+  const std::string bytes = assimp_bytes(path, ending);
   Assimp::Importer importer;
   const aiScene* scene = importer.ReadFileFromMemory(
       bytes.data(), bytes.size(), aiProcess_Triangulate | aiProcess_PreTransformVertices,
       ending.substr(1).c_str());
   if (scene == nullptr) {
-    std::string reason = importer.GetErrorString();
-    std::replace(reason.begin(), reason.end(), '\n', ' ');
+    const std::string reason = assimp_reason(importer.GetErrorString());
     if (reason.find("bad_alloc") != std::string::npos) throw std::bad_alloc();
     throw InputError(path.string(), "", "", "cannot be read as a mesh: " + reason);
   }
@@ -221,7 +264,9 @@ TriangleMesh read_mesh(const std::filesystem::path& path) {
   TriangleMesh mesh;
   if (ending == ".ply") {
     mesh = read_ply_mesh(path);
-  } else if (ending == ".obj" || ending == ".stl" || ending == ".off") {
+  } else if (ending == ".off") {
+    mesh = with_joined_vertices(read_off_mesh(path));
+  } else if (ending == ".obj" || ending == ".stl") {
     mesh = read_with_assimp(path, ending);
   } else {
     throw InputError(path.string(), "", "", "a mesh file must end with .ply, .obj, .stl or .off");

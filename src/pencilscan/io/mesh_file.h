@@ -6,9 +6,10 @@
 
 namespace pencilscan {
 
-/// Reads PLY (with sigma, confidence, hole and 8-bit sRGB colours where present), OBJ, STL or OFF
-/// (by Assimp, vertices of equal position joined); polygons become fans of triangles. InputError
-/// when missing, unreadable, without faces or with non-finite vertices.
+/// Reads PLY (with sigma, confidence, hole and 8-bit sRGB colours where present), OBJ, STL (both by
+/// Assimp) or OFF (vertices of equal position joined in these three); polygons become triangles,
+/// also those that are not convex. InputError when missing, unreadable, cut off, without faces or
+/// with non-finite vertices.
 [[nodiscard]] TriangleMesh read_mesh(const std::filesystem::path& path);
 
 /// Binary little-endian PLY: float x y z, optional float sigma, confidence, uchar hole; triangles.

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
+#include <sstream>
 
 #include "pencilscan/io/curve_file.h"
 #include "pencilscan/io/file.h"
@@ -81,6 +82,91 @@ TEST_F(Io, ObjLinesGoOnBehindABackslash) {
   EXPECT_THAT(
       error_of([&] { return read_mesh(put("b.obj", "v 1 \\\r\n0 0\r\nv x 0 0\r\nf 1 1 1\n")); }),
       ::testing::HasSubstr("line 3 = x"));
+}
+
+/// An L of 80 mm with legs of 20 mm, 40 mm high: two of its polygons are not convex.
+std::string l_shaped(bool as_ply, std::size_t first) {
+  const std::array<std::array<int, 2>, 6> outline{
+      {{0, 0}, {80, 0}, {80, 20}, {20, 20}, {20, 80}, {0, 80}}};
+  std::string vertices;
+  for (const char* z : {" 0\n", " 40\n"}) {
+    for (std::size_t i = 0; i < 6; ++i) {
+      const auto& at = outline[(first + i) % 6];
+      vertices += std::to_string(at[0]) + " " + std::to_string(at[1]) + z;
+    }
+  }
+  std::string faces = "6 5 4 3 2 1 0\n6 6 7 8 9 10 11\n";
+  for (int i = 0; i < 6; ++i) {
+    const int next = (i + 1) % 6;
+    for (const int corner : {4, i, next, next + 6}) faces += std::to_string(corner) + " ";
+    faces += std::to_string(i + 6) + "\n";
+  }
+  if (!as_ply) return "OFF\n12 8 0\n" + vertices + faces;
+  return "ply\nformat ascii 1.0\nelement vertex 12\nproperty float x\nproperty float y\n"
+         "property float z\nelement face 8\nproperty list uchar int vertex_indices\nend_header\n" +
+         vertices + faces;
+}
+
+TEST_F(Io, PolygonsThatAreNotConvexAreCoveredOnce) {
+  constexpr double kAreaMm2 = 2 * 2800 + 40 * 320;  // both ends, and all around
+  for (std::size_t first = 0; first < 6; ++first) {
+    for (const char* name : {"l.ply", "l.off"}) {
+      const TriangleMesh mesh = read_mesh(put(name, l_shaped(std::string(name) == "l.ply", first)));
+      EXPECT_EQ(mesh.faces.size(), 20U);
+      EXPECT_EQ(count_edges(mesh).boundary, 0U);
+      EXPECT_NEAR(surface_area(mesh), kAreaMm2, 1e-6) << name << ", corner " << first;
+      EXPECT_NEAR(signed_volume(mesh), 40 * 2800, 1e-6) << name << ", corner " << first;
+    }
+  }
+}
+
+TEST_F(Io, ObjMayHoldWhatOtherProgramsPutThere) {
+  const TriangleMesh mesh =
+      read_mesh(put("t.obj",
+                    "\xEF\xBB\xBFv 0 0 0 1 0 0 1\n  v +6 0 0 .5 .5 .5\nv 0 6E+0 0 1 1 1\n"
+                    "v 0 0 6 0 0 0\nf 1 3 2 # bottom\nf 1 2 4#left\n  f 1 4 3\nf 2 3 4\n"));
+  EXPECT_EQ(mesh.vertices.size(), 4U);
+  EXPECT_NEAR(signed_volume(mesh), 36, 1e-9);
+  EXPECT_THAT(error_of([&] { return read_mesh(put("b.obj", "v 1 0 0\nv 0 1\nf 1 2 1\n")); }),
+              ::testing::HasSubstr("line 2 = v 0 1: must be a vertex"));
+}
+
+TEST_F(Io, OffThatIsCutOrPointsNowhereIsRefused) {
+  const std::string vertices = "0 0 0\n6 0 0 # right\n\n0 6 0\n0 0 6\n";
+  const std::string faces = "3 0 2 1\n3 0 1 3\n3 0 3 2 255 0 0\n3 1 2 3\n";
+  EXPECT_NEAR(signed_volume(read_mesh(put("a.off", "4 4\n" + vertices + faces))), 36, 1e-9);
+  EXPECT_NEAR(signed_volume(read_mesh(put("b.off", "# x\nCOFF 4 4 6\r\n" + vertices + faces))), 36,
+              1e-9);
+  const auto error = [&](const std::string& text) {
+    return error_of([&] { return read_mesh(put("c.off", text)); });
+  };
+  using ::testing::HasSubstr;
+  EXPECT_THAT(error("OFF\n4 4 0\n" + vertices + faces.substr(0, 16)), HasSubstr("truncated OFF"));
+  EXPECT_THAT(error("OFF\n4 4 0\n" + vertices + "3 0 2 4\n"), HasSubstr("line 8 = 4"));
+  EXPECT_THAT(error("OFF\n4 4 0\n" + vertices + "3 0 2\n"), HasSubstr("line 8 = 3 corners"));
+  EXPECT_THAT(error("OFF\n4 4 0\n" + vertices + "3 0 -1 2\n"), HasSubstr("line 8 = -1"));
+  EXPECT_THAT(error("OFF\n4 4 0\n0 0 x\n"), HasSubstr("line 3 = x"));
+  EXPECT_THAT(error("4OFF\n4 4 0\n"), HasSubstr("three dimensions"));
+  EXPECT_THAT(error("OFF BINARY\n"), HasSubstr("as text"));
+}
+
+TEST_F(Io, StlMayShoutAndEndLateButHoldsWhatItSays) {
+  std::string text = "SOLID t\n";
+  for (const char* facet :
+       {"0 0 0|0 6 0|6 0 0", "0 0 0|6 0 0|0 0 6", "0 0 0|0 0 6|0 6 0", "6 0 0|0 6 0|0 0 6"}) {
+    text += "FACET NORMAL 0 0 0\nOUTER LOOP\n";
+    std::istringstream corners(facet);
+    for (std::string corner; std::getline(corners, corner, '|');) text += "VERTEX " + corner + "\n";
+    text += "ENDLOOP\nENDFACET\n";
+  }
+  EXPECT_NEAR(signed_volume(read_mesh(put("t.stl", text + "ENDSOLID t\n"))), 36, 1e-9);
+  export_mesh(folder_ / "box.stl", make_box({1, 2, 3}));
+  const std::string box = read_file(folder_ / "box.stl");
+  EXPECT_NEAR(signed_volume(read_mesh(put("late.stl", box + "made by x"))), 6, 1e-5);
+  for (const std::string& wrong : {box.substr(0, box.size() - 60), box + box}) {
+    EXPECT_THAT(error_of([&] { return read_mesh(put("b.stl", wrong)); }),
+                ::testing::HasSubstr("number of facets = 12"));
+  }
 }
 
 TEST_F(Io, ObjStlAndOffGiveOneClosedTetrahedron) {

@@ -96,7 +96,8 @@ class Body {
     auto last = bytes_.find_first_of(blanks, first);
     if (last == std::string_view::npos) last = bytes_.size();
     at_ = last;
-    const std::string_view word = bytes_.substr(first, last - first);
+    std::string_view word = bytes_.substr(first, last - first);
+    if (word.size() > 1 && word[0] == '+' && word[1] != '-') word.remove_prefix(1);
     double value = 0;
     const auto result = std::from_chars(word.data(), word.data() + word.size(), value);
     if (result.ec != std::errc{} || result.ptr != word.data() + word.size()) {
