@@ -6,6 +6,7 @@
 
 #include "pencilscan/api/run_stages.h"
 #include "pencilscan/core/error.h"
+#include "pencilscan/geometry/used_vertices.h"
 #include "pencilscan/simulation/photography.h"
 
 namespace pencilscan {
@@ -37,7 +38,7 @@ SimulatedFrame simulate(const Rig& rig, const TriangleMesh& mesh,
                         const SimulationOptions& options) {
   check_options(options);
   if (mesh.faces.empty()) throw InputError("mesh", "faces", "0", "the mesh must have faces");
-  TriangleMesh placed = turned_upright(mesh, up_axis(options.up));
+  TriangleMesh placed = turned_upright(without_unused_vertices(mesh), up_axis(options.up));
   if (options.fit) placed = fitted(std::move(placed), working_volume(rig));
   check_scene(rig, placed, "mesh", "rig");
   PhotographyOptions photo;

@@ -1,8 +1,10 @@
 #include "pencilscan/simulation/placement.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "pencilscan/core/check.h"
+#include "pencilscan/geometry/used_vertices.h"
 
 namespace pencilscan {
 
@@ -16,6 +18,7 @@ TriangleMesh turned_upright(TriangleMesh mesh, UpAxis up) {
 
 TriangleMesh fitted(TriangleMesh mesh, const Sphere& volume, double fill) {
   PENCILSCAN_CHECK(fill > 0 && fill <= 1);
+  mesh = without_unused_vertices(std::move(mesh));
   const BoundingBox box = bounding_box(mesh);
   const Vec3 middle = 0.5 * (box.low + box.high);
   double reach = 0;

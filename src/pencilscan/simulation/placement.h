@@ -9,8 +9,9 @@ enum class UpAxis { kX, kY, kZ };
 /// The mesh turned so that `up` becomes z.
 [[nodiscard]] TriangleMesh turned_upright(TriangleMesh mesh, UpAxis up);
 
-/// The mesh centred in the volume (middle of its bounding box) and scaled so that its farthest
-/// vertex lies at `fill` of the radius, 0 < fill <= 1. A mesh without extent is only centred.
+/// The mesh without vertices of no face, centred in the volume (middle of its bounding box) and
+/// scaled so that its farthest vertex lies at `fill` of the radius, 0 < fill <= 1. A mesh without
+/// extent is only centred.
 [[nodiscard]] TriangleMesh fitted(TriangleMesh mesh, const Sphere& volume, double fill = 0.95);
 
 /// Rigid motion per frame: a turn about the vertical through `pivot`, then a shift.

@@ -12,6 +12,21 @@ TEST(Fitted, FarthestVertexLiesAtItsShareOfTheRadius) {
   EXPECT_GT(signed_volume(mesh), 0);
 }
 
+TEST(Fitted, VerticesWithoutFacesDoNotCount) {
+  TriangleMesh box = make_box({1, 2, 3});
+  const Sphere volume{{10, -20, 30}, 150};
+  const TriangleMesh alone = fitted(box, volume);
+  box.vertices.insert(box.vertices.begin(), Vec3(900, 900, 900));
+  box.color.assign(box.vertices.size(), {0.5F, 0.5F, 0.5F});
+  box.color[0] = {1, 0, 0};
+  for (auto& face : box.faces)
+    for (int& corner : face) ++corner;
+  const TriangleMesh mesh = fitted(box, volume);
+  EXPECT_EQ(mesh.vertices, alone.vertices);
+  EXPECT_EQ(mesh.faces, alone.faces);
+  EXPECT_EQ(mesh.color, (std::vector<std::array<float, 3>>(8, {0.5F, 0.5F, 0.5F})));
+}
+
 TEST(TurnedUpright, IsARotationThatRaisesTheNamedAxis) {
   const TriangleMesh box = make_box({1, 2, 3});
   EXPECT_NEAR(bounding_box(turned_upright(box, UpAxis::kY)).high.z(), 1.0, 1e-12);
