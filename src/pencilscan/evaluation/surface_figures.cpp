@@ -48,23 +48,49 @@ Coverage cover(const TruthScene& truth, const std::vector<PatternChannel>& chann
   return coverage;
 }
 
-/// Distance to the nearest facet within reach, else infinity, and whether its normal agrees.
+DrawnPoint turned_round(DrawnPoint sample) {
+  sample.normal = -sample.normal;
+  return sample;
+}
+
+/// Of both sides, where there are two.
+Coverage cover_sides(const TruthScene& truth, const std::vector<PatternChannel>& channels,
+                     const DrawnPoint& sample, const CoverageOptions& options) {
+  const Coverage front = cover(truth, channels, sample, options);
+  if (!truth.is_two_sided(sample.face)) return front;
+  Coverage both = cover(truth, channels, turned_round(sample), options);
+  if (!both.seen) return front;
+  both.back = true;
+  both.front = front.seen;
+  if (front.seen) {
+    both.measurable = both.measurable || front.measurable;
+    both.lit_by = std::max(both.lit_by, front.lit_by);
+  }
+  return both;
+}
+
+/// Distance to the nearest facet within reach, else infinity, and the cosine between the normals.
 struct Nearest {
   double distance = std::numeric_limits<double>::infinity();
-  bool normal_agrees = false;
+  double cos_normals = 0;
 };
 
 std::vector<Nearest> nearest_facets(const RayScene& scene, const std::vector<DrawnPoint>& samples,
-                                    double max_deg, double reach) {
+                                    double reach) {
   std::vector<Nearest> nearest(samples.size());
-  const double limit = cos_deg(max_deg);
   parallel_chunks(samples.size(), [&](std::size_t i) {
     const auto closest = scene.closest_point(samples[i].point, reach);
     if (!closest) return;
     const Vec3 normal = face_normal(scene.mesh(), closest->face);
-    nearest[i] = {closest->distance, normal.dot(samples[i].normal) >= limit};
+    nearest[i] = {closest->distance, normal.dot(samples[i].normal)};
   });
   return nearest;
+}
+
+/// Whether the nearest facet looks where a side of the sample looks that counts.
+bool normal_agrees(const Nearest& nearest, const Coverage& coverage, double limit) {
+  return (coverage.front && nearest.cos_normals >= limit) ||
+         (coverage.back && -nearest.cos_normals >= limit);
 }
 
 SigmaFigures vertex_sigma_figures(const RayScene& truth, const TriangleMesh& mesh) {
@@ -107,7 +133,7 @@ std::vector<DrawnPoint> sample_surface(const TriangleMesh& mesh, std::size_t cou
     const double r = random.uniform();
     samples.push_back(
         {(1 - root) * corner(f, 0) + root * (1 - r) * corner(f, 1) + root * r * corner(f, 2),
-         face_normal(mesh, f)});
+         face_normal(mesh, f), f});
   }
   return samples;
 }
@@ -118,7 +144,7 @@ std::vector<Coverage> surface_coverage(const TruthScene& truth,
   const auto channels = pattern_channels(truth.rig());
   std::vector<Coverage> coverage(samples.size());
   parallel_chunks(samples.size(), [&](std::size_t i) {
-    coverage[i] = cover(truth, channels, samples[i], options);
+    coverage[i] = cover_sides(truth, channels, samples[i], options);
   });
   return coverage;
 }
@@ -151,7 +177,8 @@ SurfaceFigures surface_figures(const TruthScene& truth, const TriangleMesh& meas
   double reach = 0;
   for (const double threshold : options.thresholds_mm)
     reach = std::max(reach, threshold / mm_per_unit);
-  const auto nearest = nearest_facets(measured_scene, samples, options.max_normal_deg, reach);
+  const auto nearest = nearest_facets(measured_scene, samples, reach);
+  const double limit = cos_deg(options.max_normal_deg);
 
   Share measurable;
   Share one;
@@ -172,7 +199,8 @@ SurfaceFigures surface_figures(const TruthScene& truth, const TriangleMesh& meas
     Share found_one;
     Share found_two;
     for (std::size_t i = 0; i < samples.size(); ++i) {
-      const bool near = nearest[i].distance * mm_per_unit < threshold && nearest[i].normal_agrees;
+      const bool near = nearest[i].distance * mm_per_unit < threshold &&
+                        normal_agrees(nearest[i], coverage[i], limit);
       if (coverage[i].measurable) found.add(near);
       if (coverage[i].seen && coverage[i].lit_by >= 1) found_one.add(near);
       if (coverage[i].seen && coverage[i].lit_by >= 2) found_two.add(near);

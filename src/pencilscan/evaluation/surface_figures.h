@@ -14,6 +14,7 @@ namespace pencilscan {
 struct DrawnPoint {
   Vec3 point = Vec3::Zero();   ///< mm
   Vec3 normal = Vec3::Zero();  ///< unit, of the facet
+  std::size_t face = 0;
 };
 
 /// `count` points, uniform by area, stratified along the face list; the seed moves them within
@@ -27,11 +28,15 @@ struct Coverage {
       false;          ///< by one camera and one projector, both below 75 degrees, spacing >= 5 px
   bool seen = false;  ///< some camera sees it, at any incidence below 90 degrees
   int lit_by = 0;     ///< number of projectors that light it
+  /// The sides that this is of: of one-sided surface, and where no camera sees it, the front.
+  bool front = true;
+  bool back = false;
 };
 struct CoverageOptions {
   double max_incidence_deg = 75;
   double min_spacing_px = 5;
 };
+/// `samples`: of the truth. Where it is two-sided, both sides count.
 [[nodiscard]] std::vector<Coverage> surface_coverage(const TruthScene& truth,
                                                      const std::vector<DrawnPoint>& samples,
                                                      const CoverageOptions& options = {});

@@ -68,6 +68,64 @@ TEST(SurfaceFigures, SigmaIsJudgedWhereTheMeshIsMeasured) {
   EXPECT_EQ(sigma->tenths.back(), 1);
 }
 
+/// A sheet of 100 mm before the first camera of a rig, and its figures where its facets are wound
+/// by `wound(facet)` away from it.
+template <class Wound>
+SurfaceFigures figures_of_a_sheet(const Wound& wound) {
+  constexpr int kSide = 20;
+  constexpr double kStepMm = 5;
+  const Rig rig = oracle::ring(3);
+  const Vec3 out = rig.cameras[0].center().normalized();
+  const Vec3 right = Vec3::UnitZ().cross(out).normalized();
+  TriangleMesh sheet;
+  for (int j = 0; j <= kSide; ++j)
+    for (int i = 0; i <= kSide; ++i)
+      sheet.vertices.push_back(kStepMm *
+                               ((i - kSide / 2) * right + (j - kSide / 2) * out.cross(right)));
+  for (int j = 0; j < kSide; ++j) {
+    for (int i = 0; i < kSide; ++i) {
+      const int a = j * (kSide + 1) + i;
+      sheet.faces.push_back({a, a + 1, a + kSide + 2});
+      sheet.faces.push_back({a, a + kSide + 2, a + kSide + 1});
+    }
+  }
+  const TriangleMesh measured = sheet;  // as meshes of ours are, it faces the camera
+  for (std::size_t f = 0; f < sheet.faces.size(); ++f)
+    if (wound(f)) std::swap(sheet.faces[f][1], sheet.faces[f][2]);
+  return surface_figures(TruthScene(sheet, rig), measured, few_samples());
+}
+
+TEST(SurfaceFigures, AnOpenTruthIsSeenFromBothSides) {
+  const auto facing = figures_of_a_sheet([](std::size_t) { return false; });
+  EXPECT_GT(facing.measurable_share, 0.3);
+  EXPECT_EQ(facing.completeness[0].measurable, 1);
+  const auto away = figures_of_a_sheet([](std::size_t) { return true; });
+  const auto mixed = figures_of_a_sheet([](std::size_t f) { return f % 3 == 0; });
+  for (const SurfaceFigures& figures : {away, mixed}) {
+    // Facets that turn have their samples elsewhere.
+    EXPECT_NEAR(figures.measurable_share, facing.measurable_share, 0.02);
+    EXPECT_NEAR(figures.lit_by_one_share, facing.lit_by_one_share, 0.02);
+    EXPECT_EQ(figures.completeness[0].measurable, 1);
+  }
+}
+
+TEST(SurfaceFigures, EachClosedPartOfTheTruthFacesOutwards) {
+  const TriangleMesh ball = make_sphere(30, kSphereRings, {0, 0, 40});
+  TriangleMesh both = make_sphere(30, kSphereRings, {0, 0, -40});
+  const auto first = static_cast<int>(both.vertices.size());
+  both.vertices.insert(both.vertices.end(), ball.vertices.begin(), ball.vertices.end());
+  TriangleMesh turned = both;
+  for (const auto& f : ball.faces) {
+    both.faces.push_back({first + f[0], first + f[1], first + f[2]});
+    turned.faces.push_back({first + f[0], first + f[2], first + f[1]});
+  }
+  turned.vertices.emplace_back(1e4, 0, 0);  // of no face
+  const TruthScene truth(turned, oracle::ring(3));
+  EXPECT_EQ(truth.scene().mesh().faces, both.faces);
+  EXPECT_EQ(truth.diameter_mm(), TruthScene(both, oracle::ring(3)).diameter_mm());
+  EXPECT_FALSE(truth.is_two_sided(0));
+}
+
 TEST(SurfaceFigures, HalfASphereIsHalfComplete) {
   const TriangleMesh whole = make_sphere(oracle::kRadiusMm, kSphereRings);
   TriangleMesh half = whole;

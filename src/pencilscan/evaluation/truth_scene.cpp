@@ -2,15 +2,72 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <numeric>
 #include <set>
+#include <span>
 #include <utility>
+
+#include "pencilscan/geometry/mesh_sides.h"
+#include "pencilscan/geometry/used_vertices.h"
 
 namespace pencilscan {
 namespace {
 
+/// Which faces hang together by edges, and which of these parts are closed: each edge has as many
+/// faces that pass it one way as the other. Of other parts nobody knows what is outside.
+class MeshParts {
+ public:
+  explicit MeshParts(const TriangleMesh& mesh) : parent_(mesh.faces.size()) {
+    std::iota(parent_.begin(), parent_.end(), std::size_t{0});
+    const std::vector<FaceSide> sides = sides_by_edge(mesh);
+    std::vector<std::size_t> ragged;  // faces at an edge that is not closed
+    for_each_edge(sides, [&](std::span<const FaceSide> edge) {
+      if (edge.front().low == edge.front().high) return;  // of a face that has a vertex twice
+      const auto first = static_cast<std::size_t>(edge.front().face);
+      std::ptrdiff_t turns = 0;
+      for (const FaceSide& side : edge) {
+        join(first, static_cast<std::size_t>(side.face));
+        turns += side.rises ? 1 : -1;
+      }
+      if (turns != 0) ragged.push_back(first);
+    });
+    is_closed_.assign(parent_.size(), 1);
+    for (const std::size_t face : ragged) is_closed_[root(face)] = 0;
+  }
+
+  [[nodiscard]] bool is_closed(std::size_t face) { return is_closed_[root(face)] != 0; }
+  /// The first face of the part, which is its name.
+  [[nodiscard]] std::size_t root(std::size_t face) {
+    while (parent_[face] != face) face = parent_[face] = parent_[parent_[face]];
+    return face;
+  }
+
+ private:
+  void join(std::size_t a, std::size_t b) {
+    a = root(a);
+    b = root(b);
+    parent_[std::max(a, b)] = std::min(a, b);
+  }
+
+  std::vector<std::size_t> parent_;
+  std::vector<char> is_closed_;  ///< by root
+};
+
+/// The surface alone, closed parts facing outwards.
 TriangleMesh with_outward_faces(TriangleMesh mesh) {
-  if (count_edges(mesh).boundary == 0 && signed_volume(mesh) < 0) {
-    for (auto& face : mesh.faces) std::swap(face[1], face[2]);
+  mesh = without_unused_vertices(std::move(mesh));
+  MeshParts parts(mesh);
+  std::vector<double> volume(mesh.faces.size(), 0);  // six times, by root
+  for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
+    const auto corner = [&](std::size_t k) -> const Vec3& {
+      return mesh.vertices[static_cast<std::size_t>(mesh.faces[f][k])];
+    };
+    volume[parts.root(f)] += corner(0).dot(corner(1).cross(corner(2)));
+  }
+  for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
+    if (parts.is_closed(f) && volume[parts.root(f)] < 0)
+      std::swap(mesh.faces[f][1], mesh.faces[f][2]);
   }
   return mesh;
 }
@@ -44,6 +101,9 @@ TruthScene::TruthScene(const TriangleMesh& mesh, const Rig& rig)
   const TriangleMesh& kept = scene_.mesh();
   normals_.reserve(kept.faces.size());
   for (std::size_t f = 0; f < kept.faces.size(); ++f) normals_.push_back(face_normal(kept, f));
+  MeshParts parts(kept);
+  for (std::size_t f = 0; f < kept.faces.size(); ++f)
+    two_sided_.push_back(parts.is_closed(f) ? 0 : 1);
   for (const Projector& projector : rig_.projectors) {
     projector_centers_.push_back(projector.center());
   }

@@ -41,12 +41,15 @@ struct Lighting {
 /// the facet faces it and the point projects into its panel. Immutable, queries are thread safe.
 class TruthScene {
  public:
-  /// The mesh is in the rig's world frame. Faces of a closed mesh that point inwards are turned.
+  /// The mesh is in the rig's world frame. Closed parts of it that point inwards are turned, and
+  /// vertices without faces left out.
   TruthScene(const TriangleMesh& mesh, const Rig& rig);
 
   [[nodiscard]] const Rig& rig() const { return rig_; }
   [[nodiscard]] const RayScene& scene() const { return scene_; }
   [[nodiscard]] const Vec3& normal(std::size_t face) const { return normals_[face]; }
+  /// Of a part that is not closed, or whose faces do not agree: it is seen from both sides.
+  [[nodiscard]] bool is_two_sided(std::size_t face) const { return two_sided_[face] != 0; }
   [[nodiscard]] double diameter_mm() const { return diameter_mm_; }
   /// Distance that keeps a segment's ends off the surface they lie on, mm.
   [[nodiscard]] double margin_mm() const { return 2e-4 * diameter_mm_; }
@@ -72,6 +75,7 @@ class TruthScene {
   Rig rig_;
   RayScene scene_;
   std::vector<Vec3> normals_;            ///< per face
+  std::vector<char> two_sided_;          ///< per face
   std::vector<Vec3> projector_centers_;  ///< world, mm
   double diameter_mm_ = 0;               ///< diagonal of the bounding box
 };
