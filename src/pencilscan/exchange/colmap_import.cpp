@@ -159,7 +159,11 @@ ExchangedRig read_colmap(const std::filesystem::path& folder) {
       file.fail(file.words()[9], "names without ending must differ from each other");
     d.device.device_from_world = parse_pose(file);
     d.given.pose = true;
-    file.next_of_any_kind();  // its points
+    constexpr std::size_t kPointWords = 3;
+    if (file.next_of_any_kind() && file.words().size() % kPointWords != 0)
+      file.fail(file.words().front(),
+                "must be the points that the image before sees, X Y "
+                "POINT3D_ID each, or empty: an image has two lines");
   }
   if (rig.devices.empty()) throw InputError(images.string(), "", "", "must hold an image");
   return rig;

@@ -254,6 +254,21 @@ TEST_F(Exchange, AThinPrismBecomesTheNearestBrownLens) {
   expect_bad([&] { (void)joined(files); }, "must reproduce its lens");
 }
 
+TEST_F(Exchange, OpencvFilesMayBeginWithAMarkAndHoldTheSizeAsAMatrix) {
+  std::string text = opencv_text(rig_.cameras[0], OpencvSyntax::kYaml);
+  text.erase(0, text.find("camera_name"));  // as ROS writes it, and a Windows editor
+  ExchangedRig files;
+  read_opencv(write("ros.yml", "\xEF\xBB\xBF" + text), {}, files);
+  EXPECT_EQ(files.devices[0].device.name, rig_.cameras[0].name);
+  const auto at = text.find("image_width");
+  text.replace(at, text.find("camera_matrix") - at,
+               "image_size: !!opencv-matrix\n   rows: 1\n   cols: 2\n   dt: i\n"
+               "   data: [ 640, 480 ]\n");
+  read_opencv(write("python.yml", text), {}, files);
+  EXPECT_EQ(files.devices[1].device.width, 640);
+  EXPECT_EQ(files.devices[1].device.height, 480);
+}
+
 TEST_F(Exchange, BadOpencvFilesAreNamed) {
   ExchangedRig files;
   const std::string good = opencv_text(rig_.cameras[0], OpencvSyntax::kYaml);
@@ -276,6 +291,7 @@ TEST_F(Exchange, BadOpencvFilesAreNamed) {
   expect_bad(read(changed("image_width: 640", "image_width: 0")), "image_width");
   expect_bad(read(changed("cols: 5", "cols: 3")), "distortion_coefficients");
   expect_bad(read(changed("R: ", "Q: ")), "needs a rotation");
+  expect_bad(read(changed("data: [ 900., 0., ", "data: [ 900., 2., ")), "knows no skew");
   expect_bad(
       [&] {
         read_opencv(write("two.yml", good), {"a", "b"}, files);
@@ -346,6 +362,9 @@ TEST_F(Exchange, OtherColmapModelsAndBadLines) {
   expect_bad(read, "must be a number");
   write("cameras.txt", "7 PINHOLE 100 80 90 90 50 40\n7 PINHOLE 100 80 91 91 50 40\n");
   expect_bad(read, "line 2 = 7: cameras must differ in their CAMERA_ID");
+  write("cameras.txt", "7 PINHOLE 100 80 90 90 50 40\n");
+  write("images.txt", "1 1 0 0 0 0 0 5 7 a.jpg\n2 1 0 0 0 1 0 5 7 b.jpg\n");
+  expect_bad(read, "line 2 = 2: must be the points");
   rig_.cameras[0].name = "front camera";
   expect_bad([&] { write_colmap(rig_, {}, folder_); }, "front camera");
   rig_.cameras[0].name = "cam0";

@@ -7,6 +7,7 @@
 #include <opencv2/core/eigen.hpp>
 #include <string_view>
 
+#include "pencilscan/core/byte_order_mark.h"
 #include "pencilscan/core/error.h"
 #include "pencilscan/exchange/opencv_file.h"
 #include "pencilscan/io/file.h"
@@ -37,7 +38,7 @@ bool begins_in_first_column(std::string_view text) {
 class OpencvReader {
  public:
   explicit OpencvReader(const std::filesystem::path& path) : path_(path.string()) {
-    std::string text = read_file(path);
+    std::string text = without_byte_order_mark(read_file(path));
     // OpenCV's parser of XML follows a null pointer where the text ends, or a byte 0 stands, behind
     // the = of an attribute.
     if (text.find('\0') != std::string::npos)
@@ -104,6 +105,8 @@ class OpencvReader {
     if (K.rows() != 3 || K.cols() != 3 || !(K(0, 0) > 0) || !(K(1, 1) > 0) || K(1, 0) != 0 ||
         K(2, 0) != 0 || K(2, 1) != 0 || K(2, 2) != 1)
       fail(node.name(), "", "must be 3x3, [fx 0 cx; 0 fy cy; 0 0 1] with fx, fy > 0");
+    if (K(0, 1) != 0)
+      fail(node.name(), std::to_string(K(0, 1)), "OpenCV knows no skew: K[0][1] must be 0");
     return K;
   }
 
@@ -166,6 +169,10 @@ class OpencvReader {
     } else if (size.isSeq() && size.size() == 2) {
       device.width = side(size[0]);
       device.height = side(size[1]);
+    } else if (const cv::FileNode data = size.isMap() ? size["data"] : cv::FileNode();
+               data.isSeq() && data.size() == 2) {  // Python can only write it as a matrix
+      device.width = side(data[0]);
+      device.height = side(data[1]);
     }
   }
 
