@@ -10,6 +10,7 @@
 #include <sstream>
 #include <system_error>
 
+#include "pencilscan/core/byte_order_mark.h"
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/name_list.h"
 #include "pencilscan/core/parallel.h"
@@ -124,7 +125,7 @@ using Times = std::map<std::string, std::map<std::string, std::int64_t>>;
 /// The cameras of the columns. InputError where one has no pictures, or stands twice.
 std::vector<std::string> read_header(const fs::path& file, const std::string& line,
                                      const std::vector<std::string>& cameras) {
-  std::vector<std::string> header = words(line);
+  std::vector<std::string> header = words(without_byte_order_mark(line));
   if (header.size() < 2 || header[0] != "frame")
     throw InputError(file.string(), "line 1", line, "must be frame,<camera>,<camera>,...");
   for (auto column = header.begin() + 1; column != header.end(); ++column) {

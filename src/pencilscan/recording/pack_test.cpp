@@ -169,7 +169,7 @@ TEST_F(Pack, TheTimesOfOneRowComeBack) {
   put("000000/cam0.png", CV_8UC1, 3);
   put("000000/cam1.png", CV_8UC1, 4);
   const std::string table = "frame,cam0,cam1\n000000,100,110\n";
-  write_text(frames() / "timestamps.csv", table);
+  write_text(frames() / "timestamps.csv", "\xEF\xBB\xBF" + table);  // as Excel saves it
   pack_recording(frames(), packed());
   const Recording recording = Recording::open(packed());
   const fs::path out = temporary_.path() / "out";
