@@ -420,6 +420,8 @@ TEST_F(Newcomer, WritesScenesForOtherRenderers) {
     EXPECT_TRUE(fs::exists(folder_ / "made/blender" / file)) << file;
   }
   expect_bad(simulate + "--export-blender --texture stripes --out o", "--texture");
+  expect_bad(simulate + "--export-blender --motion-mm-s 5 0 0 --out o", "without --motion-mm-s");
+  expect_bad(simulate + "--export-povray --spin-deg-s 0 0 5 --out o", "without --motion-mm-s");
 }
 
 TEST_F(Newcomer, IsToldThatTheMemoryDoesNotSuffice) {

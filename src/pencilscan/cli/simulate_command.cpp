@@ -4,6 +4,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "pencilscan/cli/command.h"
@@ -13,6 +14,7 @@
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/core/stopwatch.h"
+#include "pencilscan/geometry/used_vertices.h"
 #include "pencilscan/io/file.h"
 #include "pencilscan/io/image.h"
 #include "pencilscan/io/mesh_file.h"
@@ -36,7 +38,8 @@ constexpr std::uint32_t kFirstCaptureImage = 0x40000000;
 
 /// The mesh where frame 0 has it; InputError when no camera would see any of it.
 TriangleMesh placed_mesh(const SimulateOptions& options, const Rig& rig) {
-  TriangleMesh mesh = turned_upright(read_mesh(options.mesh_path), options.up);
+  TriangleMesh mesh =
+      turned_upright(without_unused_vertices(read_mesh(options.mesh_path)), options.up);
   for (Vec3& v : mesh.vertices) v *= options.scale;
   if (options.fit) {
     mesh = fitted(std::move(mesh), working_volume(rig));
@@ -119,12 +122,29 @@ void write_truth_maps(const fs::path& folder, const Rig& rig, std::size_t c,
 
 Vec3 vector_of(const std::vector<double>& three) { return {three[0], three[1], three[2]}; }
 
+bool moves_within_exposure(const SimulateOptions& options) {
+  return !vector_of(options.speed_mm_s).isZero(0) || !vector_of(options.spin_deg_s).isZero(0);
+}
+
+/// InputError where another renderer cannot show what is asked for.
+void check_exports(const SimulateOptions& options, const Rig& rig) {
+  for (const auto& [option, is_given] : {std::pair("--export-povray", options.export_povray),
+                                         std::pair("--export-blender", options.export_blender)}) {
+    if (is_given && moves_within_exposure(options)) {
+      throw InputError(option, "", "",
+                       "must stand without --motion-mm-s and --spin-deg-s: in its scenes nothing "
+                       "moves while the shutter is open");
+    }
+  }
+  if (options.export_povray) check_povray_can_show(rig, options.surface, options.rig_path);
+  if (options.export_blender) check_blender_can_show(rig, options.surface, options.rig_path);
+}
+
 /// The light of --light; nothing without it. InputError where something is asked for that would
 /// have to be in it.
 std::optional<RenderedLight> rendered_light(const SimulateOptions& options, const Rig& rig) {
   if (options.light.empty()) return std::nullopt;
-  const auto moves = [](const std::vector<double>& speed) { return !vector_of(speed).isZero(0); };
-  if (moves(options.speed_mm_s) || moves(options.spin_deg_s)) {
+  if (moves_within_exposure(options)) {
     throw InputError("--light", "", options.light,
                      "must stand without --motion-mm-s and --spin-deg-s: light is as it was made");
   }
@@ -231,8 +251,7 @@ void run_simulate(SimulateOptions options) {
   warn_of_rig(rig);
   const TriangleMesh mesh = placed_mesh(options, rig);
   const std::optional<RenderedLight> light = rendered_light(options, rig);
-  if (options.export_povray) check_povray_can_show(rig, options.surface, options.rig_path);
-  if (options.export_blender) check_blender_can_show(rig, options.surface, options.rig_path);
+  check_exports(options, rig);
   check_output(options);
   const fs::path out = options.out;
   const PartialFolder making(out / kMakingFolder);

@@ -36,7 +36,7 @@ void write_list(std::ostream& out, const char* name, const Items& items, const P
   out << " }\n";
 }
 
-void write_object(std::ostream& out, const SimulatedObject& object) {
+void write_object(std::ostream& out, const SimulatedObject& object, double ambient) {
   const Reflectance& surface = object.surface();
   out << std::setprecision(9) << "mesh2 {\n";
   const auto print_vector = [&](const Vec3& v) { out << Vector{v}; };
@@ -57,8 +57,9 @@ void write_object(std::ostream& out, const SimulatedObject& object) {
   } else {
     out << "rgb 1";
   }
-  out << " }\n    finish { ambient 0 diffuse " << surface.albedo << " specular " << surface.specular
-      << " roughness " << surface.roughness << " }\n    matrix <";
+  out << " }\n    finish { ambient " << ambient * surface.albedo << " diffuse " << surface.albedo
+      << " specular " << surface.specular << " roughness " << surface.roughness
+      << " }\n    matrix <";
   for (Eigen::Index column = 0; column < 3; ++column) {  // POV-Ray multiplies rows from the left
     for (Eigen::Index row = 0; row < 3; ++row) out << pose.rotation(row, column) << ", ";
   }
@@ -156,7 +157,8 @@ void check_povray_can_show(const Rig& rig, const Reflectance& surface, const fs:
 
 void write_povray_scene(const fs::path& folder, const Rig& rig, const SimulatedObject& object,
                         const RenderOptions& options) {
-  write_atomically(folder / "mesh.inc", [&](std::ostream& out) { write_object(out, object); });
+  write_atomically(folder / "mesh.inc",
+                   [&](std::ostream& out) { write_object(out, object, options.ambient); });
   write_atomically(folder / "rig.inc", [&](std::ostream& out) { write_lights(out, rig, options); });
   for (const Camera& camera : rig.cameras) {
     write_atomically(folder / (camera.name + ".pov"),

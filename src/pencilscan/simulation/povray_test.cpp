@@ -25,11 +25,13 @@ TEST(WritePovrayScene, PovrayRendersTheSamePicture) {
   surface.specular = 0.2;
   surface.texture = {TextureKind::kStripes, 0.5, 60};
   const SimulatedObject object = ball_and_board(surface);
-  write_povray_scene(folder, rig, object);
+  RenderOptions options;
+  options.ambient = 0.05;
+  write_povray_scene(folder, rig, object, options);
   const std::string command = "cd '" + folder.string() + "' && povray cam0.ini > log.txt 2>&1";
   ASSERT_EQ(std::system(command.c_str()), 0) << "see " << folder;
   const cv::Mat theirs = read_image(folder / "cam0.png");
-  const cv::Mat ours = cv::min(render_camera(rig, 0, object, line_lights(rig)), 1.0);
+  const cv::Mat ours = cv::min(render_camera(rig, 0, object, line_lights(rig), options), 1.0);
   ASSERT_EQ(theirs.size(), ours.size());
   // All light per channel, then where it lies: POV-Ray takes 3 x 3 points a pixel, we integrate
   // lines, so single pixels at edges differ and means over 5 x 5 pixels hardly.
