@@ -424,6 +424,15 @@ TEST_F(Newcomer, WritesScenesForOtherRenderers) {
   expect_bad(simulate + "--export-povray --spin-deg-s 0 0 5 --out o", "without --motion-mm-s");
 }
 
+TEST_F(Newcomer, KeepsFilmsAndNamesThemAsTheyAre) {
+  const std::string film = "sequence export --result none ";
+  write("surface.zarr/.zgroup", "{\"zarr_format\":2}");
+  expect_bad(film + "--zarr surface.zarr", "--zarr = surface.zarr: is there already");
+  expect_bad(film + "--zarr surface.zarr --overwrite", "--result = none");
+  expect_bad(film + "--usd film.usdc", "--usd = film.usdc: must end with .usda or .usd");
+  expect_bad(film + "--usd film.USDA", "--result = none");
+}
+
 TEST_F(Newcomer, IsToldThatTheMemoryDoesNotSuffice) {
 #ifdef __SANITIZE_ADDRESS__
   GTEST_SKIP() << "the sanitizer itself takes more memory than the limit of this test";

@@ -203,7 +203,7 @@ class Scene:
                 "sequence", "finish", "--out", out], result="result"),
             Command(self, "sequence export", lambda inputs, out: [
                 "sequence", "export", "--result", f"{inputs}/result", "--zarr",
-                f"{out}/surface.zarr", "--usd", f"{out}/film.usda"], if_there("film.usda")),
+                f"{out}/surface.zarr", "--usd", f"{out}/film.usda"], if_there("surface.zarr")),
         ]
         chosen = {command.name: command for command in found if command.name in names}
         for command in chosen.values():

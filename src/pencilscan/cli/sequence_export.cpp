@@ -1,10 +1,13 @@
+#include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <system_error>
 
 #include "pencilscan/cli/arguments.h"
 #include "pencilscan/cli/command.h"
 #include "pencilscan/cli/sequence_jobs.h"
 #include "pencilscan/core/error.h"
+#include "pencilscan/core/lower_case.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/jobs/film.h"
 
@@ -25,7 +28,16 @@ void run_film_export(const FilmCommand& command) {
   const ThreadLimit threads(command.common.threads);
   if (command.zarr.empty() && command.usd.empty())
     throw InputError("command line", "--zarr, --usd", "", "at least one must be given");
-  if (!command.usd.empty()) refuse_existing("--usd", command.usd, command.overwrite);
+  std::error_code ignored;
+  if (!command.zarr.empty() && !std::filesystem::is_empty(command.zarr, ignored))
+    refuse_existing("--zarr", command.zarr, command.overwrite);
+  if (!command.usd.empty()) {
+    // Programs take .usdc for binary, .usdz for an archive, and refuse this text under such a name.
+    const std::string ending = lower_case(std::filesystem::path(command.usd).extension().string());
+    if (ending != ".usda" && ending != ".usd")
+      throw InputError("--usd", "", command.usd, "must end with .usda or .usd: it becomes text");
+    refuse_existing("--usd", command.usd, command.overwrite);
+  }
   const Film film = find_film(command.result, command.measured_only);
   nlohmann::ordered_json figures;
   figures["frames"] = film.frames.size();
@@ -56,7 +68,7 @@ void add_sequence_export(CLI::App& group) {
       ->capture_default_str();
   command->add_flag("--measured", options->measured_only,
                     "What was measured, without what closes the surface");
-  add_overwrite(*command, options->overwrite, "With --usd: replace a file that is there");
+  add_overwrite(*command, options->overwrite, "Replace files that are there");
   add_common_options(*command, options->common,
                      "pencilscan sequence export --result film --zarr surface.zarr");
   command->callback([options] { run_film_export(*options); });
