@@ -7,6 +7,7 @@
 #include "pencilscan/core/check.h"
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/formatted.h"
+#include "pencilscan/geometry/ray_scene.h"
 
 namespace pencilscan {
 namespace {
@@ -109,6 +110,17 @@ void check_scene(const Rig& rig, const TriangleMesh& mesh, const std::string& na
     for (const Vec3& vertex : mesh.vertices) {
       const auto pixel = camera.project(vertex);
       if (pixel && camera.contains(*pixel)) return;
+    }
+  }
+  // Of a wall, all vertices may lie out of view.
+  const RayScene rays(mesh);
+  constexpr int kAcross = 32;  // rays of a camera; chosen
+  for (const Camera& camera : rig.cameras) {
+    for (int j = 0; j <= kAcross; ++j) {
+      for (int i = 0; i <= kAcross; ++i) {
+        const Vec2 pixel(i * (camera.width - 1.0) / kAcross, j * (camera.height - 1.0) / kAcross);
+        if (rays.first_hit(camera.ray(pixel))) return;
+      }
     }
   }
   const BoundingBox box = bounding_box(mesh);

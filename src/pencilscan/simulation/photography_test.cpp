@@ -72,6 +72,13 @@ TEST_F(PhotographyTest, WhatMovesAlongTheEdgeOrNotAtAllKeepsIt) {
   for (std::size_t x = 0; x < still.size(); ++x) EXPECT_NEAR(along[x], still[x], 1e-3) << x;
 }
 
+TEST_F(PhotographyTest, AWallWithoutACornerInViewIsSeen) {
+  const TriangleMesh wall = make_box({10, 1e5, 1e5}, Vec3::Zero());
+  EXPECT_NO_THROW(check_scene(rig_, wall, "mesh", "rig"));
+  const TriangleMesh behind = make_box({10, 1e5, 1e5}, {2000, 0, 0});
+  EXPECT_THROW(check_scene(rig_, behind, "mesh", "rig"), InputError);
+}
+
 TEST_F(PhotographyTest, AWayOfThousandsOfPixelsIsRefused) {
   const auto moved_by = [&](double mm) {
     return through_exposure(make_box({1, 1, 1}, Vec3::Zero()), surface_, {},

@@ -114,6 +114,21 @@ TEST(CameraTruth, LineCoordinateIsTheProjectionThroughBothLenses) {
   EXPECT_GT(checked, 100);
 }
 
+/// Off its axis, the polynomial of a lens may turn back into the panel; its light does not.
+TEST(CameraTruth, NoLightBeyondWhereALensTurnsBack) {
+  Rig rig;
+  rig.cameras.push_back(small_camera({1000, 0, 0}));
+  rig.projectors.push_back(small_projector({1000, 0, 0}));
+  rig.projectors[0].distortion = {-2, 0, 0, 0, 0};  // turns back at 22 degrees
+  const SimulatedObject wall(make_box({10, 4000, 4000}, {-5, 0, 0}), flat_shading());
+  EXPECT_GT(cv::countNonZero(camera_truth(rig, 0, wall).projectors[0].lit), 1000);
+  rig.cameras[0].device_from_world = look_at({1000, 700, 0}, {0, 700, 0});
+  ASSERT_TRUE(rig.projectors[0].contains(*rig.projectors[0].project({0, 700, 0})));
+  EXPECT_EQ(cv::countNonZero(camera_truth(rig, 0, wall).projectors[0].lit), 0);
+  const std::vector<PanelLight> lights{uniform_light()};
+  EXPECT_EQ(cv::norm(render_camera(rig, 0, wall, lights), cv::NORM_INF), 0);
+}
+
 TEST(CameraTruth, ShadowOfABallOnABoardIsWhereTheSegmentMeetsTheBall) {
   Rig rig = pair_rig();
   constexpr double kRadius = 30;

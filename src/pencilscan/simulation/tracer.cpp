@@ -78,6 +78,20 @@ std::optional<SightedPoint> CameraTracer::trace(const Vec2& pixel) const {
   return sample;
 }
 
+std::optional<Vec2> panel_pixel(const Device& projector, const Vec3& x) {
+  if (!(x.z() > 0)) return std::nullopt;
+  const Vec2 pixel = projector.pixel_from_device(x);
+  if (!projector.contains(pixel)) return std::nullopt;
+  if (projector.has_distortion()) {
+    // The other direction of a pixel is tens of degrees off: a thousandth is far above what the
+    // inverse leaves and far below that.
+    constexpr double kSame = 1e-3;
+    const Vec2 direction = x.head<2>() / x.z();
+    if (!((projector.normalized_from_pixel(pixel) - direction).norm() < kSame)) return std::nullopt;
+  }
+  return pixel;
+}
+
 std::optional<Incidence> incidence(const Device& projector, const Vec3& center,
                                    const SightedPoint& sample) {
   Incidence light;
@@ -88,9 +102,9 @@ std::optional<Incidence> incidence(const Device& projector, const Vec3& center,
   light.cosine = light.to_light.dot(sample.normal);
   if (light.cosine <= 0) return std::nullopt;
   const Vec3 x = projector.device_from_world * sample.point;
-  if (!(x.z() > 0)) return std::nullopt;
-  light.pixel = projector.pixel_from_device(x);
-  if (!projector.contains(light.pixel)) return std::nullopt;
+  const auto pixel = panel_pixel(projector, x);
+  if (!pixel) return std::nullopt;
+  light.pixel = *pixel;
   const Mat3& R = projector.device_from_world.rotation;
   for (Eigen::Index axis = 0; axis < 2; ++axis) {
     const Vec3 gradient =

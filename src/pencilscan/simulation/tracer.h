@@ -45,6 +45,11 @@ class CameraTracer {
   std::vector<std::uint8_t> tiles_;
 };
 
+/// Where a projector's panel lights a point, in its own frame. Nothing behind it, outside of its
+/// panel, and beyond where the polynomial of its lens turns back: no lens shows a place of the
+/// panel in two directions.
+[[nodiscard]] std::optional<Vec2> panel_pixel(const Device& projector, const Vec3& x_in_projector);
+
 /// Light of one projector at a surface sample, before the test for shadows.
 struct Incidence {
   Vec2 pixel;           ///< on the panel

@@ -15,8 +15,8 @@ void fill_projector(const Projector& projector, const Vec3& center, const Simula
                     const SightedPoint& sample, int x, int y, ProjectorTruth& truth) {
   truth.cosine.at<float>(y, x) =
       static_cast<float>((center - sample.point).normalized().dot(sample.face_normal));
-  const auto pixel = projector.project(sample.point);
-  if (!pixel || !projector.contains(*pixel)) return;
+  const auto pixel = panel_pixel(projector, projector.device_from_world * sample.point);
+  if (!pixel) return;
   for (std::size_t i = 0; i < projector.patterns.size(); ++i) {
     const LinePattern& pattern = projector.patterns[i];
     truth.line[i].at<double>(y, x) =
