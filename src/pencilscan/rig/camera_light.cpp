@@ -1,11 +1,13 @@
 #include "pencilscan/rig/camera_light.h"
 
+#include <cstdint>
 #include <opencv2/imgproc.hpp>
 #include <optional>
 #include <string>
 
 #include "pencilscan/core/check.h"
 #include "pencilscan/core/error.h"
+#include "pencilscan/core/formatted.h"
 #include "pencilscan/io/image.h"
 #include "pencilscan/io/linear_light.h"
 
@@ -18,6 +20,18 @@ void check_size(const Camera& camera, int width, int height, const std::filesyst
                    std::to_string(width) + "x" + std::to_string(height),
                    "must be " + std::to_string(camera.width) + "x" + std::to_string(camera.height) +
                        " as camera " + camera.name + " of the rig");
+}
+
+/// Of integers the type says what the top of the range is.
+void check_range(const cv::Mat& image, const std::filesystem::path& path) {
+  if (image.depth() != CV_32F) return;
+  constexpr int kFew = 100;  // one in so many: more are no glints of a renderer's light
+  const cv::Mat values = image.reshape(1);
+  if (cv::countNonZero(values > 1) * static_cast<std::int64_t>(kFew) <=
+      static_cast<std::int64_t>(values.total()))
+    return;
+  throw InputError(path.string(), "greatest value", formatted(greatest_value(image), "%g"),
+                   "must be at most 1, in a picture of floating point");
 }
 
 }  // namespace
@@ -33,6 +47,7 @@ cv::Mat read_camera_image(const Camera& camera, const std::filesystem::path& pat
   cv::Mat image = read_stored_image(path);
   check_channels(camera, image.channels(), path);
   check_size(camera, image.cols, image.rows, path);
+  check_range(image, path);
   return image;
 }
 

@@ -12,7 +12,7 @@ namespace pencilscan {
 /// InputError, named by `path`, when an image of a camera with a mosaic has three channels.
 void check_channels(const Camera& camera, int channels, const std::filesystem::path& path);
 /// The image of a file as read_stored_image() has it; InputError when it has other channels or
-/// another size than the camera.
+/// another size than the camera, or is of floating point and more than 1 % of it are above 1.
 [[nodiscard]] cv::Mat read_camera_image(const Camera& camera, const std::filesystem::path& path);
 
 /// InputError where read_camera_image() would have one, without decoding what is sound by its

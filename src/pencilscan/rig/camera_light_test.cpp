@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include "pencilscan/core/error.h"
 #include "pencilscan/io/image.h"
+#include "pencilscan/io/temporary_folder.h"
 #include "pencilscan/rig/sample_devices.h"
 
 namespace pencilscan {
@@ -36,6 +38,22 @@ TEST_P(StoredImages, AreLightLikeTheirValues) {
 
 INSTANTIATE_TEST_SUITE_P(Types, StoredImages,
                          testing::Values(CV_8UC3, CV_16UC3, CV_8UC1, CV_16UC1));
+
+/// Light of another renderer may have glints; values up to 255 are no light in [0, 1].
+TEST(PicturesOfFloatingPoint, HaveValuesUpToOne) {
+  const TemporaryFolder folder("float_pictures");
+  Camera camera;
+  camera.width = 40;
+  camera.height = 30;
+  const std::filesystem::path path = folder.path() / "cam0.tiff";
+  cv::Mat picture(camera.height, camera.width, CV_32FC3, cv::Scalar::all(0.4));
+  picture.at<cv::Vec3f>(3, 4) = {3, 3, 3};
+  write_image(path, picture);
+  EXPECT_NO_THROW(check_camera_image(camera, path));
+  write_image(path, cv::Mat(255 * picture));
+  EXPECT_THROW(check_camera_image(camera, path), InputError);
+  EXPECT_THROW((void)read_camera_image(camera, path), InputError);
+}
 
 }  // namespace
 }  // namespace pencilscan
