@@ -18,6 +18,8 @@ const char* to_string(WarningCode code) {
       return "colors-filled-in";
     case WarningCode::kGamma:
       return "gamma";
+    case WarningCode::kBlackLevel:
+      return "black-level";
     case WarningCode::kRigIsOff:
       return "rig-is-off";
     case WarningCode::kDeviceIsOff:

@@ -8,15 +8,16 @@ namespace pencilscan {
 
 /// What a warning is about; programs act on this, never on the text.
 enum class WarningCode {
-  kColorsMix,       ///< colours of different projectors cannot be told apart
+  kColorsMix,       ///< colours of projectors cannot be told apart from each other, or of one
   kNoPicture,       ///< of a camera
   kWrongPicture,    ///< it was left out (pipeline/picture_check.h)
   kNoLines,         ///< a camera's picture shows none
   kSaturated,       ///< figure "share": of a camera's pixels
   kColorsFilledIn,  ///< pictures went through a mosaic and an interpolation
   kGamma,           ///< pictures are not coded as the rig says; figure "gamma" of the first camera
-  kRigIsOff,        ///< figures "median_px", "expected_px": how crossing lines miss each other
-  kDeviceIsOff,     ///< the same of one device's crossings, the others' meet
+  kBlackLevel,   ///< figure "median": of the first camera's values, below the black that is stated
+  kRigIsOff,     ///< figures "median_px", "expected_px": how crossing lines miss each other
+  kDeviceIsOff,  ///< the same of one device's crossings, the others' meet
   kPointsLeftOut,   ///< coordinates are not finite or absurd
   kTooFewPoints,    ///< for a surface
   kUnsupported,     ///< hardly any point has another curve beside it

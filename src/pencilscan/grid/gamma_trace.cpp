@@ -115,7 +115,7 @@ std::optional<Sum> sum_at(const GridGraph& graph, const NextCrossings& next, con
 
 }  // namespace
 
-std::optional<GammaTrace> gamma_at_crossings(const GridGraph& graph, const cv::Mat& values) {
+std::vector<double> log_gammas_at_crossings(const GridGraph& graph, const cv::Mat& values) {
   const NextCrossings next(graph);
   std::vector<double> logs;
   for (const Crossing& x : graph.crossings) {
@@ -123,6 +123,10 @@ std::optional<GammaTrace> gamma_at_crossings(const GridGraph& graph, const cv::M
     const auto gamma = sum ? gamma_of(*sum) : std::nullopt;
     if (gamma) logs.push_back(std::log(*gamma));
   }
+  return logs;
+}
+
+std::optional<GammaTrace> gamma_of_crossings(const std::vector<double>& logs) {
   if (logs.size() < kLeastCrossings) return std::nullopt;
   const double middle = upper_median(logs);
   std::vector<double> off;

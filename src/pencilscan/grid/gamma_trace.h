@@ -2,6 +2,7 @@
 
 #include <opencv2/core.hpp>
 #include <optional>
+#include <vector>
 
 #include "pencilscan/grid/grid_graph.h"
 
@@ -15,9 +16,11 @@ struct GammaTrace {
 };
 
 /// Light of two projectors adds where their lines cross: with light L = v^gamma, L at the crossing
-/// and off both lines are together what they are on either line beside it. `values`: CV_32FC3. The
-/// median over crossings; nothing where too few say it.
-[[nodiscard]] std::optional<GammaTrace> gamma_at_crossings(const GridGraph& graph,
-                                                           const cv::Mat& values);
+/// and off both lines are together what they are on either line beside it. `values`: CV_32FC3.
+/// Result: log(gamma) of every crossing that says one.
+[[nodiscard]] std::vector<double> log_gammas_at_crossings(const GridGraph& graph,
+                                                          const cv::Mat& values);
+/// Their median; nothing where they are too few.
+[[nodiscard]] std::optional<GammaTrace> gamma_of_crossings(const std::vector<double>& logs);
 
 }  // namespace pencilscan

@@ -63,6 +63,7 @@ std::optional<Rig> label_lines(const Rig& rig, const Frame& frame, const PointOp
   result.crossings = naming.crossings;
   result.device_crossings = std::move(naming.device_crossings);
   result.rig_in_frame = naming.rig_in_frame;
+  if (naming.color_warning) result.warnings.push_back(std::move(*naming.color_warning));
   if (naming.warning) {
     result.warnings.push_back(std::move(*naming.warning));
   } else if (std::optional<Warning> warning = device_warning(rig, result.device_crossings)) {

@@ -74,18 +74,29 @@ std::optional<Warning> gamma_warning(const Rig& rig, const Frame& frame,
   // Of colours that a mosaic or a JPEG leaves out: these look like a factor of up to 1.4.
   constexpr double kOfFilledIn = 1.5;
   constexpr double kDeviations = 4;  // of the median of all crossings
-  std::vector<double> gammas(rig.cameras.size(), 0);
+  std::vector<std::vector<double>> logs(rig.cameras.size());
   parallel_for(rig.cameras.size(), [&](std::size_t c) {
+    if (!graphs[c].crossings.empty())
+      logs[c] = log_gammas_at_crossings(graphs[c], linear_light(rig.cameras[c], frame.images[c]));
+  });
+  // Cameras with too few crossings that say something say it together.
+  std::vector<double> of_few;
+  for (const auto& of_camera : logs)
+    if (!gamma_of_crossings(of_camera))
+      of_few.insert(of_few.end(), of_camera.begin(), of_camera.end());
+  std::vector<double> gammas(rig.cameras.size(), 0);
+  for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
+    if (logs[c].empty()) continue;
+    auto trace = gamma_of_crossings(logs[c]);
+    if (!trace) trace = gamma_of_crossings(of_few);
+    if (!trace) continue;
     const Camera& camera = rig.cameras[c];
-    if (graphs[c].crossings.empty()) return;
-    const auto trace = gamma_at_crossings(graphs[c], linear_light(camera, frame.images[c]));
-    if (!trace) return;
     const double off = std::abs(std::log(trace->gamma));
     const double worth_saying =
         detections[c].is_filled_in || camera.mosaic ? kOfFilledIn : kWorthSaying;
     if (off > std::log(worth_saying) && off > kDeviations * trace->deviation)
       gammas[c] = camera.gamma * trace->gamma;
-  });
+  }
   std::string names;
   double first = 0;
   for (std::size_t c = 0; c < gammas.size(); ++c) {
@@ -99,6 +110,14 @@ std::optional<Warning> gamma_warning(const Rig& rig, const Frame& frame,
                      names + "; state it as \"gamma\" of these cameras, or switch it off there",
                  {},
                  {{"gamma", first}}};
+}
+
+Warning alike_warning(const std::string& projectors) {
+  return {WarningCode::kColorsMix,
+          "the lines of " + projectors +
+              " are all seen in one colour, and are named by their crossings alone: the object "
+              "hardly gives back what tells their colours apart, or the projector or the camera "
+              "lacks it; other colours in the pattern find more lines"};
 }
 
 Warning naming_warning(const std::string& doubt) {

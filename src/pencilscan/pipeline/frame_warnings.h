@@ -26,6 +26,8 @@ namespace pencilscan {
                                                    std::span<const CameraDetection> detections,
                                                    std::span<const GridGraph> graphs);
 
+/// `projectors`: of NamingDoubt::alike().
+[[nodiscard]] Warning alike_warning(const std::string& projectors);
 /// Crossings miss each other by more than noise; what was done about it.
 /// Of NamingDoubt::text().
 [[nodiscard]] Warning naming_warning(const std::string& doubt);

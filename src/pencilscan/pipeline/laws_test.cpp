@@ -10,7 +10,11 @@
 
 #include "pencilscan/core/median.h"
 #include "pencilscan/geometry/ray_scene.h"
+#include "pencilscan/grid/gamma_trace.h"
 #include "pencilscan/pipeline/frame.h"
+#include "pencilscan/pipeline/frame_warnings.h"
+#include "pencilscan/pipeline/sensor_frame.h"
+#include "pencilscan/rig/camera_light.h"
 #include "pencilscan/rig/sample_devices.h"
 #include "pencilscan/simulation/panel_light.h"
 #include "pencilscan/simulation/render.h"
@@ -194,6 +198,59 @@ TEST_F(Laws, AGammaThatIsNotStatedIsNamed) {
   EXPECT_EQ(gamma_named(measure_points(with_gamma(*rig_), coded(*frame_))), 0);
   EXPECT_NEAR(gamma_named(measure_points(*rig_, coded(*frame_))), kGamma, 0.3);
   EXPECT_NEAR(gamma_named(measure_points(with_gamma(*rig_), *frame_)), 1, 0.15);
+}
+
+/// Where crossings are few in each camera, all cameras' tell the gamma.
+TEST_F(Laws, AGammaIsNamedByFewCrossingsOfManyCameras) {
+  constexpr std::size_t kOfEach = 60;  // not all of them say something
+  for (const bool is_coded : {true, false}) {
+    const Frame frame = is_coded ? coded(*frame_) : *frame_;
+    const PointResult points = measure_points(*rig_, frame);
+    std::vector<GridGraph> graphs = points.graphs;
+    std::size_t sum = 0;
+    for (std::size_t c = 0; c < graphs.size(); ++c) {
+      graphs[c].crossings.resize(std::min(kOfEach, graphs[c].crossings.size()));
+      const auto logs =
+          log_gammas_at_crossings(graphs[c], linear_light(rig_->cameras[c], frame.images[c]));
+      ASSERT_FALSE(gamma_of_crossings(logs));
+      sum += logs.size();
+    }
+    ASSERT_GE(sum, 50U);
+    const auto warning = gamma_warning(*rig_, frame, points.detections, graphs);
+    EXPECT_EQ(warning.has_value(), is_coded);
+    if (warning) {
+      EXPECT_NEAR(warning->figures.front().second, kGamma, 0.3);
+    }
+  }
+}
+
+TEST_F(Laws, ABlackLevelAboveThePictureIsNamed) {
+  const auto warned = [](const Rig& rig, const Frame& frame) {
+    const SensorFrame sensor = sensor_frame(rig, frame);
+    const auto& notes = sensor.frame.notes;
+    return std::any_of(notes.begin(), notes.end(),
+                       [](const Warning& w) { return w.code == WarningCode::kBlackLevel; });
+  };
+  const auto with_black = [](double level) {
+    Rig rig = *rig_;
+    for (Camera& camera : rig.cameras) camera.black_level = level;
+    return rig;
+  };
+  constexpr int kBlack = 240;  // of 12 bits
+  constexpr double kNoise = 100;
+  Frame stored = *frame_;
+  for (cv::Mat& image : stored.images) {
+    image.convertTo(image, CV_32F, 4095 - kBlack, kBlack);
+    cv::Mat noise(image.size(), image.type());
+    cv::RNG random(5);
+    random.fill(noise, cv::RNG::NORMAL, 0, kNoise);
+    cv::Mat noisy = cv::min(image + noise, 4095);
+    noisy.convertTo(image, CV_16U);
+  }
+  EXPECT_FALSE(warned(*rig_, stored));
+  EXPECT_FALSE(warned(with_black(kBlack / 65535.), stored));
+  EXPECT_TRUE(warned(with_black(kBlack / 4095.), stored)) << "of 12 bits, which are the low ones";
+  EXPECT_TRUE(warned(with_black(2 * kBlack / 65535.), stored));
 }
 
 /// What a gamma was put on and taken off again is the same light, in every stage.

@@ -65,6 +65,8 @@ LineNaming name_lines(const Rig& rig, const std::vector<ColorFamily>& families,
   const auto points = static_cast<double>(labelled_points(result.labeling));
   if (!are_enough(result.crossings)) return result;
   const NamingDoubt doubt = doubt_of(rig, families, graphs, result.labeling);
+  if (const std::string projectors = doubt.alike(); !projectors.empty())
+    result.color_warning = alike_warning(projectors);
   const bool is_wrong = is_off || !doubt.denied().empty();
   // Where a projector stands far off, a frame alone keeps the points of the others, and says so.
   if (const std::string text = doubt.of_projectors(); !text.empty())

@@ -16,6 +16,7 @@ struct LineNaming {
   std::vector<CrossingDisagreement> device_crossings;  ///< the same; empty without crossings
   RigInFrame rig_in_frame = RigInFrame::kAsGiven;
   std::optional<Warning> warning;
+  std::optional<Warning> color_warning;  ///< the colours of lines do not tell them apart
 };
 
 /// The curve points of a picture that a right one, with a right rig, could have named: what nothing

@@ -23,6 +23,8 @@ class NamingDoubt {
   /// Projectors, and cameras, whose lines have the colours of others than the ones named; empty:
   /// none.
   [[nodiscard]] std::string denied() const { return colors_.denied(); }
+  /// Projectors whose lines are of several colours and all look alike; empty: none.
+  [[nodiscard]] std::string alike() const { return colors_.alike(); }
   /// In plain words, projectors most of what is drawn in whose colours has no name, and devices
   /// that colours deny; empty: none.
   [[nodiscard]] std::string of_projectors() const;

@@ -8,9 +8,12 @@
 #include <utility>
 #include <vector>
 
+#include "pencilscan/core/formatted.h"
+#include "pencilscan/core/median.h"
 #include "pencilscan/core/name_list.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/detection/mosaic_trace.h"
+#include "pencilscan/io/image.h"
 #include "pencilscan/rig/camera_light.h"
 
 namespace pencilscan {
@@ -58,10 +61,55 @@ void fill_range(Rig& rig, Frame& frame) {
   }
 }
 
+/// The median of a picture's values, from 0 to 1, where most of them lie below the black that the
+/// rig states. Noise is as often above the right black as below it, however strong it is.
+std::optional<double> median_below_black(const Camera& camera, const cv::Mat& stored,
+                                         double range) {
+  // Chosen: 2.5 steps of 8 bits, more than black is rounded or drifts by.
+  constexpr double kMargin = 0.01;
+  if (stored.empty() || camera.black_level == 0) return std::nullopt;
+  constexpr int kRows = 8;  // every eighth row tells as much
+  std::vector<float> values;
+  for (int y = 0; y < stored.rows; y += kRows) {
+    const cv::Mat row = unit_values(stored.row(y)).reshape(1);
+    values.insert(values.end(), row.begin<float>(), row.end<float>());
+  }
+  const double median = static_cast<double>(upper_median(std::move(values)));
+  if (median >= camera.black_level - kMargin * range) return std::nullopt;
+  return median;
+}
+
+/// `frame` as it was read.
+std::optional<Warning> black_level_warning(const Rig& rig, const Frame& frame) {
+  const double range = range_of(frame.images);
+  std::string names;
+  double first = 0;
+  for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
+    const auto median = median_below_black(rig.cameras[c], frame.images[c], range);
+    if (!median) continue;
+    if (names.empty()) first = *median;
+    add_name(names,
+             rig.cameras[c].name + formatted(*median, " (median %.4f") +
+                 formatted(rig.cameras[c].black_level, ", stated %.4f)"),
+             ", ");
+  }
+  if (names.empty()) return std::nullopt;
+  return Warning{WarningCode::kBlackLevel,
+                 "most of the picture lies below the black level that the rig states, and light "
+                 "below it is lost: " +
+                     names +
+                     "; state the value that is stored where there is no light, over 255 of 8 bits "
+                     "and over 65535 of 16, also where the sensor has fewer",
+                 {},
+                 {{"median", first}}};
+}
+
 }  // namespace
 
 SensorFrame sensor_frame(Rig rig, Frame frame) {
   SensorFrame result{std::move(rig), std::move(frame)};
+  if (std::optional<Warning> warning = black_level_warning(result.rig, result.frame))
+    result.frame.notes.push_back(std::move(*warning));
   fill_range(result.rig, result.frame);
   std::vector<Camera>& cameras = result.rig.cameras;
   std::vector<std::optional<Mosaic>> mosaics(cameras.size());

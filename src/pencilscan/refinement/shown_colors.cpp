@@ -33,13 +33,18 @@ SeenColor seen_color(const float* code, int colors) {
   return seen;
 }
 
+/// Share of a pattern's lines that have each symbol.
+std::vector<double> symbol_shares(const LinePattern& lines) {
+  std::vector<double> shares(static_cast<std::size_t>(lines.alphabet), 0);
+  for (int line = 0; line < lines.period(); ++line)
+    shares[static_cast<std::size_t>(lines.symbol(line))] += 1.0 / lines.period();
+  return shares;
+}
+
 /// Share of a pattern's lines that have the colour of a line by chance.
 double chance_of(const LinePattern& lines) {
-  std::vector<double> of_symbol(static_cast<std::size_t>(lines.alphabet), 0);
-  for (int line = 0; line < lines.period(); ++line)
-    of_symbol[static_cast<std::size_t>(lines.symbol(line))] += 1.0 / lines.period();
   double chance = 0;
-  for (const double share : of_symbol) chance += share * share;
+  for (const double share : symbol_shares(lines)) chance += share * share;
   return chance;
 }
 
@@ -50,7 +55,7 @@ ShownColorCount::ShownColorCount(const Rig& rig) : rig_(&rig), seen_(rig.cameras
     for (std::size_t k = 0; k < rig.projectors[p].patterns.size(); ++k) {
       const PatternRef ref{static_cast<int>(p), static_cast<int>(k)};
       const auto shifts = static_cast<std::size_t>(2 * reach_of(pattern(ref)) + 1);
-      counts_.push_back({ref, chance_of(pattern(ref)), 0, 0, std::vector<double>(shifts, 0)});
+      counts_.push_back({ref, chance_of(pattern(ref)), 0, 0, std::vector<double>(shifts, 0), {}});
     }
   }
 }
@@ -76,11 +81,13 @@ void ShownColorCount::add(const std::vector<ColorFamily>& families,
       const double chance = count->chance;
       Seen& in_camera = seen_[static_cast<std::size_t>(graph.camera)];
       ++count->runs;
+      count->seen.resize(family.colors.size(), 0);
       if (chance < 1) ++in_camera.runs;
       for (int i = run.begin; i < run.end; ++i) {
         const SeenColor seen =
             seen_color(curve.code.data() + static_cast<std::ptrdiff_t>(i) * colors, colors);
         count->weight += seen.weight;
+        count->seen[static_cast<std::size_t>(seen.color)] += seen.weight;
         for (int shift = -reach; shift <= reach; ++shift) {
           // Lines before the first one are those of the period before.
           const int id = (run.label.line + shift + lines.period() * kFarthest) % lines.period();
@@ -102,11 +109,14 @@ std::vector<ShownColors> ShownColorCount::shown() const {
   for (const Count& count : counts_) {
     const LinePattern& lines = pattern(count.ref);
     const int reach = reach_of(lines);
+    const std::vector<double> shares = symbol_shares(lines);
     ShownColors& shown = result.emplace_back();
     shown.pattern = count.ref;
     shown.runs = count.runs;
     if (!(count.weight > 0)) continue;  // no colour tells
     shown.chance = count.chance;
+    shown.one_color = *std::max_element(count.seen.begin(), count.seen.end()) / count.weight;
+    shown.most_lines = *std::max_element(shares.begin(), shares.end());
     const auto share_at = [&](int shift) {
       return count.agree[static_cast<std::size_t>(shift + reach)] / count.weight;
     };
@@ -132,6 +142,16 @@ std::vector<ShownColors> ShownColorCount::seen() const {
     shown.share = shown.shifted_share = camera.agree / camera.weight;
   }
   return result;
+}
+
+std::string ShownColorCount::alike() const {
+  std::string names;
+  for (const ShownColors& of_pattern : shown()) {
+    if (of_pattern.all_look_alike())
+      add_name(names,
+               rig_->projectors[static_cast<std::size_t>(of_pattern.pattern.projector)].name);
+  }
+  return names;
 }
 
 std::string ShownColorCount::denied() const {

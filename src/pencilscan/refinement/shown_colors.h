@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <span>
 #include <string>
 #include <vector>
@@ -20,7 +21,14 @@ struct ShownColors {
   double share = 0;      ///< of the points, by what their colours tell: they have their line's
   int shift = 0;         ///< if all lines were named so much further, most would agree
   double shifted_share = 0;
+  double one_color = 0;   ///< share of the points that have the colour that most of them have
+  double most_lines = 1;  ///< share of the pattern's lines that have the commonest colour
 
+  /// Lines are of several colours and are all seen in one: their colours say nothing of names. So
+  /// it is where an object gives back only what these colours have in common.
+  [[nodiscard]] bool all_look_alike() const {
+    return runs >= 30 && chance < 1 && one_color > std::max(0.9, 0.5 * (most_lines + 1));
+  }
   /// Half of what lies between chance and certainty. Right names have .9 and more, names a few
   /// lines off what chance gives; in between lie patterns of which some places are named wrong.
   [[nodiscard]] bool deny() const { return tell() && share < 0.5 * (chance + 1); }
@@ -32,7 +40,7 @@ struct ShownColors {
  private:
   /// Stretches are of many lines then: by chance two colours agree in 3 of 4 of 30 lines once in
   /// 300 times.
-  [[nodiscard]] bool tell() const { return runs >= 30 && chance < 1; }
+  [[nodiscard]] bool tell() const { return runs >= 30 && chance < 1 && !all_look_alike(); }
 };
 
 /// Counts over frames. Shifts are looked for up to half a period of the code, beyond which they
@@ -49,6 +57,8 @@ class ShownColorCount {
   [[nodiscard]] std::vector<ShownColors> seen() const;
   /// Names of the projectors and cameras that these deny; empty: none.
   [[nodiscard]] std::string denied() const;
+  /// Names of the projectors whose lines all look alike.
+  [[nodiscard]] std::string alike() const;
 
  private:
   struct Count {
@@ -57,6 +67,7 @@ class ShownColorCount {
     std::size_t runs = 0;
     double weight = 0;
     std::vector<double> agree;  ///< per shift, from -reach
+    std::vector<double> seen;   ///< weight per colour of the family
   };
   [[nodiscard]] const LinePattern& pattern(PatternRef ref) const;
 

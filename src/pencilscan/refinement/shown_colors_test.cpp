@@ -19,6 +19,10 @@ class ShownColorsTest : public ::testing::Test {
     std::vector<GridGraph> graphs;
     for (const int camera : {0, 1}) {
       graphs.push_back(scene.graph(camera, 60, 0.02, 3));
+      if (seen_in_one_color_) {
+        for (Curve& curve : graphs.back().curves)
+          for (std::size_t k = 0; k < curve.code.size(); ++k) curve.code[k] = k % 2 == 0 ? 0 : -5;
+      }
       const GridGraph& graph = graphs.back();
       std::vector<LabeledRun>& runs = labeling.runs.emplace_back();
       for (std::size_t i = 0; i < graph.curves.size(); ++i) {
@@ -34,6 +38,7 @@ class ShownColorsTest : public ::testing::Test {
     count.add(scene.families, graphs, labeling);
     return count.shown();
   }
+  bool seen_in_one_color_ = false;
   virtual void change(TwoProjectorScene& /*scene*/) {}
 };
 
@@ -56,6 +61,19 @@ TEST_F(ShownColorsTest, NamesThatAreLinesOffAreDeniedAndTheWayBackIsFound) {
   }
   // Half a period: the way back is one of two.
   EXPECT_EQ(std::abs(shown_with({4, 0})[0].better_shift()), 4);
+}
+
+TEST_F(ShownColorsTest, LinesThatAllLookAlikeSayNothingOfTheirNames) {
+  for (const ShownColors& shown : shown_with({0, 0})) EXPECT_FALSE(shown.all_look_alike());
+  for (const ShownColors& shown : shown_with({0, 3})) EXPECT_FALSE(shown.all_look_alike());
+  seen_in_one_color_ = true;
+  for (const int off : {0, 3}) {
+    for (const ShownColors& shown : shown_with({0, off})) {
+      EXPECT_TRUE(shown.all_look_alike()) << off;
+      EXPECT_FALSE(shown.deny()) << off;
+      EXPECT_EQ(shown.better_shift(), 0) << off;
+    }
+  }
 }
 
 class ColorsThatDoNotTell : public ShownColorsTest {
