@@ -24,6 +24,9 @@ class InputError(ValueError):
         place = " = ".join(part for part in (field, value) if part)
         super().__init__(": ".join(part for part in (file, place, rule) if part))
 
+    def __reduce__(self):
+        return InputError, (self.file, self.field, self.value, self.rule)
+
 
 class StageError(RuntimeError):
     """A stage that could not produce its result: no line was found, the disk is full."""

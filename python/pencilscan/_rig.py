@@ -13,6 +13,14 @@ from ._errors import InputError
 PathLike = Union[str, "os.PathLike[str]"]
 
 
+def path_of(path: PathLike) -> bytes:
+    """A path as the system takes it: its text need not be UTF-8."""
+    name = os.fsencode(path)
+    if b"\0" in name:
+        raise InputError(os.fsdecode(name), "", "", "must be a path: without a zero byte")
+    return name
+
+
 class Rig:
     """All cameras and projectors with their patterns: rig.json as a value.
 
@@ -24,7 +32,7 @@ class Rig:
         if isinstance(rig, dict):
             self._core = _core.Rig(json.dumps(rig), "rig")
         else:
-            self._core = _core.read_rig(os.fspath(rig))
+            self._core = _core.read_rig(path_of(rig))
 
     @classmethod
     def _of(cls, core: Any) -> "Rig":
@@ -54,7 +62,7 @@ class Rig:
 
     def write(self, path: PathLike) -> None:
         """Writes rig.json, whole or not at all; replaces a file that is there."""
-        self._core.write(os.fspath(path))
+        self._core.write(path_of(path))
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Rig) and self._core.text() == other._core.text()
@@ -66,7 +74,7 @@ class Rig:
 
     def __repr__(self) -> str:
         return (
-            f"<pencilscan.Rig: {len(self.cameras)} cameras, {len(self.projectors)} projectors>"
+            f"<pencilscan.{type(self).__name__}: {len(self.cameras)} cameras, {len(self.projectors)} projectors>"
         )
 
 
@@ -94,12 +102,17 @@ def as_pictures(rig: Rig, images: Any, argument: str = "images") -> _core.Pictur
                 argument, "length", str(len(images)), f"must be {len(names)}, the rig's cameras"
             )
         images = dict(zip(names, images))
-    return _core.Pictures({name: image for name, image in images.items() if image is not None})
+    for name in images:
+        if not isinstance(name, str):
+            raise InputError(argument, "camera", repr(name), "must be the name of a camera")
+    return _core.Pictures(
+        {name: image for name, image in images.items() if image is not None}
+    )
 
 
 def read_rig(path: PathLike) -> Rig:
     """Reads rig.json. InputError names file, field, value and rule of what is wrong in it."""
-    return Rig._of(_core.read_rig(os.fspath(path)))
+    return Rig._of(_core.read_rig(path_of(path)))
 
 
 def ring(
@@ -162,7 +175,8 @@ def ring(
     require(pitch_px > 0, "pitch_px", pitch_px, "must be > 0")
     require(0 < line_width_px <= pitch_px, "line_width_px", line_width_px,
             "must be in (0, pitch_px]")
-    require(len(colors) > 0, "colors", colors, "must have at least one list of colours")
+    require(len(colors) > 0 and all(not isinstance(of_one, str) and len(of_one) > 0 for of_one in colors),
+            "colors", colors, "must be one or more lists of at least one colour")
     longest = max(len(entry) for entry in colors)
     require(1 <= order <= 20 and longest**order <= 2**20, "order", order,
             "must be 1 to 20, and colours^order <= 2^20")

@@ -10,7 +10,7 @@ import numpy as np
 
 from . import _core
 from ._errors import InputError, StageError
-from ._rig import PathLike, Rig, as_pictures, as_rig
+from ._rig import PathLike, Rig, as_pictures, as_rig, path_of
 
 Progress = Callable[[str, float], Optional[bool]]
 MeshLike = Union["Mesh", PathLike, tuple, Any]
@@ -99,7 +99,7 @@ class Mesh:
         Where the unit is unknown, the numbers are those of the mesh in all of them, and the file
         says so.
         """
-        self._core.write(os.fspath(path), self.unit_known)
+        self._core.write(path_of(path), self.unit_known)
 
     def __repr__(self) -> str:
         return f"<pencilscan.Mesh: {len(self.vertices)} vertices, {len(self.faces)} faces>"
@@ -116,19 +116,19 @@ def _whole(faces: Any) -> np.ndarray:
 
 def _check_range(name: str, value: int, last: int) -> None:
     """InputError unless 0 <= value <= last, before the library says it in terms of its own."""
-    if not 0 <= value <= last:
+    if not isinstance(value, (int, np.integer)) or not 0 <= value <= last:
         raise InputError("options", name, str(value), f"must be a whole number from 0 to {last}")
 
 
 def read_mesh(path: PathLike) -> Mesh:
     """Reads PLY (with sigma, confidence, hole and colour), OBJ, STL or OFF, in mm."""
-    return Mesh._of(_core.read_mesh(os.fspath(path)))
+    return Mesh._of(_core.read_mesh(path_of(path)))
 
 
 def make_sphere(radius_mm: float, rings: int = 32) -> Mesh:
     """A closed sphere around the origin."""
-    if not radius_mm > 0:
-        raise InputError("make_sphere", "radius_mm", str(radius_mm), "must be > 0")
+    if not 0 < radius_mm < np.inf:
+        raise InputError("make_sphere", "radius_mm", str(radius_mm), "must be > 0 and finite")
     if rings < 3:
         raise InputError("make_sphere", "rings", str(rings), "must be >= 3")
     return Mesh._of(_core.make_sphere(radius_mm, rings))
@@ -137,7 +137,7 @@ def make_sphere(radius_mm: float, rings: int = 32) -> Mesh:
 def _as_mesh(mesh: MeshLike) -> Mesh:
     if isinstance(mesh, Mesh):
         return mesh
-    if isinstance(mesh, (str, os.PathLike)):
+    if isinstance(mesh, (str, bytes, os.PathLike)):
         return read_mesh(mesh)
     if isinstance(mesh, tuple) and len(mesh) == 2:
         return Mesh(*mesh)
@@ -157,7 +157,9 @@ class _Table:
         self._arrays = arrays
 
     def __getattr__(self, name: str) -> np.ndarray:
-        if name.startswith("_") or name not in self._arrays:
+        if name.startswith("_"):  # copies ask for some before there are arrays
+            raise AttributeError(f"no property {name}")
+        if name not in self._arrays:
             raise AttributeError(f"no property {name}; there are {', '.join(self.names)}")
         return self._arrays[name]
 
@@ -323,7 +325,7 @@ class Result:
 
     def write(self, folder: PathLike) -> None:
         """points.ply, curves.ply, report.json, mesh.ply and mesh_measured.ply, as the program."""
-        self._core.write(os.fspath(folder))
+        self._core.write(path_of(folder))
 
     def __repr__(self) -> str:
         faces = len(self.mesh.faces) if self.mesh else 0
@@ -409,7 +411,8 @@ def reconstruct(
 
 
 class SimulatedFrame(dict):
-    """The pictures of one moment by camera name: (height, width, 3) uint8 or uint16, RGB.
+    """The pictures of one moment by camera name: (height, width, 3) uint8 or uint16, RGB; of a camera
+    with a mosaic (height, width).
 
     `truth` is the mesh where this frame has it.
     """
@@ -467,12 +470,13 @@ def simulate(
     shift = tuple(float(x) for x in translate_mm)
     if len(shift) != 3:
         raise InputError("simulate", "translate_mm", str(shift), "must have three numbers")
+    scene = as_rig(rig)
     images, truth = _core.simulate(
-        as_rig(rig)._core, _as_mesh(mesh)._core, noise, seed, fit, up, bits, albedo, smooth, frame,
+        scene._core, _as_mesh(mesh)._core, noise, seed, fit, up, bits, albedo, smooth, frame,
         rotate_deg * np.pi / 180, shift, progress,
     )
     simulated = SimulatedFrame(images)
-    simulated.truth = Mesh._of(truth)
+    simulated.truth = Mesh._of(truth, True)
     return simulated
 
 
@@ -500,36 +504,37 @@ def evaluate(
     seed
         Of the surface samples.
     """
-    core, points, measured = None, "", None
+    core, points, measured = None, b"", None
     if isinstance(result, Result):
         core = result._core
     elif isinstance(result, Mesh):
         measured = result._core
     else:
-        points, measured = _result_files(os.fspath(result))
+        points, measured = _result_files(path_of(result))
+    _check_range("seed", seed, 2**64 - 1)
     text = _core.judge(
         _as_mesh(truth)._core, as_rig(rig)._core, core, points, measured, align, seed, progress
     )
     return json.loads(text)
 
 
-def _result_files(path: str) -> tuple[str, Any]:
+def _result_files(path: bytes) -> tuple[bytes, Any]:
     """The points and the mesh of a frame's folder, or of one file."""
     if not os.path.exists(path):
-        raise InputError(path, "", "", "no such file or folder")
+        raise InputError(os.fsdecode(path), "", "", "no such file or folder")
     if not os.path.isdir(path):
         try:
-            return "", _core.read_mesh(path)
+            return b"", _core.read_mesh(path)
         except InputError as error:
             if error.field != "faces":
                 raise
             return path, None
-    points = os.path.join(path, "points.ply")
-    mesh = os.path.join(path, "mesh_measured.ply")
+    points = os.path.join(path, b"points.ply")
+    mesh = os.path.join(path, b"mesh_measured.ply")
     if not os.path.exists(points) and not os.path.exists(mesh):
-        raise InputError(path, "", "", "must hold points.ply or mesh_measured.ply")
+        raise InputError(os.fsdecode(path), "", "", "must hold points.ply or mesh_measured.ply")
     return (
-        points if os.path.exists(points) else "",
+        points if os.path.exists(points) else b"",
         _core.read_mesh(mesh) if os.path.exists(mesh) else None,
     )
 
@@ -553,6 +558,23 @@ class CalibratedRig(Rig):
     reasons: list[str]
     figures: dict
     report: dict
+
+    @classmethod
+    def _with(
+        cls, core: Any, verdict: str, reasons: list[str], figures: dict, report: dict
+    ) -> "CalibratedRig":
+        rig = cls._of(core)
+        rig.verdict, rig.reasons = verdict, reasons
+        rig.figures, rig.report = figures, report
+        return rig
+
+    def __reduce__(self):
+        said = (self.verdict, self.reasons, self.figures, self.report)
+        return _calibrated, (self._core.text(), *said)
+
+
+def _calibrated(text: str, *said: Any) -> CalibratedRig:
+    return CalibratedRig._with(_core.Rig(text, "rig"), *said)
 
 
 def calibrate(
@@ -588,7 +610,9 @@ def calibrate(
     StageError
         The captures determine no usable rig; the report is its attribute `report`.
     """
-    if isinstance(captures, (str, os.PathLike)):
+    _check_range("max_tracks", max_tracks, 2**63 - 1)
+    _check_range("seed", seed, 2**64 - 1)
+    if isinstance(captures, (str, bytes, os.PathLike)):
         captures = [captures]
     path, text = None, ""
     if isinstance(devices, Rig):
@@ -596,16 +620,13 @@ def calibrate(
     elif isinstance(devices, dict):
         text = json.dumps(devices)
     else:
-        path = os.fspath(devices)
+        path = path_of(devices)
     core, verdict, reasons, figures, report = _core.calibrate(
-        path, text, [os.fspath(folder) for folder in captures], known_distance, board, max_tracks,
+        path, text, [path_of(folder) for folder in captures], known_distance, board, max_tracks,
         seed, progress,
     )
     if verdict == "unusable":
         error = StageError("unusable: " + "; ".join(reasons))
         error.report = json.loads(report)  # type: ignore[attr-defined]
         raise error
-    rig = CalibratedRig._of(core)
-    rig.verdict, rig.reasons = verdict, reasons
-    rig.figures, rig.report = json.loads(figures), json.loads(report)
-    return rig
+    return CalibratedRig._with(core, verdict, reasons, json.loads(figures), json.loads(report))

@@ -105,12 +105,21 @@ class Labels(_Table):
         plane: Any = None,
     ) -> None:
         """From arrays of one length, or a number for all; they are copied."""
-        count = np.size(projector)
+        sizes = [np.size(v) for v in (projector, pattern, line, confidence, plane) if np.ndim(v)]
+        count = sizes[0] if sizes else 1
 
         def column(values: Any, name: str, whole: bool) -> np.ndarray:
             array = np.asarray(values)
+            if array.ndim > 1:
+                raise InputError("labels", name, f"shape {array.shape}", "must be (n,)")
             if whole and not np.issubdtype(array.dtype, np.integer):
                 raise InputError("labels", name, str(array.dtype), "must be whole numbers")
+            if array.dtype.kind not in "iuf":
+                raise InputError("labels", name, str(array.dtype), "must be numbers")
+            if whole and array.size:  # what does not fit would come out as another number
+                first, last = int(array.min()), int(array.max())
+                if not -(2**31) <= first <= last < 2**31:
+                    raise InputError("labels", name, f"{first} to {last}", "must be in [-2^31, 2^31)")
             return np.full(count, array) if array.ndim == 0 else array
 
         self._core = _core.Labels(

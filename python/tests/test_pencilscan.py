@@ -3,6 +3,7 @@
 Run with PYTHONPATH=build/<preset>/python and PENCILSCAN_PROGRAM.
 """
 
+import copy
 import gc
 import inspect
 import json
@@ -175,6 +176,12 @@ class PackageTest(unittest.TestCase):
         self.assertTrue((xyz == copy).all())
         del junk
 
+    def test_tables_can_be_copied(self) -> None:
+        points = self.scene.result.points
+        for again in (copy.copy(points), copy.deepcopy(points), pickle.loads(pickle.dumps(points))):
+            self.assertEqual(again.names, points.names)
+            self.assertTrue((again.xyz == points.xyz).all())
+
     def test_pictures_stay_as_they_are_and_their_type_does_not_matter(self) -> None:
         numbers = {
             name: image.astype(np.float32) * np.float32(1 / 255)
@@ -250,6 +257,11 @@ class PackageTest(unittest.TestCase):
         once, again = (ps.measure(detection, labels, mesh=False).points for _ in range(2))
         self.assertEqual(once.xyz.tobytes(), again.xyz.tobytes())
 
+    def test_labels_may_be_a_number_for_all(self) -> None:
+        labels = ps.Labels(1, 0, [5, 6, 7])
+        self.assertEqual(labels.projector.tolist(), [1, 1, 1])
+        self.assertEqual(labels.line.tolist(), [5, 6, 7])
+
     def test_complaints_about_labels(self) -> None:
         detection = ps.detect(self.scene.rig, self.scene.frame)
         count = len(detection.curves)
@@ -264,6 +276,9 @@ class PackageTest(unittest.TestCase):
         self.assertIn("line[0]", of(zeros, zeros, zeros + 10000))
         self.assertIn("confidence[0]", of(zeros, zeros, zeros, confidence=2))
         self.assertIn("whole numbers", of(zeros + 0.5, zeros, zeros))
+        self.assertIn("line = 4294967296 to", of(zeros, zeros, zeros + 2**32))
+        self.assertIn("shape (1, ", of([zeros], zeros, zeros))
+        self.assertIn("must be numbers", of(zeros, zeros, zeros, confidence="high"))
         self.assertIn("identities", str(self.complaint(lambda: ps.label(detection, "multiview"))))
         self.assertIn("pencilscan.Labels", str(self.complaint(
             lambda: ps.reconstruct(self.scene.rig, self.scene.frame, method=lambda d: zeros))))
@@ -338,6 +353,23 @@ class PackageTest(unittest.TestCase):
         self.assertIsInstance(error, ValueError)
         self.assertEqual(self.complaint(lambda: ps.Rig(contents)).field, "cameras[1].K[0][0]")
 
+    def test_complaints_can_be_sent_to_another_process(self) -> None:
+        # A worker of a multiprocessing.Pool whose error cannot be read lets its caller wait forever.
+        error = self.complaint(lambda: ps.read_rig("nowhere.json"))
+        for again in (pickle.loads(pickle.dumps(error)), copy.copy(error)):
+            self.assertEqual(str(again), str(error))
+            self.assertEqual((again.file, again.rule), (error.file, error.rule))
+
+    def test_paths_are_those_of_the_system(self) -> None:
+        rig, folder = self.scene.rig, os.fsencode(self.scene.folder)
+        for path in (os.path.join(folder, b"\xff.json"), os.fsdecode(folder + b"/\xfe.json")):
+            rig.write(path)
+            self.assertEqual(ps.read_rig(path), rig)
+        ball = os.path.join(folder, b"ball.ply")
+        self.assertEqual(len(ps.simulate(rig, ball)), 4)
+        for call in (rig.write, ps.read_rig, ps.read_mesh, ps.make_sphere(10).write):
+            self.assertIn("zero byte", self.complaint(lambda: call("a\0b")).rule)
+
     def test_complaints_about_pictures(self) -> None:
         rig, frame = self.scene.rig, self.scene.frame
 
@@ -350,6 +382,8 @@ class PackageTest(unittest.TestCase):
         self.assertIn("[0, 1]", of(cam0=frame["cam0"].astype(np.float32)))
         self.assertIn("int64", of(cam0=frame["cam0"].astype(np.int64)))
         self.assertIn("(height, width)", of(cam0="image.png"))
+        self.assertIn("name of a camera", str(self.complaint(
+            lambda: ps.reconstruct(rig, {0: frame["cam0"]}))))
         with self.assertRaises(ps.StageError):
             ps.reconstruct(rig, {"cam0": np.zeros((360, 480, 3), np.uint8)})
         with self.assertRaises(TypeError):
@@ -390,6 +424,14 @@ class PackageTest(unittest.TestCase):
             lambda: ps.simulate(self.scene.rig, ps.make_sphere(100), noise="loud"))))
         self.assertIn("colours^order", str(self.complaint(lambda: ps.ring(order=30))))
         self.assertIn("green", str(self.complaint(lambda: ps.ring(colors=(("mauve", "blue"),)))))
+        for colors in (((),), (("blue", "cyan"), ()), ("blue", "cyan")):
+            self.assertIn("lists", str(self.complaint(lambda: ps.ring(colors=colors))), colors)
+        self.assertIn("finite", str(self.complaint(lambda: ps.make_sphere(np.inf))))
+        for options in ({"seed": -1}, {"max_tracks": -1}, {"seed": 1.5}):
+            self.assertIn("whole number", str(self.complaint(
+                lambda: ps.calibrate("captures", self.scene.rig, **options))), options)
+        self.assertIn("whole number", str(self.complaint(
+            lambda: ps.evaluate(ball, self.scene.rig, self.scene.result, seed=-1))))
 
     # ---- the rest -------------------------------------------------------------------------------
 
@@ -437,6 +479,10 @@ class PackageTest(unittest.TestCase):
                              progress=lambda stage, done: stages.append(stage))
         self.assertEqual((folder / "calibrated.json").read_text(), found._core.text())
         self.assertEqual(found.verdict, "good")
+        for again in (pickle.loads(pickle.dumps(found)), copy.copy(found)):
+            self.assertEqual(again, found)
+            self.assertEqual((again.verdict, again.reasons, again.figures, again.report),
+                             (found.verdict, found.reasons, found.figures, found.report))
         self.assertLess(found.figures["rms_px"], 0.2)
         self.assertIn("decoding", stages)
         self.assertIsInstance(found, ps.Rig)
