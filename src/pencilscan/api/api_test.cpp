@@ -1,6 +1,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <filesystem>
+#include <functional>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
@@ -118,6 +121,37 @@ TEST(Api, ComplaintsNameWhatIsWrong) {
               }),
               HasSubstr("10: must be width x height x channels"));
   EXPECT_THROW(static_cast<void>(reconstruct(rig(), {})), StageError);
+}
+
+TEST(Api, AConfidenceThatIsNoNumberIsRefused) {
+  const DetectedFrame detected = detect(rig(), views(frame().images));
+  std::vector<PointLabel> labels = label(detected);
+  for (PointLabel& label : labels) label.confidence = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_THAT(complaint([&] { static_cast<void>(reconstruct(detected, labels)); }),
+              HasSubstr("must be in [0, 1]"));
+}
+
+TEST(Api, ANegativeNumberOfThreadsIsRefused) {
+  ReconstructionOptions options;
+  options.threads = -1;
+  EXPECT_THAT(
+      complaint([&] { static_cast<void>(reconstruct(rig(), views(frame().images), options)); }),
+      HasSubstr("threads = -1: must be >= 0"));
+}
+
+TEST(Api, AResultWithoutAMeshLeavesNoneOfAnEarlierOne) {
+  const std::filesystem::path folder = ::testing::TempDir() + "api_earlier_mesh";
+  std::filesystem::remove_all(folder);
+  Reconstruction result;
+  result.report = "{}";
+  result.mesh = result.measured = make_sphere(10, 8);
+  write_reconstruction(folder, result);
+  EXPECT_TRUE(std::filesystem::exists(folder / "mesh.ply"));
+  result.mesh = result.measured = {};
+  write_reconstruction(folder, result);
+  EXPECT_FALSE(std::filesystem::exists(folder / "mesh.ply"));
+  EXPECT_FALSE(std::filesystem::exists(folder / "mesh_measured.ply"));
+  EXPECT_TRUE(std::filesystem::exists(folder / "points.ply"));
 }
 
 TEST(Api, JudgementHasTheKeysOfThePartsThatAreThere) {

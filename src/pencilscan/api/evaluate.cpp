@@ -6,6 +6,7 @@
 #include "pencilscan/api/run_stages.h"
 #include "pencilscan/core/error.h"
 #include "pencilscan/evaluation/evaluate.h"
+#include "pencilscan/evaluation/truth_check.h"
 #include "pencilscan/io/json_text.h"
 
 namespace pencilscan {
@@ -32,7 +33,10 @@ std::string judge(const TriangleMesh& truth, const Rig& rig,
   constexpr std::array<std::string_view, 1> kStages = {"evaluating"};
   std::string text;
   run_stages(options.progress, kStages, [&](const Progress&) {
-    text = json_text(figures_json(evaluate(truth, rig, input, evaluation), rig));
+    nlohmann::ordered_json figures = figures_json(evaluate(truth, rig, input, evaluation), rig);
+    if (const auto warning = unit_warning(rig, evaluation.align))
+      figures["warnings"].push_back("rig: " + *warning);
+    text = json_text(figures);
   });
   return text;
 }

@@ -18,7 +18,8 @@ namespace pencilscan {
 namespace {
 
 /// One image per camera of the rig, CV_32FC3; empty where there is none.
-std::vector<cv::Mat> camera_images(const Rig& rig, const Images& images) {
+std::vector<cv::Mat> camera_images(const Rig& rig, const Images& images,
+                                   const std::string& argument) {
   std::vector<cv::Mat> result(rig.cameras.size());
   std::size_t known = 0;
   for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
@@ -28,7 +29,7 @@ std::vector<cv::Mat> camera_images(const Rig& rig, const Images& images) {
     ++known;
     const cv::Mat& stored = at->second.stored();
     if (stored.cols != camera.width || stored.rows != camera.height) {
-      throw InputError("images", camera.name,
+      throw InputError(argument, camera.name,
                        std::to_string(stored.cols) + "x" + std::to_string(stored.rows),
                        "must be " + std::to_string(camera.width) + "x" +
                            std::to_string(camera.height) + " (width x height) as the rig's camera");
@@ -36,10 +37,10 @@ std::vector<cv::Mat> camera_images(const Rig& rig, const Images& images) {
     // Far outside [0, 1] means bytes as numbers; a little above it an image that was worked on.
     if (stored.depth() == CV_32F && !cv::checkRange(stored, true, nullptr, -1, 2)) {
       throw InputError(
-          "images", camera.name, "",
+          argument, camera.name, "",
           "float pixels must be finite and lie in [0, 1], or not far outside (-1 to 2)");
     }
-    check_channels(camera, stored.channels(), "images");
+    check_channels(camera, stored.channels(), argument);
     result[c] = stored;
   }
   if (known == images.size()) return result;
@@ -47,7 +48,7 @@ std::vector<cv::Mat> camera_images(const Rig& rig, const Images& images) {
     const bool is_known = std::any_of(rig.cameras.begin(), rig.cameras.end(),
                                       [&](const Camera& camera) { return camera.name == name; });
     if (!is_known)
-      throw InputError("images", "camera", name, "must be one of the rig: " + camera_names(rig));
+      throw InputError(argument, "camera", name, "must be one of the rig: " + camera_names(rig));
   }
   return result;
 }
@@ -74,12 +75,14 @@ std::span<const std::string_view> told_stages() {
 Frame frame_of(const Rig& rig, const Images& images, const ReconstructionOptions& options) {
   Frame frame;
   frame.name = options.frame;
-  frame.images = camera_images(rig, images);
-  if (!options.plain.empty()) frame.plain = camera_images(rig, options.plain);
+  frame.images = camera_images(rig, images, "images");
+  if (!options.plain.empty()) frame.plain = camera_images(rig, options.plain, "plain");
   return frame;
 }
 
 FrameOptions frame_options(const Rig& rig, const ReconstructionOptions& options) {
+  if (options.threads < 0)
+    throw InputError("options", "threads", std::to_string(options.threads), "must be >= 0");
   FrameOptions frame;
   frame.meshes = options.mesh;
   PointOptions& points = frame.points;

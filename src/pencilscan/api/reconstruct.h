@@ -56,7 +56,8 @@ struct Reconstruction {
 [[nodiscard]] Reconstruction reconstruct(const Rig& rig, const Images& images,
                                          const ReconstructionOptions& options = {});
 
-/// points.ply, curves.ply, report.json and, where there is a mesh, mesh.ply and mesh_measured.ply.
+/// points.ply, curves.ply, report.json and, where there is a mesh, mesh.ply and mesh_measured.ply;
+/// without a mesh, those of an earlier result in the folder are removed.
 void write_reconstruction(const std::filesystem::path& folder, const Reconstruction& result);
 
 }  // namespace pencilscan

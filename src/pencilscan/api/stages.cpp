@@ -100,6 +100,7 @@ Labeling labeling_of(const Rig& rig, const std::vector<GridGraph>& graphs,
       const std::size_t count = graphs[c].curves[k].points.size();
       const std::span<const PointLabel> of_curve = labels.subspan(first, count);
       for (std::size_t begin = 0, end = 0; begin < count; begin = end) {
+        end = begin + 1;  // a confidence that is no number does not even equal itself
         while (end < count && is_same(of_curve[end], of_curve[begin])) ++end;
         if (of_curve[begin].projector < 0) continue;
         check_label(rig, of_curve[begin], first + begin);

@@ -3,8 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <numbers>
 
+#include "pencilscan/core/error.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/planning/rig_check.h"
 #include "pencilscan/planning/ring.h"
@@ -43,6 +45,21 @@ Rig mirror_symmetric_rig() {
     projector.patterns.front().axis = Axis::kColumn;
   }
   return rig;
+}
+
+TEST(Ring, OptionsOutOfTheirRangeAreRefused) {
+  const auto refuses = [](const std::function<void(RingOptions&)>& change) {
+    RingOptions options;
+    change(options);
+    EXPECT_THROW(static_cast<void>(make_ring(options)), InputError);
+  };
+  refuses([](RingOptions& options) { options.cameras = 0; });
+  refuses([](RingOptions& options) { options.distance_mm = 1; });
+  refuses([](RingOptions& options) { options.arc_rad = -1; });
+  refuses([](RingOptions& options) { options.colors = {}; });
+  refuses([](RingOptions& options) { options.colors = {{}}; });
+  refuses([](RingOptions& options) { options.order = 0; });
+  refuses([](RingOptions& options) { options.order = 21; });
 }
 
 TEST(Ring, DevicesStandWhereAskedAndLookAtTheCentre) {

@@ -1,9 +1,11 @@
 #include "pencilscan/planning/ring.h"
 
 #include <cmath>
+#include <numbers>
+#include <string>
 #include <utility>
 
-#include "pencilscan/core/check.h"
+#include "pencilscan/core/error.h"
 #include "pencilscan/pattern/de_bruijn.h"
 
 namespace pencilscan {
@@ -39,6 +41,31 @@ const Entry& in_turn(const std::vector<Entry>& entries, int i) {
   return entries[static_cast<std::size_t>(i) % entries.size()];
 }
 
+void require(bool holds, const char* field, const std::string& value, const char* rule) {
+  if (!holds) throw InputError("ring", field, value, rule);
+}
+
+void check_ring(const RingOptions& options) {
+  require(options.cameras >= 1, "cameras", std::to_string(options.cameras), "must be >= 1");
+  require(options.projectors >= 1, "projectors", std::to_string(options.projectors),
+          "must be >= 1");
+  require(options.volume_radius_mm > 0, "volume_radius_mm",
+          std::to_string(options.volume_radius_mm), "must be > 0");
+  require(options.distance_mm > options.volume_radius_mm, "distance_mm",
+          std::to_string(options.distance_mm), "must be larger than volume_radius_mm");
+  require(options.arc_rad > 0 && options.arc_rad <= kFullCircle, "arc_rad",
+          std::to_string(options.arc_rad), "must be in (0, 2 pi]");
+  require(!options.axes.empty(), "axes", "", "must not be empty");
+  require(!options.rolls_rad.empty(), "rolls_rad", "", "must not be empty");
+  require(!options.colors.empty(), "colors", "", "must not be empty");
+  for (const std::vector<PatternColor>& colors : options.colors) {
+    require(!colors.empty(), "colors", "", "must have at least one colour for each projector");
+    const bool has_code = options.order >= 1 && std::pow(colors.size(), options.order) <= 1 << 20;
+    require(has_code || colors.size() == 1, "order", std::to_string(options.order),
+            "must be >= 1, and colours^order <= 2^20");
+  }
+}
+
 LinePattern ring_pattern(const RingOptions& options, int projector) {
   LinePattern pattern;
   pattern.axis = in_turn(options.axes, projector);
@@ -56,10 +83,7 @@ LinePattern ring_pattern(const RingOptions& options, int projector) {
 }  // namespace
 
 Rig make_ring(const RingOptions& options) {
-  PENCILSCAN_CHECK(options.cameras >= 1 && options.projectors >= 1);
-  PENCILSCAN_CHECK(options.distance_mm > options.volume_radius_mm && options.volume_radius_mm > 0);
-  PENCILSCAN_CHECK(options.arc_rad > 0 && options.arc_rad <= kFullCircle);
-  PENCILSCAN_CHECK(!options.axes.empty() && !options.colors.empty() && !options.rolls_rad.empty());
+  check_ring(options);
   Rig rig;
   // On an arc, equal numbers would put each projector right above a camera: move both by a quarter.
   const bool full = options.arc_rad >= kFullCircle;

@@ -37,8 +37,8 @@ struct RingOptions {
 
 /// Cameras cam0, cam1, ... and projectors proj0, proj1, ..., each with one pattern. Azimuths grow
 /// from x towards y: from cam0 at 0 all around, projectors half a step of theirs further, or
-/// over an arc with 0 in its middle. The volume's centre is the origin. It is a bug where an option
-/// is out of its range.
+/// over an arc with 0 in its middle. The volume's centre is the origin. InputError for an option
+/// out of its range.
 [[nodiscard]] Rig make_ring(const RingOptions& options = {});
 
 }  // namespace pencilscan
