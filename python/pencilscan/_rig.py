@@ -89,7 +89,7 @@ def as_rig(rig: Union[Rig, dict, PathLike]) -> Rig:
 def as_pictures(rig: Rig, images: Any, argument: str = "images") -> _core.Pictures:
     """By camera name, or a list with one picture (or None) per camera, in the rig's order."""
     if images is None:
-        return _core.Pictures({})
+        return _core.Pictures({}, argument)
     if not isinstance(images, Mapping):
         names = rig.cameras
         if not isinstance(images, (list, tuple)):
@@ -106,7 +106,7 @@ def as_pictures(rig: Rig, images: Any, argument: str = "images") -> _core.Pictur
         if not isinstance(name, str):
             raise InputError(argument, "camera", repr(name), "must be the name of a camera")
     return _core.Pictures(
-        {name: image for name, image in images.items() if image is not None}
+        {name: image for name, image in images.items() if image is not None}, argument
     )
 
 

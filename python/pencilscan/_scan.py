@@ -324,7 +324,10 @@ class Result:
         return self.report["warnings"]
 
     def write(self, folder: PathLike) -> None:
-        """points.ply, curves.ply, report.json, mesh.ply and mesh_measured.ply, as the program."""
+        """points.ply, curves.ply, report.json, mesh.ply and mesh_measured.ply, as the program.
+
+        Without a mesh, those of an earlier result in the folder are removed.
+        """
         self._core.write(path_of(folder))
 
     def __repr__(self) -> str:
@@ -476,7 +479,7 @@ def simulate(
         rotate_deg * np.pi / 180, shift, progress,
     )
     simulated = SimulatedFrame(images)
-    simulated.truth = Mesh._of(truth, True)
+    simulated.truth = Mesh._of(truth, scene._core.unit_known)
     return simulated
 
 

@@ -31,7 +31,7 @@ bool is_row_by_row(const py::array& array) {
   const py::ssize_t channels = array.ndim() == 3 ? array.shape(2) : 1;
   if (array.ndim() == 3 && channels > 1 && array.strides(2) != item) return false;
   return array.strides(1) == item * channels &&
-         array.strides(0) >= item * channels * array.shape(1);
+         array.strides(0) >= item * channels * array.shape(1) && array.strides(0) % item == 0;
 }
 
 std::string shape_text(const py::array& array) {
@@ -59,23 +59,24 @@ py::array matrix_view(const cv::Mat& matrix, py::object owner) {
   return py::array(type, shape, strides, matrix.data, owner);
 }
 
-ImageView picture(const std::string& name, const py::handle& object, std::vector<py::array>& kept) {
+ImageView picture(const std::string& argument, const std::string& name, const py::handle& object,
+                  std::vector<py::array>& kept) {
   py::array array = py::array::ensure(object);
   if (!array) {
     PyErr_Clear();
-    throw InputError("images", name, std::string(py::str(py::type::of(object))),
+    throw InputError(argument, name, std::string(py::str(py::type::of(object))),
                      "must be a NumPy array");
   }
   const bool has_shape =
       array.ndim() == 2 || (array.ndim() == 3 && (array.shape(2) == 1 || array.shape(2) == 3));
   if (!has_shape || array.size() == 0) {
-    throw InputError("images", name, "shape " + shape_text(array),
+    throw InputError(argument, name, "shape " + shape_text(array),
                      "must be (height, width) or (height, width, 3), RGB");
   }
   if (array.dtype().kind() == 'f' && array.itemsize() == 8) array = array.attr("astype")("float32");
   const int depth = depth_of(array.dtype());
   if (depth < 0) {
-    throw InputError("images", name, std::string(py::str(array.dtype())),
+    throw InputError(argument, name, std::string(py::str(array.dtype())),
                      "must be uint8 or uint16, or float32 in [0, 1]");
   }
   if (!is_row_by_row(array)) array = array.attr("copy")("C");

@@ -36,7 +36,8 @@ py::array field_view(const std::vector<Element>& values, std::size_t offset, py:
 py::array matrix_view(const cv::Mat& matrix, py::object owner = {});
 
 /// A picture where it lies in an array of uint8, uint16 or float32; what NumPy stores otherwise is
-/// copied into `kept` first. `name` is the picture's in an InputError.
-ImageView picture(const std::string& name, const py::handle& array, std::vector<py::array>& kept);
+/// copied into `kept` first. `argument` and `name` are the picture's in an InputError.
+ImageView picture(const std::string& argument, const std::string& name, const py::handle& array,
+                  std::vector<py::array>& kept);
 
 }  // namespace pencilscan::python

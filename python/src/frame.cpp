@@ -17,10 +17,10 @@ namespace {
 
 /// A dictionary of arrays as pictures; the arrays are kept as long as this.
 struct Pictures {
-  explicit Pictures(const py::dict& arrays) {
+  Pictures(const py::dict& arrays, const std::string& argument) {
     for (const auto& [key, array] : arrays) {
       const auto name = key.cast<std::string>();
-      images.emplace(name, picture(name, array, kept));
+      images.emplace(name, picture(argument, name, array, kept));
     }
   }
   Images images;
@@ -138,7 +138,8 @@ py::object part(const ResultPtr& result, TriangleMesh& mesh) {
 
 void add_results(py::module_& module) {
   py::class_<Pictures, std::shared_ptr<Pictures>>(module, "Pictures")
-      .def(py::init<const py::dict&>())
+      .def(py::init<const py::dict&, const std::string&>(), py::arg("arrays"),
+           py::arg("argument") = "images")
       .def("views", [](const std::shared_ptr<Pictures>& pictures) {
         py::dict views;
         for (const auto& [name, image] : pictures->images)
@@ -157,7 +158,7 @@ void add_results(py::module_& module) {
       .def_property_readonly("measured", [](const ResultPtr& r) { return part(r, r->measured); })
       .def_property_readonly("report", [](const Reconstruction& r) { return r.report; })
       .def("write", [](const Reconstruction& r, const std::string& folder) {
-        const py::gil_scoped_release unlocked;
+        const Unlocked unlocked;
         write_reconstruction(folder, r);
       });
   module.def("reconstruct", [](const Rig& rig, const Pictures& pictures, const Pictures& plain,
@@ -174,7 +175,7 @@ void add_results(py::module_& module) {
     options.frame = frame;
     options.threads = threads;
     options.progress = listener(progress);
-    const py::gil_scoped_release unlocked;
+    const Unlocked unlocked;
     return std::make_shared<Reconstruction>(reconstruct(rig, pictures.images, options));
   });
 }
@@ -262,7 +263,7 @@ void add_stages(py::module_& module) {
     options.frame = frame;
     options.threads = threads;
     options.progress = listener(progress);
-    const py::gil_scoped_release unlocked;
+    const Unlocked unlocked;
     return std::make_shared<DetectedFrame>(detect(rig, pictures.images, options, identities));
   });
   module.def("label",
@@ -273,7 +274,7 @@ void add_stages(py::module_& module) {
                options.multiview_cost = multiview_cost;
                options.threads = threads;
                options.progress = listener(progress);
-               const py::gil_scoped_release unlocked;
+               const Unlocked unlocked;
                return std::make_shared<Labels>(Labels{label(detected, options)});
              });
   module.def("measure", [](const DetectedFrame& detected, const Labels& labels,
@@ -286,7 +287,7 @@ void add_stages(py::module_& module) {
     options.depth_maps = depth_maps;
     options.threads = threads;
     options.progress = listener(progress);
-    const py::gil_scoped_release unlocked;
+    const Unlocked unlocked;
     return std::make_shared<Reconstruction>(reconstruct(detected, labels.values, options));
   });
 }

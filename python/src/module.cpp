@@ -7,9 +7,14 @@
 #include <pybind11/stl.h>
 
 #include <algorithm>
+#include <chrono>
+#include <condition_variable>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
+#include <string_view>
+#include <thread>
 #include <variant>
 #include <vector>
 
@@ -25,13 +30,20 @@ void raise(const char* name, Arguments&&... arguments) {
   PyErr_SetObject(type.ptr(), type(std::forward<Arguments>(arguments)...).ptr());
 }
 
+/// As Python has text from outside: names of files need not be UTF-8.
+py::object text_of(std::string_view text) {
+  return py::reinterpret_steal<py::object>(
+      PyUnicode_DecodeUTF8(text.data(), static_cast<py::ssize_t>(text.size()), "surrogateescape"));
+}
+
 void translate(std::exception_ptr thrown) {
   try {
     if (thrown) std::rethrow_exception(thrown);
   } catch (const InputError& error) {
-    raise("InputError", error.path, error.field, error.value, error.rule);
+    raise("InputError", text_of(error.path), text_of(error.field), text_of(error.value),
+          text_of(error.rule));
   } catch (const StageError& error) {
-    raise("StageError", error.what());
+    raise("StageError", text_of(error.what()));
   } catch (const Cancelled& error) {
     raise("Cancelled", error.what());
   }
@@ -112,7 +124,7 @@ void add_mesh(py::module_& module) {
             return result;
           })
       .def("write", [](const TriangleMesh& mesh, const std::string& path, bool unit_known) {
-        const py::gil_scoped_release unlocked;
+        const Unlocked unlocked;
         if (path.ends_with(".ply")) {
           write_mesh(path, mesh, unit_known);
         } else {
@@ -120,7 +132,7 @@ void add_mesh(py::module_& module) {
         }
       });
   module.def("read_mesh", [](const std::string& path) {
-    const py::gil_scoped_release unlocked;
+    const Unlocked unlocked;
     return std::make_shared<TriangleMesh>(read_mesh(path));
   });
   module.def("make_sphere", [](double radius_mm, int rings) {
@@ -163,6 +175,7 @@ void add_rig(py::module_& module) {
         return std::make_shared<Rig>(rig_from_text(text, name));
       }))
       .def("text", &rig_text)
+      .def_readonly("unit_known", &Rig::unit_known)
       .def("write", [](const Rig& rig, const std::string& path) { write_rig(rig, path); })
       .def("volume",
            [](const Rig& rig) {
@@ -230,7 +243,7 @@ void add_simulation(py::module_& module) {
     options.progress = listener(progress);
     SimulatedFrame simulated;
     {
-      const py::gil_scoped_release unlocked;
+      const Unlocked unlocked;
       simulated = simulate(rig, mesh, options);
     }
     py::dict images;
@@ -247,7 +260,7 @@ void add_judgement(py::module_& module) {
     options.align = align;
     options.seed = seed;
     options.progress = listener(progress);
-    const py::gil_scoped_release unlocked;
+    const Unlocked unlocked;
     if (result != nullptr) return judge(truth, rig, *result, options);
     std::vector<MeasuredPoint> points;
     if (!points_path.empty()) points = read_points(points_path);
@@ -272,7 +285,7 @@ void add_calibration(py::module_& module) {
     options.progress = listener(progress);
     CalibratedRig found;
     {
-      const py::gil_scoped_release unlocked;
+      const Unlocked unlocked;
       const UncalibratedRig devices =
           devices_path ? read_devices(*devices_path) : devices_from_text(devices_text);
       found = calibrate_rig(devices, {captures.begin(), captures.end()}, options);
@@ -282,16 +295,73 @@ void add_calibration(py::module_& module) {
   });
 }
 
+// ---- the end of the interpreter -----------------------------------------------------------------
+
+/// The calls at work without the interpreter's lock.
+struct Calls {
+  std::mutex mutex;
+  std::condition_variable changed;
+  int running = 0;
+  std::optional<std::thread::id> ending;  ///< the thread that ends the interpreter
+};
+
+/// Never destroyed: threads of daemons may hold it when the process ends.
+Calls* calls = new Calls;
+
+/// True in all threads but the one that ends the interpreter. `calls->mutex` is locked.
+bool is_left_behind() { return calls->ending && *calls->ending != std::this_thread::get_id(); }
+
+/// Stops the calls of daemon threads and waits for them, at the interpreter's exit.
+void end_calls() {
+  constexpr auto kInterval = std::chrono::milliseconds(50);  // Ctrl-C is noticed within it
+  for (bool ended = false; !ended;) {
+    {
+      const py::gil_scoped_release unlocked;
+      std::unique_lock lock(calls->mutex);
+      calls->ending = std::this_thread::get_id();
+      ended = calls->changed.wait_for(lock, kInterval, [] { return calls->running <= 0; });
+    }
+    if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+  }
+}
+
+void watch_exit() {
+  py::module_::import("atexit").attr("register")(py::cpp_function(&end_calls));
+  // Calls of other threads do not go on in a child.
+  py::module_::import("os").attr("register_at_fork")(
+      py::arg("after_in_child") = py::cpp_function([] { calls = new Calls; }));
+}
+
 }  // namespace
+
+Unlocked::Unlocked() {
+  std::unique_lock lock(calls->mutex);
+  while (is_left_behind()) calls->changed.wait(lock);
+  ++calls->running;
+}
+
+Unlocked::~Unlocked() {
+  std::unique_lock lock(calls->mutex);
+  --calls->running;
+  calls->changed.notify_all();
+  while (is_left_behind()) calls->changed.wait(lock);
+}
 
 StageListener listener(const py::object& progress) {
   return [progress = progress.ptr()](std::string_view stage, double done) {
     const py::gil_scoped_acquire lock;
+    {
+      const std::lock_guard guard(calls->mutex);
+      if (is_left_behind()) return false;
+    }
     if (PyErr_CheckSignals() != 0) throw py::error_already_set();
     if (Py_IsNone(progress) != 0) return true;
     const py::object answer =
         py::reinterpret_borrow<py::object>(progress)(py::str(stage.data(), stage.size()), done);
-    return !answer.is(py::bool_(false));
+    // NumPy has a False of its own: `return error < limit` of its numbers.
+    const bool is_truth = py::isinstance<py::bool_>(answer) ||
+                          py::isinstance(answer, py::dtype::of<bool>().attr("type"));
+    return !is_truth || PyObject_IsTrue(answer.ptr()) != 0;
   };
 }
 
@@ -301,6 +371,7 @@ PYBIND11_MODULE(_core, module) {
   using namespace pencilscan::python;
   module.attr("version") = pencilscan::version();
   py::register_exception_translator(&translate);
+  watch_exit();
   add_mesh(module);
   add_rig(module);
   add_frame(module);

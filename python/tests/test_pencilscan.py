@@ -176,11 +176,26 @@ class PackageTest(unittest.TestCase):
         self.assertTrue((xyz == copy).all())
         del junk
 
+    def test_rows_of_floats_may_begin_anywhere(self) -> None:
+        picture = np.arange(24, dtype=np.float32).reshape(2, 4, 3) / 24
+        rows = np.zeros((2, 49), np.uint8)  # a byte more than a row
+        rows[:, :48] = picture.view(np.uint8).reshape(2, 48)
+        odd = np.ndarray((2, 4, 3), np.float32, rows, strides=(49, 12, 4))
+        self.assertTrue((_core.Pictures({"odd": odd}).views()["odd"] == picture).all())
+
     def test_tables_can_be_copied(self) -> None:
         points = self.scene.result.points
         for again in (copy.copy(points), copy.deepcopy(points), pickle.loads(pickle.dumps(points))):
             self.assertEqual(again.names, points.names)
             self.assertTrue((again.xyz == points.xyz).all())
+
+    def test_a_result_without_a_mesh_leaves_none_of_an_earlier_one(self) -> None:
+        folder = self.scene.folder / "twice"
+        self.scene.result.write(folder)
+        points = ps.reconstruct(self.scene.rig, self.scene.frame, mesh=False)
+        points.write(folder)
+        self.assertEqual({path.name for path in folder.iterdir()},
+                         {"points.ply", "curves.ply", "report.json"})
 
     def test_pictures_stay_as_they_are_and_their_type_does_not_matter(self) -> None:
         numbers = {
@@ -275,6 +290,7 @@ class PackageTest(unittest.TestCase):
         self.assertIn("projector[0]: 9", of(zeros + 9, zeros, zeros).replace(" = ", ": "))
         self.assertIn("line[0]", of(zeros, zeros, zeros + 10000))
         self.assertIn("confidence[0]", of(zeros, zeros, zeros, confidence=2))
+        self.assertIn("confidence[0]", of(zeros, zeros, zeros, confidence=np.nan))
         self.assertIn("whole numbers", of(zeros + 0.5, zeros, zeros))
         self.assertIn("line = 4294967296 to", of(zeros, zeros, zeros + 2**32))
         self.assertIn("shape (1, ", of([zeros], zeros, zeros))
@@ -295,6 +311,9 @@ class PackageTest(unittest.TestCase):
     def test_progress_can_end_the_call(self) -> None:
         with self.assertRaises(ps.Cancelled):
             ps.reconstruct(self.scene.rig, self.scene.frame, progress=lambda *_: False)
+
+        with self.assertRaises(ps.Cancelled):  # False as NumPy has it
+            ps.reconstruct(self.scene.rig, self.scene.frame, progress=lambda *_: np.float64(1) < 0)
 
         def fail(stage: str, done: float) -> None:
             raise KeyError(stage)
@@ -333,6 +352,22 @@ class PackageTest(unittest.TestCase):
         rest, _ = child.communicate(timeout=120)
         self.assertEqual((rest, child.returncode), ("interrupted\n", 0))
 
+    def test_a_daemon_thread_at_work_does_not_keep_a_program_from_its_end(self) -> None:
+        script = (
+            "import pencilscan as ps, threading\n"
+            "rig = ps.ring()\n"
+            "frame = ps.simulate(rig, ps.make_sphere(120, 48), 'none')\n"
+            "begun = threading.Event()\n"
+            "def work():\n"
+            "    while True: ps.reconstruct(rig, frame, progress=lambda *_: begun.set())\n"
+            "threading.Thread(target=work, daemon=True).start()\n"
+            "begun.wait()\n"
+            "print('the end')\n"
+        )
+        child = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True,
+                               timeout=120)
+        self.assertEqual((child.stdout, child.stderr, child.returncode), ("the end\n", "", 0))
+
     # ---- complaints -----------------------------------------------------------------------------
 
     def complaint(self, call) -> ps.InputError:
@@ -365,6 +400,8 @@ class PackageTest(unittest.TestCase):
         for path in (os.path.join(folder, b"\xff.json"), os.fsdecode(folder + b"/\xfe.json")):
             rig.write(path)
             self.assertEqual(ps.read_rig(path), rig)
+        missing = os.fsdecode(folder + b"/\xfd.json")
+        self.assertEqual(self.complaint(lambda: ps.read_rig(missing)).file, missing)
         ball = os.path.join(folder, b"ball.ply")
         self.assertEqual(len(ps.simulate(rig, ball)), 4)
         for call in (rig.write, ps.read_rig, ps.read_mesh, ps.make_sphere(10).write):
@@ -382,8 +419,14 @@ class PackageTest(unittest.TestCase):
         self.assertIn("[0, 1]", of(cam0=frame["cam0"].astype(np.float32)))
         self.assertIn("int64", of(cam0=frame["cam0"].astype(np.int64)))
         self.assertIn("(height, width)", of(cam0="image.png"))
+        self.assertIn("plain: cam0", str(self.complaint(
+            lambda: ps.reconstruct(rig, frame, plain={"cam0": frame["cam0"][:10]}))))
+        self.assertIn("plain: cam0", str(self.complaint(
+            lambda: ps.reconstruct(rig, frame, plain={"cam0": frame["cam0"] > 0}))))
         self.assertIn("name of a camera", str(self.complaint(
             lambda: ps.reconstruct(rig, {0: frame["cam0"]}))))
+        for call in (ps.reconstruct, ps.detect):
+            self.assertIn("threads = -1", str(self.complaint(lambda: call(rig, frame, threads=-1))))
         with self.assertRaises(ps.StageError):
             ps.reconstruct(rig, {"cam0": np.zeros((360, 480, 3), np.uint8)})
         with self.assertRaises(TypeError):
@@ -462,6 +505,14 @@ class PackageTest(unittest.TestCase):
         again.write(self.scene.folder / "ball.obj")
         self.assertIn("unit unknown", (self.scene.folder / "ball.obj").read_text()[:200])
         self.assertTrue(self.scene.result.mesh.unit_known)
+
+    def test_an_unknown_unit_is_said(self) -> None:
+        rig = ps.Rig({**self.scene.rig.to_dict(), "unit": "unknown"})
+        frame = ps.simulate(rig, ps.make_sphere(120, 48))
+        frame.truth.write(self.scene.folder / "unitless.ply")
+        self.assertIn(b"unit unknown", (self.scene.folder / "unitless.ply").read_bytes()[:200])
+        figures = ps.evaluate(frame.truth, rig, self.scene.result)
+        self.assertIn("the rig's unit is unknown", figures["warnings"][0])
 
     def test_calibration_gives_a_rig(self) -> None:
         folder = self.scene.folder / "calibration"
