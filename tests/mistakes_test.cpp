@@ -14,6 +14,7 @@ using ::testing::Not;
 class Newcomer : public ProgramTest {
  protected:
   void write(const std::string& name, const std::string& text) {
+    fs::create_directories((folder_ / name).parent_path());
     std::ofstream(folder_ / name) << text;
   }
   /// A tetrahedron inside of the ring's volume.
