@@ -45,6 +45,7 @@ void run_scan(const ScanCommand& command) {
   const Progress progress = stderr_progress("nothing was written");
   std::vector<MeasuredPoint> points;
   std::vector<SurfaceSample> samples;
+  std::vector<PairYield> yields;
   std::size_t missed = 0;
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     tell_steps(progress, "decoding: pair", i, pairs.size());
@@ -54,8 +55,12 @@ void run_scan(const ScanCommand& command) {
     points.insert(points.end(), scan.points.begin(), scan.points.end());
     samples.insert(samples.end(), scan.samples.begin(), scan.samples.end());
     missed += scan.missed;
+    yields.push_back(
+        {rig.projectors[pairs[i].projector].name + "/" + rig.cameras[pairs[i].camera].name,
+         scan.points.size(), scan.missed - scan.narrow});
   }
   tell_steps(progress, "decoding: pair", pairs.size(), pairs.size());
+  warn_of(misfit_warning(yields));
   if (points.empty()) throw StageError("no pixel could be measured: see pencilscan calibrate");
   write_points(out / "points.ply", points, rig.unit_known);
   nlohmann::ordered_json figures{

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <optional>
 
+#include "pencilscan/core/name_list.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/gray/local_map.h"
 #include "pencilscan/surface/closing.h"
@@ -65,6 +66,7 @@ GrayScan gray_scan(const Rig& rig, std::size_t camera, std::size_t projector,
   const auto down = static_cast<std::size_t>((decoded.state.rows - 1) / options.step_px + 1);
   std::vector<std::optional<Measured>> found(across * down);
   std::vector<char> missed(found.size(), 0);
+  std::vector<char> narrow(found.size(), 0);
   const Vec3 center = eye.center();
   parallel_for(down, [&](std::size_t row) {
     for (std::size_t column = 0; column < across; ++column) {
@@ -80,9 +82,10 @@ GrayScan gray_scan(const Rig& rig, std::size_t camera, std::size_t projector,
       const auto beside = meet(eye, light, right, map->panel_from_camera(right));
       const auto under = meet(eye, light, below, map->panel_from_camera(below));
       const std::size_t i = row * across + column;
-      if (!at || !beside || !under || at->miss_px > options.worst_miss_px ||
-          at->angle < options.least_angle_rad) {
+      const bool is_narrow = at && at->angle < options.least_angle_rad;
+      if (!at || !beside || !under || at->miss_px > options.worst_miss_px || is_narrow) {
         missed[i] = 1;
+        narrow[i] = is_narrow ? 1 : 0;
         continue;
       }
       Measured m;
@@ -116,11 +119,38 @@ GrayScan gray_scan(const Rig& rig, std::size_t camera, std::size_t projector,
   GrayScan scan;
   for (std::size_t i = 0; i < found.size(); ++i) {
     scan.missed += missed[i] != 0 ? 1U : 0U;
+    scan.narrow += narrow[i] != 0 ? 1U : 0U;
     if (!found[i]) continue;
     scan.points.push_back(found[i]->point);
     scan.samples.push_back(found[i]->sample);
   }
   return scan;
+}
+
+std::optional<std::string> misfit_warning(std::span<const PairYield> pairs) {
+  // Of a right rig wrong codes alone fit no point, a few per cent at edges. Of a wrong one the rays
+  // pass each other by more than they may, but along one line of the image. Both numbers are
+  // chosen.
+  constexpr double kMostMissed = 0.3;
+  constexpr std::size_t kLeastCodes = 50;
+  std::vector<std::string> names;
+  std::size_t missed = 0;
+  std::size_t codes = 0;
+  for (const PairYield& pair : pairs) {
+    const std::size_t all = pair.points + pair.missed;
+    if (all < kLeastCodes ||
+        static_cast<double>(pair.missed) < kMostMissed * static_cast<double>(all))
+      continue;
+    names.push_back(pair.name);
+    missed += pair.missed;
+    codes += all;
+  }
+  if (names.empty()) return std::nullopt;
+  const auto percent = static_cast<int>(
+      std::lround(100.0 * static_cast<double>(missed) / static_cast<double>(codes)));
+  return std::to_string(percent) + " % of the codes of " + name_list(names, 6) +
+         " fit no point of this rig, and what is left may be wrong: the rig is not that of these "
+         "captures, a device has moved since, or folders are swapped. See pencilscan calibrate";
 }
 
 TriangleMesh scan_mesh(std::span<const SurfaceSample> samples, double cell_mm) {

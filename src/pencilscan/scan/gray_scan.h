@@ -1,5 +1,8 @@
 #pragma once
 
+#include <optional>
+#include <span>
+#include <string>
 #include <vector>
 
 #include "pencilscan/geometry/mesh.h"
@@ -20,7 +23,8 @@ struct GrayScanOptions {
 struct GrayScan {
   std::vector<MeasuredPoint> points;   ///< line and plane: the panel column
   std::vector<SurfaceSample> samples;  ///< the same points with normals, for meshing
-  std::size_t missed = 0;              ///< codes whose rays do not meet
+  std::size_t missed = 0;  ///< codes without a point: their rays do not meet, or narrowly
+  std::size_t narrow = 0;  ///< of these, rays that meet at too small an angle
 };
 
 /// Triangulates every decoded pixel of a lattice: camera ray and panel ray, each panel coordinate
@@ -28,6 +32,17 @@ struct GrayScan {
 /// slopes of that quadratic. sigma is along the camera ray.
 [[nodiscard]] GrayScan gray_scan(const Rig& rig, std::size_t camera, std::size_t projector,
                                  const DecodedView& decoded, const GrayScanOptions& options = {});
+
+/// What one camera and one projector gave, for `misfit_warning`.
+struct PairYield {
+  std::string name;  ///< proj0/cam0
+  std::size_t points = 0;
+  std::size_t missed = 0;  ///< codes whose rays do not meet
+};
+
+/// Names the pairs of which many codes fit no point: their captures are of another rig, or a device
+/// moved.
+[[nodiscard]] std::optional<std::string> misfit_warning(std::span<const PairYield> pairs);
 
 /// Closed surface of all pairs' samples; empty when there are too few. `cell_mm` is the
 /// wished size of its cells, > 0.

@@ -1,5 +1,6 @@
 #include "pencilscan/scan/gray_scan.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -51,6 +52,16 @@ TEST(GrayScan, MeasuresASphere) {
   EXPECT_LT(*middle, 0.1);  // a panel pixel is 3 mm of depth here
   std::sort(angles.begin(), angles.end());
   EXPECT_GT(angles[angles.size() / 10], 0.97);  // outward
+}
+
+TEST(MisfitWarning, PairsOfWhichManyCodesFitNoPointAreNamed) {
+  const std::vector<PairYield> right{{"proj0/cam0", 950, 50}, {"proj0/cam1", 5, 20}};
+  EXPECT_FALSE(misfit_warning(right));  // wrong codes at edges; too few to tell
+  std::vector<PairYield> wrong = right;
+  wrong.push_back({"proj1/cam1", 200, 800});
+  const auto warning = misfit_warning(wrong);
+  ASSERT_TRUE(warning);
+  EXPECT_THAT(*warning, testing::StartsWith("80 % of the codes of proj1/cam1 fit no point"));
 }
 
 }  // namespace
