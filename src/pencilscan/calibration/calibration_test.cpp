@@ -242,6 +242,31 @@ TEST(LoopClosure, AnArcHasNone) {
   EXPECT_TRUE(loop.devices.empty());
 }
 
+/// Before wide lenses fundamental matrices explain few correspondences: the rig does.
+TEST(Judge, PairsThatTheRigExplainsAreRigidWhateverFundamentalMatricesSay) {
+  const Rig truth = ring(2, 2);
+  for (const double wrong : {0.0, 0.5}) {
+    const CalibrationInput input =
+        input_of(truth, tracks_of(truth, {.count = 900, .outliers = wrong}), true);
+    CalibrationResult result = exact_ring(input.tracks, truth);
+    result.placed.assign(4, 1);
+    result.residuals.resize(4);
+    result.given.assign(4, GivenUse::kNone);
+    const std::size_t matches = matches_by_pair(input.tracks).at({0, 2}).size();
+    result.pairs = {{.camera = 0, .projector = 2, .matches = matches, .inliers = matches / 2}};
+    Uncertainty sigma;
+    sigma.devices.resize(4);
+    std::string all;
+    for (const Finding& finding : judge(input, result, sigma, {}).findings)
+      all += finding.what + "\n";
+    const auto complaint = HasSubstr("of the correspondences of proj0/cam0 fit a rigid scene");
+    if (wrong == 0)
+      EXPECT_THAT(all, Not(complaint));
+    else
+      EXPECT_THAT(all, complaint);
+  }
+}
+
 TEST(CalibrationReport, SaysVerdictLoopAndPlaces) {
   const Rig truth = ring(2, 2);
   const CalibrationInput input = input_of(truth, tracks_of(truth, {.count = 400}), true);

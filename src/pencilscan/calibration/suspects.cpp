@@ -7,7 +7,6 @@
 #include <set>
 
 #include "pencilscan/bundle/bundle_device.h"
-#include "pencilscan/calibration/pair_fit.h"
 #include "pencilscan/core/name_list.h"
 
 namespace pencilscan {
@@ -109,16 +108,23 @@ Finding name_mover(const CalibrationInput& input, const Matches& matches, const 
     for (const std::size_t capture : when) names.push_back(std::to_string(capture + 1));
     text += " (--captures number " + name_list(names) + ")";
   }
-  return {Grade::kDoubtful, text,
-          "fix the device, and take the captures again; those that do not fit were left out"};
+  return {
+      Grade::kDoubtful, text,
+      std::string("fix the device, and take the captures again; those that do not fit were left "
+                  "out") +
+          (when.empty() ? "" : ". Where nothing was touched, the object moved between pictures")};
 }
 
 }  // namespace
 
+PairFit tolerant_fit(const CalibrationResult& result) {
+  return {result.problem.devices, std::max(2.0, 8 * result.rms_px)};
+}
+
 Contradictions find_contradictions(const CalibrationInput& input, const CalibrationResult& result) {
   if (!result.solved) return {};
   const Matches matches = matches_by_pair(input.tracks);
-  const PairFit fit(result.problem.devices, std::max(2.0, 8 * result.rms_px));
+  const PairFit fit = tolerant_fit(result);
   Contradicting bad;
   std::set<std::size_t> numbers_of_bad;
   for (const auto& [pair, list] : matches) {

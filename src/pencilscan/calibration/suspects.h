@@ -3,6 +3,7 @@
 #include <map>
 #include <vector>
 
+#include "pencilscan/calibration/pair_fit.h"
 #include "pencilscan/calibration/pair_matches.h"
 #include "pencilscan/calibration/verdict.h"
 
@@ -15,6 +16,9 @@ struct Contradictions {
   /// at all), with the captures in which they contradict; none: in all.
   std::map<DevicePair, std::vector<std::size_t>> unexplained;
 };
+
+/// To ask whether correspondences agree with a rig: to 8 times its errors, 2 px at least.
+[[nodiscard]] PairFit tolerant_fit(const CalibrationResult& result);
 
 /// Pairs whose correspondences contradict the rig, explained: swapped folders, a device that moved
 /// between captures or between projectors, or a scene that moved.

@@ -5,6 +5,7 @@
 
 #include "pencilscan/bundle/bundle_device.h"
 #include "pencilscan/calibration/given_values.h"
+#include "pencilscan/calibration/pair_fit.h"
 #include "pencilscan/calibration/suspects.h"
 #include "pencilscan/core/formatted.h"
 #include "pencilscan/core/length_units.h"
@@ -107,12 +108,20 @@ class Judge {
   void judge_pairs() {
     for (const Finding& finding : find_contradictions(input_, result_).findings)
       findings_.push_back(finding);
+    const auto matches = matches_by_pair(input_.tracks);
+    const PairFit fit = tolerant_fit(result_);
     for (const PairGeometry& pair : result_.pairs) {
       if (pair.matches < 24 || pair.inlier_share() >= options_.low_inlier_share) continue;
+      // Fundamental matrices know no distortion: before a wide lens the rig explains what they do
+      // not.
+      const auto list = matches.find({pair.camera, pair.projector});
+      const double by_rig =
+          list == matches.end() ? 0 : fit.share(list->second, pair.camera, pair.projector);
+      const double share = std::max(pair.inlier_share(), by_rig);
+      if (share >= options_.low_inlier_share) continue;
       add(Grade::kDoubtful,
-          "only " + percent(pair.inlier_share()) + " of the correspondences of " +
-              name(pair.projector) + "/" + name(pair.camera) +
-              " fit a rigid scene seen by one camera and one projector",
+          "only " + percent(share) + " of the correspondences of " + name(pair.projector) + "/" +
+              name(pair.camera) + " fit a rigid scene seen by one camera and one projector",
           "look at these images: something moved, or files are mixed up");
     }
   }
