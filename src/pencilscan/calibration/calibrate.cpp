@@ -322,6 +322,7 @@ class Calibration {
     rig = scaled(std::move(rig), frame.of_given);
     rig.unit_known = frame.is_scaled;
     if (frame.contradicts_given) result_.given_times = frame.of_given;
+    result_.board_times = frame.of_board;
     if (frame.is_given) return;
     result_.has_lost_volume = rig.volume.has_value();
     result_.has_lost_floor = rig.floor.has_value();

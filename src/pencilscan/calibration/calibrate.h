@@ -68,6 +68,8 @@ struct CalibrationResult {
   /// What the known distance or the board makes of millimetres that given poses contradict; the
   /// rig's volume and floor were multiplied by it.
   std::optional<double> given_times;
+  /// What the known distance makes of the board's millimetres, which contradict it.
+  std::optional<double> board_times;
   bool has_lost_volume = false;  ///< the stated one was of a frame that too few given poses tell
   bool has_lost_floor = false;
   GivenTolerance tolerance;  ///< of them

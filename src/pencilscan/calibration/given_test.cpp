@@ -14,6 +14,7 @@ namespace pencilscan {
 namespace {
 
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 /// Two cameras and a projector with a shifted lens before a wall that is tilted, and a few things
 /// that stand before it.
@@ -157,6 +158,86 @@ TEST_F(BeforeAWall, TheSkewOfAGivenKIsKept) {
   EXPECT_EQ(result.given[0], GivenUse::kExact);
   EXPECT_LT(result.rms_px, 0.2);  // 0.1 px in each coordinate
   EXPECT_LT(sample::projection_error(truth_, result.problem), 0.3);
+}
+
+/// Cameras whose K is given, found without error; then stated otherwise.
+class GivenRing : public testing::Test {
+ protected:
+  GivenRing() : input_(sample::input_of(truth_, {}, true)) {
+    for (std::size_t d = 0; d < device_count(truth_); ++d) {
+      BundleDevice device = bundle_device(device_at(truth_, d));
+      device.present = true;
+      set_priors(input_.known[d], GivenTolerance{}, d < kCameras, device_at(truth_, d), device);
+      found_.problem.devices.push_back(device);
+      found_.given.push_back(d < kCameras ? GivenUse::kTolerance : GivenUse::kNone);
+    }
+    found_.solved = true;
+    found_.rig = truth_;
+    found_.placed.assign(device_count(truth_), 1);
+    found_.residuals.resize(device_count(truth_));
+  }
+
+  /// The first cameras' focal lengths are stated too large, by so many tolerances.
+  void overstate(std::size_t cameras, double tolerances) {
+    for (std::size_t d = 0; d < cameras; ++d) {
+      const double factor = 1 / (1 - tolerances * GivenTolerance{}.focal);
+      input_.rig.cameras[d].K(0, 0) *= factor;
+      input_.rig.cameras[d].K(1, 1) *= factor;
+    }
+  }
+  [[nodiscard]] std::string findings() const {
+    Uncertainty sigma;
+    sigma.devices.resize(device_count(truth_));
+    std::string all;
+    for (const Finding& finding : judge(input_, found_, sigma, {}).findings)
+      if (finding.grade == Grade::kDoubtful) all += finding.what + "\n";
+    return all;
+  }
+
+  static constexpr std::size_t kCameras = 4;
+  Rig truth_ = sample::ring(kCameras, 2);
+  CalibrationInput input_;
+  CalibrationResult found_;
+};
+
+TEST_F(GivenRing, OneKMayBeOffByTwoTolerances) {
+  overstate(1, 2.4);
+  EXPECT_FALSE(is_any_pulled(input_, {}, found_.problem));
+  EXPECT_THAT(findings(), Not(HasSubstr("given K")));
+}
+
+/// Each alone would pass, and a ring with all focal lengths wrong alike fits its data.
+TEST_F(GivenRing, AllKAreNotOffByTwoTolerances) {
+  overstate(kCameras, 2.4);
+  EXPECT_TRUE(is_any_pulled(input_, {}, found_.problem));
+  EXPECT_THAT(findings(), HasSubstr("the data contradict the given K together"));
+}
+
+/// A board whose squares are no squares stretches everything, and the pixels of the cameras.
+TEST_F(GivenRing, AGivenKDoesNotExcusePixelsThatAreNotSquare) {
+  EXPECT_THAT(findings(), Not(HasSubstr("fy / fx")));
+  found_.problem.devices[0].inner[kFy] *= 1.009;
+  EXPECT_THAT(findings(), HasSubstr("fy / fx of cam0 lies 4.5 standard deviations"));
+}
+
+/// Long lenses far away: first guesses of focal lengths end at four image widths, these are nine.
+TEST(Calibrate, TelephotoLensesAreKnownAsWellAsTheirDeviationsSay) {
+  Rig truth;
+  for (const double y : {0.0, 2700.0})
+    truth.cameras.push_back(sample::device_at<Camera>(
+        {5000, y, 1400}, "cam" + std::to_string(truth.cameras.size()), 640, 480, 6000));
+  for (const double y : {1400.0, 3900.0})
+    truth.projectors.push_back(sample::device_at<Projector>(
+        {4800, y, y < 2000 ? 700.0 : 2600.0}, "proj" + std::to_string(truth.projectors.size()), 640,
+        512, 6000));
+  const auto tracks = sample::tracks_of(truth, {.count = 1500, .radius = 110});
+  const auto result = calibrate(sample::input_of(truth, tracks, true), {.hypotheses = 2});
+  ASSERT_TRUE(result.solved);
+  const Uncertainty sigma = uncertainty(result.problem, result.adjustment);
+  for (std::size_t d = 2; d < 4; ++d) {
+    const double error = device_at(result.rig, d).K(0, 0) - 6000;
+    EXPECT_LT(std::abs(error), 2.5 * sigma.devices[d].inner[kFx]) << d;
+  }
 }
 
 }  // namespace

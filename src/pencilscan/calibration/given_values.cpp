@@ -7,6 +7,16 @@
 #include "pencilscan/bundle/bundle_device.h"
 
 namespace pencilscan {
+namespace {
+
+/// A sum of `count` squares of unit normals as one normal deviation (Wilson and Hilferty 1931).
+double normal_deviation(double sum, double count) {
+  if (count == 0) return 0;
+  const double variance = 2 / (9 * count);
+  return (std::cbrt(sum / count) - (1 - variance)) / std::sqrt(variance);
+}
+
+}  // namespace
 
 std::array<double, 4> moved_deviations(const Device& given, const GivenTolerance& tolerance,
                                        const BundleDevice& found) {
@@ -20,8 +30,26 @@ std::array<double, 4> moved_deviations(const Device& given, const GivenTolerance
   return moved;
 }
 
+double common_pull(const CalibrationInput& input, const std::vector<char>& counts,
+                   const GivenTolerance& tolerance, const BundleProblem& problem) {
+  double focal = 0;
+  double center = 0;
+  double count = 0;
+  for (std::size_t d = 0; d < counts.size(); ++d) {
+    if (counts[d] == 0 || !input.known[d].K || !problem.devices[d].present) continue;
+    const auto moved = moved_deviations(device_at(input.rig, d), tolerance, problem.devices[d]);
+    // fx and fy of a lens are wrong alike: one number.
+    focal += (moved[kFx] * moved[kFx] + moved[kFy] * moved[kFy]) / 2;
+    center += moved[kCx] * moved[kCx] + moved[kCy] * moved[kCy];
+    ++count;
+  }
+  return std::max(normal_deviation(focal, count), normal_deviation(center, 2 * count));
+}
+
 bool is_any_pulled(const CalibrationInput& input, const GivenTolerance& tolerance,
                    const BundleProblem& problem) {
+  const std::vector<char> all(input.known.size(), 1);
+  if (common_pull(input, all, tolerance, problem) > kContradictsDeviations) return true;
   for (std::size_t d = 0; d < input.known.size(); ++d) {
     if (!input.known[d].K || !problem.devices[d].present) continue;
     const auto moved = moved_deviations(device_at(input.rig, d), tolerance, problem.devices[d]);

@@ -16,7 +16,13 @@ namespace pencilscan {
 /// A K that the data pull this far is contradicted, deviations of its tolerance.
 inline constexpr double kContradictsDeviations = 3;
 
-/// Whether any given K moved by more than that.
+/// How unlikely it is that given K are off by this much all together, in deviations of a normal
+/// distribution: the larger one of focal lengths and of principal points. A common error moves each
+/// K by less than what contradicts it alone. `counts`: per device, the K that are asked about.
+[[nodiscard]] double common_pull(const CalibrationInput& input, const std::vector<char>& counts,
+                                 const GivenTolerance& tolerance, const BundleProblem& problem);
+
+/// Whether any given K moved by more than that, or all of them together.
 [[nodiscard]] bool is_any_pulled(const CalibrationInput& input, const GivenTolerance& tolerance,
                                  const BundleProblem& problem);
 

@@ -76,13 +76,15 @@ Similarity similarity_of(const GivenCenters& centers) {
   return {scale, {S.block<3, 3>(0, 0) / scale, S.block<3, 1>(0, 3)}};
 }
 
-/// By how much, as a logarithm, a measured scale and given poses may differ that are both right. A
-/// tape between lenses is good to some 2.5 %: nobody sees their pupils, which are centimetres deep.
+/// By how much, as a logarithm, two measured scales may differ that are both right. A tape between
+/// lenses is good to some 2.5 %: nobody sees their pupils, which are centimetres deep.
+constexpr double kMeasured = 0.05;
+
+/// The same of a measured scale and given poses.
 /// Poses that were measured alike err by as much. Rough ones miss the solution: the scale of n
 /// poses has the deviation of a coordinate, which 3 n - 7 surplus numbers show, over the poses'
 /// spread.
 double scale_tolerance(const GivenCenters& centers, const Similarity& given_from_found) {
-  constexpr double kMeasured = 0.05;
   constexpr double kDeviations = 3;
   const auto& [scale, motion] = given_from_found;
   const Eigen::Matrix3Xd moved =
@@ -155,14 +157,21 @@ void move_solution(double scale, const RigidTransform& new_from_old, BundleProbl
 
 FixedFrame fix_frame(const CalibrationInput& input, BundleProblem& problem) {
   std::optional<double> measured = scale_by_distance(input, problem);
-  if (!measured && !problem.board_views.empty()) measured = 1;
+  const bool is_by_board = !problem.board_views.empty();  // the solution is in its millimetres
+  std::optional<double> of_board;
+  if (is_by_board && measured && std::abs(std::log(*measured)) > kMeasured) of_board = measured;
+  if (!measured && is_by_board) measured = 1;
   const GivenCenters centers = given_centers(input, problem);
-  if (centers.found.cols() >= 3)
-    return fix_given_frame(centers, input.rig.unit_known, measured, problem);
+  FixedFrame frame;
+  if (centers.found.cols() >= 3) {
+    frame = fix_given_frame(centers, input.rig.unit_known, measured, problem);
+    frame.of_board = of_board;
+    return frame;
+  }
   move_solution(1, own_frame(problem, input.rig.cameras.size()), problem);
   move_solution(measured.value_or(usual_scale(problem)), {}, problem);
-  FixedFrame frame;
   frame.is_scaled = measured.has_value();
+  frame.of_board = of_board;
   return frame;
 }
 

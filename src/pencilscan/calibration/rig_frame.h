@@ -12,6 +12,8 @@ struct FixedFrame {
   bool is_given = false;   ///< it is the frame of the given poses
   double of_given = 1;     ///< what lengths in the frame of the given poses are multiplied by
   bool contradicts_given = false;  ///< these were in millimetres, and `of_given` is not 1
+  /// What the known distance makes of the board's millimetres, where the two contradict each other.
+  std::optional<double> of_board;
 };
 /// Puts the solution into the frame of three or more given poses; without these, into one of its
 /// own: origin in the middle of the points, z against the cameras' mean "down". The scale is that

@@ -12,6 +12,7 @@ namespace {
 
 using ::testing::AllOf;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 /// A ring found without error, in a frame and a unit of nobody.
 class FrameOfAKnownRing : public testing::Test {
@@ -112,6 +113,23 @@ TEST_F(FrameOfAKnownRing, SoDoesABoard) {
   EXPECT_LT(miss(), kRoundingMm);
 }
 
+TEST_F(FrameOfAKnownRing, ADistanceThatABoardContradictsIsTold) {
+  move_solution(100, {}, problem_);  // in the board's millimetres
+  problem_.board_poses.emplace_back();
+  problem_.board_views.emplace_back();
+  for (const std::size_t poses : {0U, 3U}) {
+    give_poses(poses);
+    measure(1.02);
+    BundleProblem problem = problem_;
+    EXPECT_FALSE(fix_frame(input_, problem).of_board);
+    measure(1.11);
+    problem = problem_;
+    const FixedFrame frame = fix_frame(input_, problem);
+    ASSERT_TRUE(frame.of_board) << poses;
+    EXPECT_NEAR(*frame.of_board, 1.11, 1e-9);
+  }
+}
+
 TEST_F(FrameOfAKnownRing, TwoPosesDoNotTellIt) {
   give_poses(2);
   EXPECT_FALSE(fix_frame(input_, problem_).is_given);
@@ -157,6 +175,18 @@ TEST(Calibrate, ADistanceThatContradictsGivenPosesIsNamedAndScalesVolumeAndFloor
   EXPECT_THAT(all_findings(verdict),
               AllOf(HasSubstr("the known distance and the given poses contradict each other"),
                     HasSubstr("the known distance is probably in centimetres")));
+}
+
+TEST(Judge, ADistanceThatTheBoardContradictsIsNamed) {
+  const CalibrationInput input = with_volume(0);
+  CalibrationResult result = calibrate(input, {.hypotheses = 2});
+  EXPECT_THAT(all_findings(judged(input, result)), Not(HasSubstr("contradict each other")));
+  result.board_times = 10;
+  const Verdict verdict = judged(input, result);
+  EXPECT_EQ(verdict.grade, Grade::kDoubtful);
+  EXPECT_THAT(all_findings(verdict),
+              AllOf(HasSubstr("the known distance and the board contradict each other"),
+                    HasSubstr("the board is probably in centimetres")));
 }
 
 TEST(Calibrate, VolumeAndFloorStayInTheGivenFrameAndAreLeftOutOfAnother) {

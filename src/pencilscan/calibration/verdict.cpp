@@ -197,7 +197,8 @@ class Judge {
     double worst = 0;
     const char* which = "";
     for (const std::size_t i : {kFy, kP1, kP2, kCx, kK1, kK2}) {
-      if (is_given(d) && i <= kCy) continue;
+      // How far a given K moved is told in its tolerances, but for the shape of its pixels.
+      if (is_given(d) && (i == kCx || i == kCy)) continue;
       const double sigma = device.prior_sigma[i];
       if (sigma == 0 || !std::isfinite(sigma)) continue;
       const double value = i == kFy ? device.inner[kFy] / device.inner[kFx] : device.inner[i];
@@ -207,10 +208,14 @@ class Judge {
       which = i == kFy ? "fy / fx" : kIntrinsicNames[i];
     }
     if (worst < 3) return;
+    const bool has_board = !result_.problem.board_views.empty();
     add(Grade::kDoubtful,
         std::string(which) + " of " + name(d) + " lies " + formatted(worst) +
-            " standard deviations from what such devices have: the data contradict the model",
-        "check that nothing moved and that no glass or mirror is in the way, and add captures");
+            " standard deviations from what such devices have" +
+            (is_given(d) ? " and from what was given" : "") + ": the data contradict the model",
+        std::string("check that nothing moved and that no glass or mirror is in the way") +
+            (has_board ? ", and that the board is flat and its squares are square" : "") +
+            ", and add captures");
   }
 
   void judge_volume() {
@@ -232,8 +237,28 @@ class Judge {
     if (!result_.rig.unit_known)
       add(Grade::kGood, "the scale is not known: the rig's unit is \"unknown\"",
           "give --known-distance, or a --board");
+    if (result_.board_times) judge_board_lengths(*result_.board_times);
     if (result_.given_times) judge_given_lengths(*result_.given_times);
     judge_given_places();
+  }
+
+  /// Of what is `factor` times as long by `measured` as by `other`: what is too short is in the
+  /// larger unit.
+  [[nodiscard]] static std::string unit_behind(double factor, const std::string& other,
+                                               const std::string& measured) {
+    constexpr double kUnitTolerance = 0.1;
+    const UnitFactor* unit = unit_behind_factor(std::max(factor, 1 / factor), kUnitTolerance);
+    if (unit == nullptr) return {};
+    return "; " + (factor > 1 ? other : measured) + " is probably in " + unit->words;
+  }
+
+  void judge_board_lengths(double factor) {
+    add(Grade::kDoubtful,
+        "the known distance and the board contradict each other: by the known distance, which "
+        "counts, lengths are " +
+            formatted(factor, "%.3g") + " times those by the board" +
+            unit_behind(factor, "the board", "the known distance"),
+        "measure a square of the board, and the distance of the lenses of these two devices");
   }
 
   /// A distance or a board against given poses, all in millimetres.
@@ -242,11 +267,7 @@ class Judge {
     std::string what = "the " + measured + " and the given poses contradict each other: by the " +
                        measured + ", lengths are " + formatted(factor, "%.3g") +
                        " times those of t. Poses, volume and floor were multiplied by it";
-    constexpr double kUnitTolerance = 0.1;
-    // What is too short is in the larger unit.
-    const std::string too_short = factor > 1 ? "t" : "the " + measured;
-    if (const UnitFactor* unit = unit_behind_factor(std::max(factor, 1 / factor), kUnitTolerance))
-      what += "; " + too_short + " is probably in " + unit->words;
+    what += unit_behind(factor, "t", "the " + measured);
     add(Grade::kDoubtful, what, "give the " + measured + " and t in mm");
   }
 
@@ -273,6 +294,7 @@ class Judge {
         "check that K is of this lens, focus and image size, or say how rough it is "
         "(--focal-tolerance, --center-tolerance)";
     std::string moved_within;
+    std::vector<char> within(result_.placed.size(), 0);
     for (std::size_t d = 0; d < result_.placed.size(); ++d) {
       if (result_.given[d] == GivenUse::kNone || result_.placed[d] == 0) continue;
       const BundleDevice& found = result_.problem.devices[d];
@@ -282,6 +304,7 @@ class Judge {
       const std::string by = kIntrinsicNames[most] + std::string(" ") + formatted(moved[most]);
       if (is_given(d) && moved[most] <= kContradictsDeviations) {
         add_name(moved_within, name(d) + " by " + by);
+        within[d] = 1;
         continue;
       }
       const bool is_free = result_.given[d] == GivenUse::kContradicted;
@@ -291,6 +314,15 @@ class Judge {
               (is_free ? ", so it was only a start" : ", though it was held near it"),
           advice);
     }
+    // A single one would be named above.
+    const double together = common_pull(input_, within, result_.tolerance, result_.problem);
+    if (together > kContradictsDeviations)
+      add(Grade::kDoubtful,
+          "the data contradict the given K together: that all are off by as much is as unlikely "
+          "as " +
+              formatted(together) +
+              " standard deviations, though each alone is near its tolerance (" + unit + ")",
+          advice);
     if (!moved_within.empty())
       add(Grade::kGood,
           "given K were kept; they moved, in their tolerances (" + unit + "): " + moved_within);
