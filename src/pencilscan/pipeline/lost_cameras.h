@@ -24,7 +24,7 @@ struct FoundCamera {
 
 struct CameraSearchOptions {
   double reach = 0.125;          ///< of the picture's longer side: how far it may be turned
-  double most_roll_degrees = 2;  ///< about the optical axis
+  double most_roll_degrees = 5;  ///< about the optical axis
 };
 
 /// What each camera's points, by the labels of all frames, say of those of the others.
