@@ -195,7 +195,7 @@ class GivenRing : public testing::Test {
   }
 
   static constexpr std::size_t kCameras = 4;
-  Rig truth_ = sample::ring(kCameras, 2);
+  Rig truth_ = sample::ring(kCameras, kCameras);
   CalibrationInput input_;
   CalibrationResult found_;
 };
