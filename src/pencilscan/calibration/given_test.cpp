@@ -220,25 +220,5 @@ TEST_F(GivenRing, AGivenKDoesNotExcusePixelsThatAreNotSquare) {
   EXPECT_THAT(findings(), HasSubstr("fy / fx of cam0 lies 4.5 standard deviations"));
 }
 
-/// Long lenses far away: first guesses of focal lengths end at four image widths, these are nine.
-TEST(Calibrate, TelephotoLensesAreKnownAsWellAsTheirDeviationsSay) {
-  Rig truth;
-  for (const double y : {0.0, 2700.0})
-    truth.cameras.push_back(sample::device_at<Camera>(
-        {5000, y, 1400}, "cam" + std::to_string(truth.cameras.size()), 640, 480, 6000));
-  for (const double y : {1400.0, 3900.0})
-    truth.projectors.push_back(sample::device_at<Projector>(
-        {4800, y, y < 2000 ? 700.0 : 2600.0}, "proj" + std::to_string(truth.projectors.size()), 640,
-        512, 6000));
-  const auto tracks = sample::tracks_of(truth, {.count = 1500, .radius = 110});
-  const auto result = calibrate(sample::input_of(truth, tracks, true), {.hypotheses = 2});
-  ASSERT_TRUE(result.solved);
-  const Uncertainty sigma = uncertainty(result.problem, result.adjustment);
-  for (std::size_t d = 2; d < 4; ++d) {
-    const double error = device_at(result.rig, d).K(0, 0) - 6000;
-    EXPECT_LT(std::abs(error), 2.5 * sigma.devices[d].inner[kFx]) << d;
-  }
-}
-
 }  // namespace
 }  // namespace pencilscan

@@ -150,8 +150,8 @@ Warning rig_warning(const CrossingDisagreement& crossings, RigInFrame rig_in_fra
           {{"median_px", crossings.median_px}, {"expected_px", crossings.expected_px}}};
 }
 
-std::optional<Warning> device_warning(const Rig& rig,
-                                      std::span<const CrossingDisagreement> device_crossings) {
+std::optional<std::size_t> device_that_is_off(
+    std::span<const CrossingDisagreement> device_crossings) {
   // Right devices with so many crossings reach 1.8 times what noise explains (2,293 results of
   // drawn rigs, artefacts, films and a path tracer); a projector that zooms by 2 % 6 times.
   constexpr std::size_t kEnough = 200;
@@ -163,19 +163,26 @@ std::optional<Warning> device_warning(const Rig& rig,
       std::max_element(device_crossings.begin(), device_crossings.end(),
                        [&](const auto& a, const auto& b) { return ratio(a) < ratio(b); });
   if (most == device_crossings.end() || !(ratio(*most) > kFarMore)) return std::nullopt;
-  const auto d = static_cast<std::size_t>(most - device_crossings.begin());
-  const std::string& name = device_at(rig, d).name;
+  return static_cast<std::size_t>(most - device_crossings.begin());
+}
+
+std::optional<Warning> device_warning(const Rig& rig,
+                                      std::span<const CrossingDisagreement> device_crossings) {
+  const std::optional<std::size_t> d = device_that_is_off(device_crossings);
+  if (!d) return std::nullopt;
+  const std::string& name = device_at(rig, *d).name;
+  const CrossingDisagreement& crossings = device_crossings[*d];
   return Warning{WarningCode::kDeviceIsOff,
-                 (d < rig.cameras.size() ? "camera " : "projector ") + name +
+                 (*d < rig.cameras.size() ? "camera " : "projector ") + name +
                      ": crossing lines of it miss each other by " +
-                     formatted(most->median_px, "%.2f") +
+                     formatted(crossings.median_px, "%.2f") +
                      " projector pixels (median) where image noise explains " +
-                     formatted(most->expected_px, "%.2f") +
+                     formatted(crossings.expected_px, "%.2f") +
                      ", more than those of any other device: it was moved or zoomed after the "
                      "calibration, or was calibrated badly; rig check --frames says by how much, "
                      "--refine-rig can correct it",
                  name,
-                 {{"median_px", most->median_px}, {"expected_px", most->expected_px}}};
+                 {{"median_px", crossings.median_px}, {"expected_px", crossings.expected_px}}};
 }
 
 std::vector<Warning> missing_lines_warnings(const Rig& rig,

@@ -35,6 +35,8 @@ namespace pencilscan {
 
 /// The one device whose crossings miss each other by far more than noise, where the rig as a whole
 /// does not (per device: cameras, then projectors). Counts alike in all resolutions.
+[[nodiscard]] std::optional<std::size_t> device_that_is_off(
+    std::span<const CrossingDisagreement> device_crossings);
 [[nodiscard]] std::optional<Warning> device_warning(
     const Rig& rig, std::span<const CrossingDisagreement> device_crossings);
 

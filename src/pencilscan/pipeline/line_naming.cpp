@@ -87,7 +87,7 @@ LineNaming name_lines(const Rig& rig, const std::vector<ColorFamily>& families,
   // Names need the rig only as far as the crossings tell; what they leave open stays as given.
   refinement.refine.max_remaining = std::numeric_limits<double>::infinity();
   // A frame alone leaves such a camera out and keeps the points of the others.
-  refinement.finds_lost_cameras = false;
+  refinement.is_for_rig = false;
   RigRefinement found = refine_rig_on_frames(rig, {&curves, 1}, refinement);
   if (found.report.refined) {
     Labeling& again = found.labelings.front();

@@ -9,6 +9,7 @@
 
 #include "pencilscan/core/formatted.h"
 #include "pencilscan/core/name_list.h"
+#include "pencilscan/pipeline/frame_warnings.h"
 #include "pencilscan/pipeline/line_naming.h"
 #include "pencilscan/pipeline/lost_cameras.h"
 #include "pencilscan/pipeline/naming_doubt.h"
@@ -174,6 +175,13 @@ RigFit check_rig_on_frames(const Rig& stated, std::span<const FrameCurves> frame
   fit.before = crossing_disagreement(rig, named.tracks);
   fit.after = crossing_disagreement(put_back, named.tracks);
   fit.doubt = named.doubt.text();
+  const auto per_device_after = device_disagreements(put_back, named.tracks);
+  if (const auto d = device_that_is_off(per_device_after); d && fit.doubt.empty()) {
+    fit.doubt = "crossing lines of " + device_at(rig, *d).name + " miss each other by " +
+                formatted(per_device_after[*d].median_px, "%.2f px (median), where image noise ") +
+                formatted(per_device_after[*d].expected_px, "explains %.2f") +
+                ", and putting devices back does not help";
+  }
   const auto per_device = device_disagreements(rig, named.tracks);
   for (std::size_t d = 0; d < device_count(rig); ++d) {
     fit.devices.push_back({device_at(rig, d).name, d >= rig.cameras.size(), per_device[d],

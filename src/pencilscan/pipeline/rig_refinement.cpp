@@ -7,8 +7,11 @@
 #include <string>
 #include <utility>
 
+#include "pencilscan/core/formatted.h"
 #include "pencilscan/joint/joint.h"
+#include "pencilscan/pipeline/frame_warnings.h"
 #include "pencilscan/pipeline/lost_cameras.h"
+#include "pencilscan/pipeline/naming_doubt.h"
 #include "pencilscan/pipeline/view_agreement.h"
 #include "pencilscan/refinement/moved_devices.h"
 #include "pencilscan/refinement/shown_colors.h"
@@ -174,6 +177,22 @@ Start start_of(const Rig& calibrated, std::span<const FrameCurves> frames) {
   return start;
 }
 
+/// What else speaks against a refined rig: few names of a device, or crossings that still miss each
+/// other.
+void object_as_rig(std::span<const FrameCurves> frames, Attempt& result) {
+  const Rig& rig = result.refinement.rig;
+  NamingDoubt doubt(rig);
+  for (std::size_t f = 0; f < frames.size(); ++f)
+    doubt.add(frames[f].families, frames[f].graphs, result.refinement.labelings[f]);
+  if (result.objection.empty()) result.objection = doubt.text();
+  const auto per_device = device_disagreements(rig, result.tracks);
+  if (const auto d = device_that_is_off(per_device); d && result.objection.empty()) {
+    result.objection = "crossing lines of " + device_at(rig, *d).name + " miss each other by " +
+                       formatted(per_device[*d].median_px, "%.2f px (median), ") +
+                       formatted(per_device[*d].expected_px, "where image noise explains %.2f");
+  }
+}
+
 Attempt attempt(const Rig& calibrated, std::span<const FrameCurves> frames, double tolerance,
                 const Start& start, const RigRefinementOptions& options) {
   Attempt result;
@@ -186,6 +205,7 @@ Attempt attempt(const Rig& calibrated, std::span<const FrameCurves> frames, doub
     return result;
   result.agrees = !disagrees(crossing_disagreement(result.refinement.rig, result.tracks));
   result.objection = objection(result.refinement.rig, frames, result.refinement.labelings);
+  if (options.is_for_rig) object_as_rig(frames, result);
   if (!result.objection.empty()) result.agrees = false;
   for (const Labeling& labeling : result.refinement.labelings)
     result.points += labelled_points(labeling);
@@ -210,7 +230,7 @@ RigRefinement refine_rig_on_frames(const Rig& stated, std::span<const FrameCurve
                                    const RigRefinementOptions& options) {
   const double unit = footprint(stated);
   const Rig calibrated = with_registered_patterns(scaled(stated, 1 / unit));
-  const Start start = options.finds_lost_cameras ? start_of(calibrated, frames) : Start{};
+  const Start start = options.is_for_rig ? start_of(calibrated, frames) : Start{};
   std::optional<Attempt> best;
   for (const double tolerance : options.first_tolerances_px) {
     Attempt next = attempt(calibrated, frames, tolerance, start, options);
@@ -221,7 +241,7 @@ RigRefinement refine_rig_on_frames(const Rig& stated, std::span<const FrameCurve
   RigRefinement result = std::move(best->refinement);
   if (result.report.refined && !best->objection.empty()) {
     result.report.refined = false;
-    result.report.reason = "where crossings meet, " + best->objection +
+    result.report.reason = "though most crossings meet, " + best->objection +
                            ": it stands too far from where the rig has it; calibrate anew";
   }
   if (result.report.refined) {

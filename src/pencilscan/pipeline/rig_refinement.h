@@ -18,8 +18,10 @@ struct RigRefinementOptions {
   std::vector<double> first_tolerances_px = {2, 3, 4, 6, 1};
   TrackOptions tracks;
   RefineRigOptions refine;
-  /// Cameras that stand far off are looked for first (lost_cameras.h).
-  bool finds_lost_cameras = true;
+  /// The rig is wanted, not only names for the lines of one frame. Then cameras that stand far off
+  /// are looked for first (lost_cameras.h), and a rig is refused in which one device's crossings
+  /// still miss each other by far more than noise (frame_warnings.h).
+  bool is_for_rig = true;
 };
 
 /// Labels and refinement at one tolerance.
