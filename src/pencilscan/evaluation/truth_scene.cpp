@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <numeric>
 #include <set>
 #include <span>
 #include <utility>
 
+#include "pencilscan/core/disjoint_sets.h"
 #include "pencilscan/geometry/mesh_sides.h"
 #include "pencilscan/geometry/used_vertices.h"
 
@@ -18,39 +18,31 @@ namespace {
 /// faces that pass it one way as the other. Of other parts nobody knows what is outside.
 class MeshParts {
  public:
-  explicit MeshParts(const TriangleMesh& mesh) : parent_(mesh.faces.size()) {
-    std::iota(parent_.begin(), parent_.end(), std::size_t{0});
+  explicit MeshParts(const TriangleMesh& mesh)
+      : parts_(mesh.faces.size()), is_closed_(mesh.faces.size(), 1) {
     const std::vector<FaceSide> sides = sides_by_edge(mesh);
     std::vector<std::size_t> ragged;  // faces at an edge that is not closed
     for_each_edge(sides, [&](std::span<const FaceSide> edge) {
       if (edge.front().low == edge.front().high) return;  // of a face that has a vertex twice
-      const auto first = static_cast<std::size_t>(edge.front().face);
+      const int first = edge.front().face;
       std::ptrdiff_t turns = 0;
       for (const FaceSide& side : edge) {
-        join(first, static_cast<std::size_t>(side.face));
+        parts_.join(first, side.face);
         turns += side.rises ? 1 : -1;
       }
-      if (turns != 0) ragged.push_back(first);
+      if (turns != 0) ragged.push_back(static_cast<std::size_t>(first));
     });
-    is_closed_.assign(parent_.size(), 1);
     for (const std::size_t face : ragged) is_closed_[root(face)] = 0;
   }
 
   [[nodiscard]] bool is_closed(std::size_t face) { return is_closed_[root(face)] != 0; }
   /// The first face of the part, which is its name.
   [[nodiscard]] std::size_t root(std::size_t face) {
-    while (parent_[face] != face) face = parent_[face] = parent_[parent_[face]];
-    return face;
+    return static_cast<std::size_t>(parts_.root(static_cast<int>(face)));
   }
 
  private:
-  void join(std::size_t a, std::size_t b) {
-    a = root(a);
-    b = root(b);
-    parent_[std::max(a, b)] = std::min(a, b);
-  }
-
-  std::vector<std::size_t> parent_;
+  DisjointSets parts_;
   std::vector<char> is_closed_;  ///< by root
 };
 

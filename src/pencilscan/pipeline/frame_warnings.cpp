@@ -166,6 +166,12 @@ std::optional<std::size_t> device_that_is_off(
   return static_cast<std::size_t>(most - device_crossings.begin());
 }
 
+std::string misses_text(const Device& device, const CrossingDisagreement& crossings) {
+  return "crossing lines of " + device.name + " miss each other by " +
+         formatted(crossings.median_px, "%.2f px (median), ") +
+         formatted(crossings.expected_px, "where image noise explains %.2f");
+}
+
 std::optional<Warning> device_warning(const Rig& rig,
                                       std::span<const CrossingDisagreement> device_crossings) {
   const std::optional<std::size_t> d = device_that_is_off(device_crossings);

@@ -2,6 +2,7 @@
 
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "pencilscan/core/warning.h"
@@ -37,6 +38,8 @@ namespace pencilscan {
 /// does not (per device: cameras, then projectors). Counts alike in all resolutions.
 [[nodiscard]] std::optional<std::size_t> device_that_is_off(
     std::span<const CrossingDisagreement> device_crossings);
+/// By how much its crossings miss, and what noise explains, in plain words.
+[[nodiscard]] std::string misses_text(const Device& device, const CrossingDisagreement& crossings);
 [[nodiscard]] std::optional<Warning> device_warning(
     const Rig& rig, std::span<const CrossingDisagreement> device_crossings);
 

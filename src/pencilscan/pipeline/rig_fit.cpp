@@ -177,9 +177,7 @@ RigFit check_rig_on_frames(const Rig& stated, std::span<const FrameCurves> frame
   fit.doubt = named.doubt.text();
   const auto per_device_after = device_disagreements(put_back, named.tracks);
   if (const auto d = device_that_is_off(per_device_after); d && fit.doubt.empty()) {
-    fit.doubt = "crossing lines of " + device_at(rig, *d).name + " miss each other by " +
-                formatted(per_device_after[*d].median_px, "%.2f px (median), where image noise ") +
-                formatted(per_device_after[*d].expected_px, "explains %.2f") +
+    fit.doubt = misses_text(device_at(rig, *d), per_device_after[*d]) +
                 ", and putting devices back does not help";
   }
   const auto per_device = device_disagreements(rig, named.tracks);

@@ -7,7 +7,6 @@
 #include <string>
 #include <utility>
 
-#include "pencilscan/core/formatted.h"
 #include "pencilscan/joint/joint.h"
 #include "pencilscan/pipeline/frame_warnings.h"
 #include "pencilscan/pipeline/lost_cameras.h"
@@ -122,14 +121,24 @@ bool run_rounds(const Rig& calibrated, std::span<const FrameCurves> frames, doub
   return true;
 }
 
-/// What speaks against the names, in plain words; empty: nothing.
-std::string objection(const Rig& rig, std::span<const FrameCurves> frames,
-                      std::span<const Labeling> labelings) {
-  if (const std::string denied = shown_colors(rig, frames, labelings).denied(); !denied.empty())
+/// What speaks against the names of a refined rig, in plain words; empty: nothing. As a rig it has
+/// to give every device names, and crossings that meet.
+std::string objection(std::span<const FrameCurves> frames, const Attempt& attempt,
+                      bool is_for_rig) {
+  const Rig& rig = attempt.refinement.rig;
+  const std::vector<Labeling>& labelings = attempt.refinement.labelings;
+  NamingDoubt doubt(rig);
+  for (std::size_t f = 0; f < frames.size(); ++f)
+    doubt.add(frames[f].families, frames[f].graphs, labelings[f]);
+  if (const std::string denied = doubt.denied(); !denied.empty())
     return "the colours of " + denied + " speak against its lines' names";
   if (const std::string camera = contradicted_camera(rig, frames, labelings); !camera.empty())
     return "what " + camera + " measures lies elsewhere than what the other cameras do";
-  return {};
+  if (!is_for_rig) return {};
+  if (const std::string unnamed = doubt.text(); !unnamed.empty()) return unnamed;
+  const auto per_device = device_disagreements(rig, attempt.tracks);
+  const auto off = device_that_is_off(per_device);
+  return off ? misses_text(device_at(rig, *off), per_device[*off]) : std::string();
 }
 
 /// Turns projectors of whose lines all colours say that they are a few lines further. True where
@@ -177,22 +186,6 @@ Start start_of(const Rig& calibrated, std::span<const FrameCurves> frames) {
   return start;
 }
 
-/// What else speaks against a refined rig: few names of a device, or crossings that still miss each
-/// other.
-void object_as_rig(std::span<const FrameCurves> frames, Attempt& result) {
-  const Rig& rig = result.refinement.rig;
-  NamingDoubt doubt(rig);
-  for (std::size_t f = 0; f < frames.size(); ++f)
-    doubt.add(frames[f].families, frames[f].graphs, result.refinement.labelings[f]);
-  if (result.objection.empty()) result.objection = doubt.text();
-  const auto per_device = device_disagreements(rig, result.tracks);
-  if (const auto d = device_that_is_off(per_device); d && result.objection.empty()) {
-    result.objection = "crossing lines of " + device_at(rig, *d).name + " miss each other by " +
-                       formatted(per_device[*d].median_px, "%.2f px (median), ") +
-                       formatted(per_device[*d].expected_px, "where image noise explains %.2f");
-  }
-}
-
 Attempt attempt(const Rig& calibrated, std::span<const FrameCurves> frames, double tolerance,
                 const Start& start, const RigRefinementOptions& options) {
   Attempt result;
@@ -204,8 +197,7 @@ Attempt attempt(const Rig& calibrated, std::span<const FrameCurves> frames, doub
       !run_rounds(calibrated, frames, tolerance, options, result))
     return result;
   result.agrees = !disagrees(crossing_disagreement(result.refinement.rig, result.tracks));
-  result.objection = objection(result.refinement.rig, frames, result.refinement.labelings);
-  if (options.is_for_rig) object_as_rig(frames, result);
+  result.objection = objection(frames, result, options.is_for_rig);
   if (!result.objection.empty()) result.agrees = false;
   for (const Labeling& labeling : result.refinement.labelings)
     result.points += labelled_points(labeling);

@@ -42,8 +42,8 @@ void fill_range(double range, double black, cv::Mat& image) {
   image = filled;
 }
 
-void fill_range(Rig& rig, Frame& frame) {
-  const double range = range_of(frame.images);
+/// `range`: of the frame's images.
+void fill_range(double range, Rig& rig, Frame& frame) {
   const double plain_range = range_of(frame.plain);
   if (range == 1 && plain_range == 1) return;
   frame.gains.assign(rig.cameras.size(), 1);
@@ -79,9 +79,8 @@ std::optional<double> median_below_black(const Camera& camera, const cv::Mat& st
   return median;
 }
 
-/// `frame` as it was read.
-std::optional<Warning> black_level_warning(const Rig& rig, const Frame& frame) {
-  const double range = range_of(frame.images);
+/// `frame` as it was read, `range`: of its images.
+std::optional<Warning> black_level_warning(double range, const Rig& rig, const Frame& frame) {
   std::string names;
   double first = 0;
   for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
@@ -108,9 +107,10 @@ std::optional<Warning> black_level_warning(const Rig& rig, const Frame& frame) {
 
 SensorFrame sensor_frame(Rig rig, Frame frame) {
   SensorFrame result{std::move(rig), std::move(frame)};
-  if (std::optional<Warning> warning = black_level_warning(result.rig, result.frame))
+  const double range = range_of(result.frame.images);
+  if (std::optional<Warning> warning = black_level_warning(range, result.rig, result.frame))
     result.frame.notes.push_back(std::move(*warning));
-  fill_range(result.rig, result.frame);
+  fill_range(range, result.rig, result.frame);
   std::vector<Camera>& cameras = result.rig.cameras;
   std::vector<std::optional<Mosaic>> mosaics(cameras.size());
   parallel_for(cameras.size(), [&](std::size_t c) {

@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "pencilscan/core/disjoint_sets.h"
 #include "pencilscan/geometry/mesh_sides.h"
 
 namespace pencilscan {
@@ -18,15 +19,12 @@ namespace {
 /// Corners of faces, three per face, that are one vertex.
 class Corners {
  public:
-  explicit Corners(std::size_t faces) : parent_(3 * faces) {
-    std::iota(parent_.begin(), parent_.end(), std::size_t{0});
-  }
+  explicit Corners(std::size_t faces) : sets_(3 * faces) {}
   static std::size_t index(int face, int corner) {
     return 3 * static_cast<std::size_t>(face) + static_cast<std::size_t>(corner % 3);
   }
   [[nodiscard]] std::size_t root(std::size_t c) {
-    while (parent_[c] != c) c = parent_[c] = parent_[parent_[c]];
-    return c;
+    return static_cast<std::size_t>(sets_.root(static_cast<int>(c)));
   }
   /// The two faces go on into each other over this edge.
   void join(const FaceSide& rising, const FaceSide& falling) {
@@ -35,12 +33,8 @@ class Corners {
   }
 
  private:
-  void join(std::size_t a, std::size_t b) {
-    a = root(a);
-    b = root(b);
-    parent_[std::max(a, b)] = std::min(a, b);
-  }
-  std::vector<std::size_t> parent_;
+  void join(std::size_t a, std::size_t b) { sets_.join(static_cast<int>(a), static_cast<int>(b)); }
+  DisjointSets sets_;
 };
 
 /// Orders the sides of one edge by the angle of their faces around it, from low to high.
