@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "pencilscan/rig/view_of_volume.h"
+
 namespace pencilscan {
 
 std::optional<DepthRange> depth_range(const Camera& camera, const Sphere& volume,
@@ -52,8 +54,7 @@ std::vector<LineCandidate> line_candidates(const Rig& rig, const Camera& camera,
 bool can_see_pattern(const Rig& rig, const Camera& camera, int projector) {
   // Light comes in at 77 degrees, and leaves so: a fifth of what it would be, on each way.
   constexpr double kMinCosine = -0.9;
-  return camera.forward().dot(rig.projectors[static_cast<std::size_t>(projector)].forward()) >
-         kMinCosine;
+  return gaze(camera).dot(gaze(rig.projectors[static_cast<std::size_t>(projector)])) > kMinCosine;
 }
 
 std::vector<float> phase_costs(const Rig& rig, const Camera& camera, const ColorFamily& family) {

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "pencilscan/core/median.h"
-#include "pencilscan/rig/viewing_distance.h"
+#include "pencilscan/rig/view_of_volume.h"
 
 namespace pencilscan {
 

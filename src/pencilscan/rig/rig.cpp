@@ -7,14 +7,14 @@
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/median.h"
 #include "pencilscan/geometry/least_squares.h"
-#include "pencilscan/rig/viewing_distance.h"
+#include "pencilscan/rig/view_of_volume.h"
 
 namespace pencilscan {
 namespace {
 
-/// Axes closer to parallel than this (smallest eigenvalue per device) have no meeting point.
-constexpr double kParallelAxes = 1e-4;
-/// Where the axes do not meet, the object is guessed at this many baselines in front.
+/// Gazes closer to parallel than this (smallest eigenvalue per device) have no meeting point.
+constexpr double kParallelGazes = 1e-4;
+/// Where the gazes do not meet, the object is guessed at this many baselines in front.
 constexpr double kGuessedBaselines = 5;
 /// Depth guessed for a single device, mm.
 constexpr double kGuessedDepth = 1000;
@@ -50,31 +50,31 @@ double visible_radius(const Device& device, const Vec3& center) {
                    (bottom * x.z() - x.y()) / std::hypot(1, bottom)});
 }
 
-/// In front of the devices where their axes tell nothing.
+/// In front of the devices where their gazes tell nothing.
 Vec3 guessed_center(const std::vector<const Device*>& devices) {
   Vec3 mean = Vec3::Zero(), forward = Vec3::Zero();
   double baseline = 0;
   for (const Device* device : devices) {
     mean += device->center() / static_cast<double>(devices.size());
-    forward += device->forward();
+    forward += gaze(*device);
     baseline = std::max(baseline, (device->center() - devices.front()->center()).norm());
   }
   const double depth = baseline > 0 ? kGuessedBaselines * baseline : kGuessedDepth;
   return mean + depth * forward.normalized();
 }
 
-/// min_x sum_i |(I - f_i f_i')(x - c_i)|^2 over the optical axes (c_i, f_i).
-Vec3 nearest_to_axes(const std::vector<const Device*>& devices) {
+/// min_x sum_i |(I - f_i f_i')(x - c_i)|^2 over the rays (c_i, f_i) through the pictures' middles.
+Vec3 nearest_to_gazes(const std::vector<const Device*>& devices) {
   Mat3 normal = Mat3::Zero();
   Vec3 right = Vec3::Zero();
   for (const Device* device : devices) {
-    const Vec3 forward = device->forward();
+    const Vec3 forward = gaze(*device);
     const Mat3 across = Mat3::Identity() - forward * forward.transpose();
     normal += across;
     right += across * device->center();
   }
   const Eigen::SelfAdjointEigenSolver<Mat3> eigen(normal);
-  if (eigen.eigenvalues()(0) < kParallelAxes * static_cast<double>(devices.size())) {
+  if (eigen.eigenvalues()(0) < kParallelGazes * static_cast<double>(devices.size())) {
     return guessed_center(devices);
   }
   const Vec3 center = solve_symmetric(normal, right);
@@ -97,7 +97,7 @@ Sphere working_volume(const Rig& rig) {
   const auto devices = all_devices(rig);
   if (devices.empty()) return {};
   Sphere volume;
-  volume.center = nearest_to_axes(devices);
+  volume.center = nearest_to_gazes(devices);
   std::vector<double> radii, distances;
   for (const Device* device : devices) {
     radii.push_back(visible_radius(*device, volume.center));
@@ -110,10 +110,10 @@ Sphere working_volume(const Rig& rig) {
 
 std::vector<int> adjacent_cameras(const Rig& rig, int camera, double min_cosine) {
   std::vector<int> result;
-  const Vec3 forward = rig.cameras[static_cast<std::size_t>(camera)].forward();
+  const Vec3 forward = gaze(rig.cameras[static_cast<std::size_t>(camera)]);
   for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
     if (static_cast<int>(c) == camera || rig.cameras[c].sees_texture_only) continue;
-    if (rig.cameras[c].forward().dot(forward) > min_cosine) result.push_back(static_cast<int>(c));
+    if (gaze(rig.cameras[c]).dot(forward) > min_cosine) result.push_back(static_cast<int>(c));
   }
   return result;
 }

@@ -107,7 +107,8 @@ void write_rig(const Rig& rig, const std::filesystem::path& path);
 void require_patterns(const Rig& rig, const std::string& source, const std::string& why);
 
 /// The sphere that holds the object: the stated one, or else derived from the devices: the point
-/// nearest to all optical axes (least squares), with the radius that the median device sees whole.
+/// nearest to the rays through all pictures' middles (least squares), with the radius that the
+/// median device sees whole.
 [[nodiscard]] Sphere working_volume(const Rig& rig);
 
 /// Name of its unit of length for people: "mm", or "units" where it is not known.

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
 #include <cmath>
 #include <fstream>
 #include <functional>
@@ -380,6 +381,25 @@ TEST(WorkingVolume, IsWhereTheAxesMeet) {
   EXPECT_LT((derived.center - Vec3(10, 20, 30)).norm(), 1e-6);
   // Half the image height, 480 px at f = 2300, from about 1100 mm: 1100 sin(atan(480 / 2300)).
   EXPECT_NEAR(derived.radius, 225, 10);
+}
+
+TEST(WorkingVolume, IsInTheMiddleOfThePicturesOfShiftedLenses) {
+  Rig rig = example_rig();
+  rig.volume.reset();
+  for (Camera& camera : rig.cameras) camera.distortion = {};
+  const Sphere before = working_volume(rig);
+  // The panel slides by 60 % of its height behind the lens, which turns back by as much.
+  for (Projector& projector : rig.projectors) {
+    const double shift = 0.6 * projector.height;
+    const double angle = std::atan(shift / projector.K(1, 1));
+    projector.K(1, 2) += shift;
+    projector.device_from_world =
+        RigidTransform{Eigen::AngleAxisd(angle, Vec3::UnitX()).toRotationMatrix(), Vec3::Zero()} *
+        projector.device_from_world;
+  }
+  const Sphere shifted = working_volume(rig);
+  EXPECT_LT((shifted.center - before.center).norm(), 0.05 * before.radius);
+  EXPECT_NEAR(shifted.radius, before.radius, 0.1 * before.radius);
 }
 
 TEST(WorkingVolume, IsFiniteAndInFrontForParallelAxes) {
