@@ -44,6 +44,12 @@ struct BoardCorner {
 [[nodiscard]] std::vector<BoardCorner> find_board(const cv::Mat& image,
                                                   const CalibrationBoard& board);
 
+/// True where the corners that were found of a chessboard are all that it has: one square lies
+/// between neighbours, and no further row of squares beyond those of the border. OpenCV also finds
+/// a part of a larger board, or every other row.
+[[nodiscard]] bool are_all_corners(const std::vector<BoardCorner>& corners, const cv::Mat& image,
+                                   const CalibrationBoard& board);
+
 /// Corners of a ChArUco board, in an image of bytes. Markers may stand as boards since OpenCV 4.6
 /// have them, or as older ones with an even number of rows: what fits is taken.
 [[nodiscard]] std::vector<BoardCorner> find_charuco(const cv::Mat& bytes,
@@ -54,7 +60,8 @@ class BoardFinder {
  public:
   explicit BoardFinder(CalibrationBoard board) : board_(std::move(board)) {}
 
-  /// Looks for the board in a camera's image of a capture, unless all of it was found before.
+  /// Looks for the board in a camera's image of a capture, unless all of it was found before. A
+  /// board of another size is none.
   void look(std::size_t capture, std::size_t camera, const cv::Mat& image);
   /// Where a projector (a device of the rig) has the corners that a camera found in a capture:
   /// the panel coordinates at the corners' pixels (D. Moreno, G. Taubin, "Simple, accurate, and
@@ -66,12 +73,15 @@ class BoardFinder {
   /// The same of projectors.
   [[nodiscard]] std::vector<BoardView> projected_views() const { return views_of(projected_); }
   [[nodiscard]] std::size_t found() const { return corners_.size(); }
+  /// Images that show a board of another size.
+  [[nodiscard]] std::size_t of_other_size() const { return of_other_size_; }
 
  private:
   using Corners = std::map<std::pair<std::size_t, std::size_t>, std::vector<BoardCorner>>;
   [[nodiscard]] std::vector<BoardView> views_of(const Corners& corners) const;
 
   CalibrationBoard board_;
+  std::size_t of_other_size_ = 0;
   Corners corners_;    ///< by capture and camera
   Corners projected_;  ///< by capture and projector
 };

@@ -64,6 +64,29 @@ TEST(Board, CornersAreFoundToATenthOfAPixelUnderPerspective) {
   EXPECT_TRUE(find_board(cv::Mat(480, 640, CV_32F, cv::Scalar(0.5)), kBoard).empty());
 }
 
+/// OpenCV finds a part of it, or every other row.
+TEST(Board, ALargerBoardThanStatedIsNone) {
+  constexpr int kCell = 40;
+  const cv::Matx33d view(0.9, 0.2, 60, -0.1, 0.8, 90, 2e-4, 3e-4, 1);
+  cv::Mat image;
+  cv::warpPerspective(flat_board(kCell), image, view, {640, 480}, cv::INTER_AREA);
+  cv::GaussianBlur(image, image, {}, 0.8);
+  cv::Mat noise(image.size(), CV_32F);
+  cv::RNG(1).fill(noise, cv::RNG::NORMAL, 0, 0.02);
+  image = 0.4 * image + noise;
+  for (const cv::Size size : {cv::Size(3, 3), cv::Size(9, 4), cv::Size(7, 5), cv::Size(3, 7)}) {
+    const CalibrationBoard board{size.width, size.height, 30, {}};
+    BoardFinder finder(board);
+    finder.look(0, 0, image);
+    EXPECT_EQ(finder.found(), 0U) << size;
+    EXPECT_EQ(finder.of_other_size(), 1U) << size;
+  }
+  BoardFinder finder(kBoard);
+  finder.look(0, 0, image);
+  EXPECT_EQ(finder.found(), 1U);
+  EXPECT_EQ(finder.of_other_size(), 0U);
+}
+
 /// The board under Gray codes: what falls on it is weighed by black and white, then blurred.
 TEST(Board, ProjectorsHaveCornersWhereCamerasFindThem) {
   constexpr int kCell = 40;

@@ -117,7 +117,12 @@ CapturesCalibration calibrate_captures(const UncalibratedRig& devices,
     input.board_views = boards->views();
     input.projected_corners = boards->projected_views();
     input.boards = folders.size();
-    if (boards->found() == 0)
+    if (boards->of_other_size() > 0)
+      findings.push_back({boards->found() == 0 ? Grade::kUnusable : Grade::kDoubtful,
+                          "pictures that show a board of another size than " + options.board +
+                              ": " + std::to_string(boards->of_other_size()),
+                          "count all inner corners of the board; those pictures were left out"});
+    else if (boards->found() == 0)
       findings.push_back({Grade::kDoubtful,
                           "the board " + options.board + " is in no picture of any camera",
                           "count its inner corners, and let a camera see all of it lit"});
