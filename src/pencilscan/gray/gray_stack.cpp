@@ -62,13 +62,10 @@ std::string names_of(const std::vector<DeviceT>& devices) {
 /// The range of the pictures' values, by some that are bright in whatever order they are.
 double range_of(const std::vector<fs::path>& files) {
   constexpr std::size_t kBright = 4;
-  double most = 0;
-  for (std::size_t i = 0; i < std::min(kBright, files.size()); ++i) {
-    const cv::Mat stored = read_stored_image(files[i]);
-    if (stored.depth() != CV_16U) return 1;
-    most = std::max(most, greatest_value(stored));
-  }
-  return sensor_range(most);
+  double range = 0;
+  for (std::size_t i = 0; i < std::min(kBright, files.size()); ++i)
+    range = std::max(range, sensor_range(read_stored_image(files[i])));
+  return range;
 }
 
 CapturePair capture_pair(const fs::path& folder, const Projector& projector) {
@@ -96,6 +93,7 @@ CapturePair capture_pair(const fs::path& folder, const Projector& projector) {
 cv::Mat read_color_image(const CapturePair& pair, const fs::path& path, const Camera& camera) {
   const cv::Mat stored = read_stored_image(path);
   check_channels(camera, stored.channels(), path);
+  check_light(stored, path);
   cv::Mat color = camera_values(camera, stored);
   if (color.cols != camera.width || color.rows != camera.height) {
     throw InputError(

@@ -28,10 +28,10 @@ bool is_of_16_bits(const cv::Mat& image) { return !image.empty() && image.depth(
 
 /// Of all cameras alike, so that their light compares.
 double range_of(const std::vector<cv::Mat>& images) {
-  double most = -1;
+  double range = 0;
   for (const cv::Mat& image : images)
-    if (is_of_16_bits(image)) most = std::max(most, greatest_value(image));
-  return most < 0 ? 1 : sensor_range(most);
+    if (is_of_16_bits(image)) range = std::max(range, sensor_range(image));
+  return range == 0 ? 1 : range;
 }
 
 /// Values of a sensor with fewer bits than 16 fill the range, and its black is 0.

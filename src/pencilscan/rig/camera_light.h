@@ -11,8 +11,11 @@ namespace pencilscan {
 
 /// InputError, named by `path`, when an image of a camera with a mosaic has three channels.
 void check_channels(const Camera& camera, int channels, const std::filesystem::path& path);
+/// InputError, named by `path`, when an image is of floating point and no light from 0 to 1: more
+/// than 1 % of it are above 1, or so far below 0 that it is no noise around black (-0.1).
+void check_light(const cv::Mat& image, const std::filesystem::path& path);
 /// The image of a file as read_stored_image() has it; InputError when it has other channels or
-/// another size than the camera, or is of floating point and more than 1 % of it are above 1.
+/// another size than the camera, or is none of check_light().
 [[nodiscard]] cv::Mat read_camera_image(const Camera& camera, const std::filesystem::path& path);
 
 /// InputError where read_camera_image() would have one, without decoding what is sound by its
@@ -28,11 +31,9 @@ void check_camera_image(const Camera& camera, const std::filesystem::path& path)
 [[nodiscard]] cv::Mat linear_light(const Camera& camera, const cv::Mat& stored);
 
 /// Sensors of 10, 12 or 14 bits fill 16 of them, or leave their values in the low ones. The
-/// greatest value that a sensor has whose pictures, CV_16U, have `most` at most: of the fewest bits
-/// that hold it, in [0, 1] of 16 bits.
-[[nodiscard]] double sensor_range(double most);
-/// The greatest value of an image as stored, of any channel.
-[[nodiscard]] double greatest_value(const cv::Mat& stored);
+/// greatest value, in [0, 1] of 16 bits, of the sensor with the fewest bits that hold the image:
+/// all of it but a ten-thousandth, of pixels that are stuck. 1 for other images than CV_16U.
+[[nodiscard]] double sensor_range(const cv::Mat& stored);
 
 /// Values in [0, 1] from here on are at the top of the range.
 inline constexpr float kFullRange = 0.998F;

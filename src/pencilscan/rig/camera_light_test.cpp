@@ -55,5 +55,41 @@ TEST(PicturesOfFloatingPoint, HaveValuesUpToOne) {
   EXPECT_THROW((void)read_camera_image(camera, path), InputError);
 }
 
+/// Pictures whose black was taken out have noise around 0; those from -1 to 1 are no light.
+TEST(PicturesOfFloatingPoint, AreNotNegativeButForNoise) {
+  const TemporaryFolder folder("negative_pictures");
+  Camera camera;
+  camera.width = 40;
+  camera.height = 30;
+  const std::filesystem::path path = folder.path() / "cam0.tiff";
+  cv::Mat noise(camera.height, camera.width, CV_32FC1);
+  cv::RNG(1).fill(noise, cv::RNG::NORMAL, 0, 0.03);
+  write_image(path, noise);
+  EXPECT_NO_THROW((void)read_camera_image(camera, path));
+  cv::Mat centred(camera.height, camera.width, CV_32FC1);
+  cv::RNG(1).fill(centred, cv::RNG::UNIFORM, -1, 1);
+  centred.at<float>(0, 0) = -1;
+  write_image(path, centred);
+  try {
+    (void)read_camera_image(camera, path);
+    FAIL() << "values below 0 were taken for light";
+  } catch (const InputError& error) {
+    EXPECT_EQ(error.path, path.string());
+    EXPECT_EQ(error.value, "-1");
+  }
+}
+
+/// One that is stuck at the top of 16 bits does not hide that the others have 12.
+TEST(SensorRange, IsThatOfAllPixelsButFew) {
+  cv::Mat stored(480, 640, CV_16UC1);
+  cv::RNG(1).fill(stored, cv::RNG::UNIFORM, 0, 4096);
+  EXPECT_EQ(sensor_range(stored), 4095. / 65535);
+  stored.at<std::uint16_t>(100, 200) = 65535;
+  EXPECT_EQ(sensor_range(stored), 4095. / 65535);
+  stored.row(100).setTo(30000);
+  EXPECT_EQ(sensor_range(stored), 1);
+  EXPECT_EQ(sensor_range(cv::Mat(480, 640, CV_8UC3, cv::Scalar::all(3))), 1);
+}
+
 }  // namespace
 }  // namespace pencilscan
