@@ -5,7 +5,8 @@ light/<frame>/<camera>.png (linear light, 16 bit); pictures that are there stay.
 more than a matt object; lengths are in the rig's unit:
 
   samples, bounces   paths per pixel; reflections that light may take (0: only what projectors light)
-  ambient            even light from all around: image value of a white surface
+  ambient            even light from all around: image value of a white surface; what is behind the
+                     object stays black
   aperture           diameter of the cameras' lenses, focused at reference_distance
   material           inputs of Blender's Principled BSDF by name ("Base Color", "Roughness",
                      "Subsurface", "Subsurface Color", "Subsurface Radius" ...), or a matt "Color"
@@ -50,6 +51,7 @@ def settings():
     image.file_format, image.color_mode, image.color_depth = "PNG", "RGB", "16"
     scene.world = bpy.data.worlds.new("surroundings")
     scene.world.use_nodes = True
+    scene.render.film_transparent = True  # cameras see no light behind the object
     scene.world.node_tree.nodes["Background"].inputs[0].default_value = (*[SCENE["ambient"]] * 3, 1)
     return scene
 

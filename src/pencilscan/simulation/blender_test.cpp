@@ -62,6 +62,28 @@ TEST_F(BlenderScene, BlenderRendersTheSamePicture) {
   }
 }
 
+TEST_F(BlenderScene, BlenderLightsNoBackground) {
+  if (std::system("command -v blender > /dev/null 2>&1") != 0) GTEST_SKIP() << "no blender here";
+  const Rig rig = two_projectors();
+  const SimulatedObject ball(make_sphere(40, 24));  // no part of it keeps light from another
+  RenderOptions options;
+  options.ambient = 0.1;
+  write_blender_scene(folder_, rig, ball.surface(), {}, options);
+  write_blender_object(folder_, "000000", ball);
+  nlohmann::json scene = nlohmann::json::parse(read_file(folder_ / "scene.json"));
+  scene["samples"] = 64;
+  scene["bounces"] = 0;
+  write_json(folder_ / "scene.json", scene);
+  const std::string command =
+      "cd '" + folder_.string() + "' && blender -b -P render.py > log.txt 2>&1";
+  ASSERT_EQ(std::system(command.c_str()), 0);
+  const cv::Mat theirs = read_image(folder_ / "light" / "000000" / "cam0.png");
+  const cv::Mat ours = cv::min(render_camera(rig, 0, ball, line_lights(rig), options), 1.0);
+  EXPECT_EQ(theirs.at<cv::Vec3f>(0, 0), cv::Vec3f(0, 0, 0));
+  for (int k = 0; k < 3; ++k)
+    EXPECT_NEAR(cv::mean(theirs)[k] / cv::mean(ours)[k], 1, 0.01) << "channel " << k;
+}
+
 TEST_F(BlenderScene, RefusesWhatBlenderLacks) {
   Rig rig = two_projectors();
   EXPECT_NO_THROW(check_blender_can_show(rig, {}, "rig.json"));
