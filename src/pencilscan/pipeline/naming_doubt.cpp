@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "pencilscan/core/formatted.h"
+#include "pencilscan/core/median.h"
 #include "pencilscan/core/name_list.h"
 
 namespace pencilscan {
@@ -53,6 +54,19 @@ void NamingDoubt::add(const std::vector<ColorFamily>& families, std::span<const 
   }
 }
 
+bool NamingDoubt::shows_lines(std::size_t projector) const {
+  // Of a projector that is off, what is drawn in its colours is what is left of others that share
+  // them: .11 of what the others have named (six cameras, six projectors). Of one that was turned
+  // by 3 degrees it is 1.06. The root of their product.
+  constexpr double kShown = 0.34;
+  const std::size_t first = rig_->cameras.size();
+  std::vector<std::size_t> named;
+  for (std::size_t d = first; d < devices_.size(); ++d)
+    if (d != first + projector) named.push_back(devices_[d].named);
+  const auto usual = static_cast<double>(upper_median(std::move(named)));
+  return static_cast<double>(devices_[first + projector].all()) >= kShown * usual;
+}
+
 bool NamingDoubt::lacks_names(std::size_t device, std::size_t sharing) const {
   const TellingPoints& points = devices_[device];
   return points.are_enough() && points.named_share() <= kMostNamed / static_cast<double>(sharing);
@@ -83,7 +97,7 @@ std::string NamingDoubt::of_projectors() const {
   std::string text;
   for (std::size_t p = 0; p < sharing.size(); ++p) {
     const std::string lack = unnamed(rig_->cameras.size() + p, sharing[p]);
-    if (!lack.empty()) add_name(text, lack, "; ");
+    if (!lack.empty() && shows_lines(p)) add_name(text, lack, "; ");
   }
   const std::string projectors = denied();
   if (!projectors.empty())

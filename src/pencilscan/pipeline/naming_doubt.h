@@ -26,7 +26,7 @@ class NamingDoubt {
   /// Projectors whose lines are of several colours and all look alike; empty: none.
   [[nodiscard]] std::string alike() const { return colors_.alike(); }
   /// In plain words, projectors most of what is drawn in whose colours has no name, and devices
-  /// that colours deny; empty: none.
+  /// that colours deny; empty: none. One that shows nothing is not among them.
   [[nodiscard]] std::string of_projectors() const;
   /// The same, and cameras most of whose curves have no name.
   [[nodiscard]] std::string text() const;
@@ -36,6 +36,9 @@ class NamingDoubt {
   [[nodiscard]] const TellingPoints& telling(std::size_t device) const { return devices_[device]; }
 
  private:
+  /// False where hardly anything is drawn in a projector's colours that may be its own: it shows
+  /// nothing, wherever it stands.
+  [[nodiscard]] bool shows_lines(std::size_t projector) const;
   [[nodiscard]] bool lacks_names(std::size_t device, std::size_t sharing) const;
   [[nodiscard]] std::string unnamed(std::size_t device, std::size_t sharing) const;
 

@@ -197,6 +197,21 @@ TEST_F(PictureCheck, AProjectorWithAnotherPatternIsNamed) {
   EXPECT_THAT(named(other, *frame_), testing::ElementsAre(rig_->projectors[2].name));
 }
 
+/// What is left in its colours is of others that share them, and no sign that it was moved.
+TEST_F(PictureCheck, AProjectorThatIsOffStandsNowhereElse) {
+  RingOptions ring;
+  ring.camera_width = 640;
+  ring.camera_height = 480;
+  ring.camera_focal_px = 1150;
+  const Rig rig = make_ring(ring);
+  Rig lit = rig;
+  lit.projectors.erase(lit.projectors.begin() + 2);
+  const Frame frame =
+      sample::photographed_frame(lit, SimulatedObject(make_sphere(120, 40)), photography());
+  for (const Warning& warning : measure_points(rig, frame).warnings)
+    EXPECT_NE(warning.code, WarningCode::kRigIsOff) << warning.text;
+}
+
 TEST_F(PictureCheck, MosaicsThatAreNotStatedOrOthersAreNamed) {
   for (const char* name : {"RGGB", "BGGR", "GRBG", "GBRG"}) {
     const Mosaic mosaic = *Mosaic::from_name(name);
