@@ -7,6 +7,8 @@ import math
 import os
 from typing import Any, Mapping, Union
 
+import numpy as np
+
 from . import _core
 from ._errors import InputError
 
@@ -105,6 +107,12 @@ def as_pictures(rig: Rig, images: Any, argument: str = "images") -> _core.Pictur
     for name in images:
         if not isinstance(name, str):
             raise InputError(argument, "camera", repr(name), "must be the name of a camera")
+    for name, image in images.items():
+        if np.ma.is_masked(image):
+            raise InputError(
+                argument, name, f"{np.ma.count_masked(image)} masked pixels",
+                "must have none: no pixel can be left out; image.filled(0) makes them black",
+            )
     return _core.Pictures(
         {name: image for name, image in images.items() if image is not None}, argument
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 from typing import Any, Callable, Mapping, NamedTuple, Optional, Sequence, Union
 
 import numpy as np
@@ -121,16 +122,21 @@ def _check_range(name: str, value: int, last: int) -> None:
 
 
 def read_mesh(path: PathLike) -> Mesh:
-    """Reads PLY (with sigma, confidence, hole and colour), OBJ, STL or OFF, in mm."""
-    return Mesh._of(_core.read_mesh(path_of(path)))
+    """Reads PLY (with sigma, confidence, hole and colour), OBJ, STL or OFF, in mm.
+
+    `unit_known` is False where the file says so.
+    """
+    name = path_of(path)
+    return Mesh._of(_core.read_mesh(name), _core.mesh_unit_known(name))
 
 
 def make_sphere(radius_mm: float, rings: int = 32) -> Mesh:
-    """A closed sphere around the origin."""
+    """A closed sphere around the origin: `rings` bands (3 to 2048) of twice as many sectors."""
     if not 0 < radius_mm < np.inf:
         raise InputError("make_sphere", "radius_mm", str(radius_mm), "must be > 0 and finite")
-    if rings < 3:
-        raise InputError("make_sphere", "rings", str(rings), "must be >= 3")
+    # Chosen: 2048 rings are 17 million faces, and take 0.4 GB.
+    if not 3 <= rings <= 2048:
+        raise InputError("make_sphere", "rings", str(rings), "must be 3 to 2048")
     return Mesh._of(_core.make_sphere(radius_mm, rings))
 
 
@@ -576,6 +582,11 @@ class CalibratedRig(Rig):
         return _calibrated, (self._core.text(), *said)
 
 
+def _argument_names(text: str) -> str:
+    """What the program says of its options, of the arguments here: --known-distance, known_distance."""
+    return re.sub(r"(?<![\w/-])--([a-z]+(?:-[a-z]+)*)", lambda m: m[1].replace("-", "_"), text)
+
+
 def _calibrated(text: str, *said: Any) -> CalibratedRig:
     return CalibratedRig._with(_core.Rig(text, "rig"), *said)
 
@@ -624,10 +635,17 @@ def calibrate(
         text = json.dumps(devices)
     else:
         path = path_of(devices)
-    core, verdict, reasons, figures, report = _core.calibrate(
-        path, text, [path_of(folder) for folder in captures], known_distance, board, max_tracks,
-        seed, progress,
-    )
+    try:
+        core, verdict, reasons, figures, report = _core.calibrate(
+            path, text, [path_of(folder) for folder in captures], known_distance, board,
+            max_tracks, seed, progress,
+        )
+    except InputError as error:
+        file = "options" if error.file == "command line" else _argument_names(error.file)
+        raise InputError(
+            file, _argument_names(error.field), error.value, _argument_names(error.rule)
+        ) from None
+    reasons = [_argument_names(reason) for reason in reasons]
     if verdict == "unusable":
         error = StageError("unusable: " + "; ".join(reasons))
         error.report = json.loads(report)  # type: ignore[attr-defined]

@@ -135,6 +135,7 @@ void add_mesh(py::module_& module) {
     const Unlocked unlocked;
     return std::make_shared<TriangleMesh>(read_mesh(path));
   });
+  module.def("mesh_unit_known", [](const std::string& path) { return mesh_unit_known(path); });
   module.def("make_sphere", [](double radius_mm, int rings) {
     return std::make_shared<TriangleMesh>(make_sphere(radius_mm, rings));
   });

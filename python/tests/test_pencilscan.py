@@ -419,6 +419,12 @@ class PackageTest(unittest.TestCase):
         self.assertIn("[0, 1]", of(cam0=frame["cam0"].astype(np.float32)))
         self.assertIn("int64", of(cam0=frame["cam0"].astype(np.int64)))
         self.assertIn("(height, width)", of(cam0="image.png"))
+        masked = np.ma.masked_greater(frame["cam0"], 200)
+        masked[0, 0] = np.ma.masked
+        self.assertIn("masked", of(cam0=masked))
+        for call in (ps.reconstruct, ps.detect):
+            for none in ([None] * 4, {}, {"cam0": None}):
+                self.assertIn("at least one", str(self.complaint(lambda: call(rig, none))))
         self.assertIn("plain: cam0", str(self.complaint(
             lambda: ps.reconstruct(rig, frame, plain={"cam0": frame["cam0"][:10]}))))
         self.assertIn("plain: cam0", str(self.complaint(
@@ -470,6 +476,7 @@ class PackageTest(unittest.TestCase):
         for colors in (((),), (("blue", "cyan"), ()), ("blue", "cyan")):
             self.assertIn("lists", str(self.complaint(lambda: ps.ring(colors=colors))), colors)
         self.assertIn("finite", str(self.complaint(lambda: ps.make_sphere(np.inf))))
+        self.assertIn("2048", str(self.complaint(lambda: ps.make_sphere(10, 10**6))))
         for options in ({"seed": -1}, {"max_tracks": -1}, {"seed": 1.5}):
             self.assertIn("whole number", str(self.complaint(
                 lambda: ps.calibrate("captures", self.scene.rig, **options))), options)
@@ -511,6 +518,10 @@ class PackageTest(unittest.TestCase):
         frame = ps.simulate(rig, ps.make_sphere(120, 48))
         frame.truth.write(self.scene.folder / "unitless.ply")
         self.assertIn(b"unit unknown", (self.scene.folder / "unitless.ply").read_bytes()[:200])
+        for name in ("again.ply", "again.obj", "again.stl"):
+            ps.read_mesh(self.scene.folder / "unitless.ply").write(self.scene.folder / name)
+            self.assertFalse(ps.read_mesh(self.scene.folder / name).unit_known, name)
+        self.assertTrue(ps.read_mesh(self.scene.folder / "ball.ply").unit_known)
         figures = ps.evaluate(frame.truth, rig, self.scene.result)
         self.assertIn("the rig's unit is unknown", figures["warnings"][0])
 
@@ -537,6 +548,19 @@ class PackageTest(unittest.TestCase):
         self.assertLess(found.figures["rms_px"], 0.2)
         self.assertIn("decoding", stages)
         self.assertIsInstance(found, ps.Rig)
+        captures = folder / "scene" / "captures"
+        error = self.complaint(lambda: ps.calibrate(captures, rig, board="chess"))
+        self.assertEqual((error.file, error.field, error.value), ("options", "board", "chess"))
+        self.assertEqual(self.complaint(lambda: ps.calibrate(folder / "no", rig)).file, "captures")
+        # Two folders of a projector that were exchanged: the reason names the argument.
+        pair = captures / "proj1"
+        for old, new in (("cam0", "kept"), ("cam1", "cam0"), ("kept", "cam1")):
+            (pair / old).rename(pair / new)
+        try:
+            said = " ".join(ps.calibrate(captures, rig).reasons)
+        except ps.StageError as error:
+            said = str(error)
+        self.assertNotIn("--", said)
 
 
 if __name__ == "__main__":

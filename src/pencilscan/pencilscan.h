@@ -21,6 +21,7 @@
 #include "pencilscan/core/error.h"
 #include "pencilscan/geometry/mesh.h"
 #include "pencilscan/io/mesh_file.h"
+#include "pencilscan/io/mesh_unit.h"
 #include "pencilscan/labeling/point_file.h"
 #include "pencilscan/planning/ring.h"
 #include "pencilscan/rig/rig.h"

@@ -120,7 +120,7 @@ TEST(Api, ComplaintsNameWhatIsWrong) {
                 static_cast<void>(ImageView(std::span<const std::uint8_t>(few), 4, 3));
               }),
               HasSubstr("10: must be width x height x channels"));
-  EXPECT_THROW(static_cast<void>(reconstruct(rig(), {})), StageError);
+  EXPECT_THROW(static_cast<void>(reconstruct(rig(), {})), InputError);
 }
 
 TEST(Api, AConfidenceThatIsNoNumberIsRefused) {
