@@ -95,7 +95,10 @@ class Calibration {
     if (!is_any_given()) return solve(std::nullopt);
     const CalibrationResult fresh = result_;
     const bool is_solved = solve(options_.tolerance);
-    if (is_solved && present_devices(result_.problem) == result_.problem.devices.size() &&
+    // What is held exactly cannot be pulled, however wrong it is.
+    const bool may_show = options_.tolerance.focal > 0 && options_.tolerance.center_px > 0;
+    if (is_solved && may_show &&
+        present_devices(result_.problem) == result_.problem.devices.size() &&
         !is_any_pulled(input_, options_.tolerance, result_.problem))
       return true;
     CalibrationResult within = std::move(result_);
@@ -149,7 +152,9 @@ class Calibration {
       const BundleDevice found = device;
       device.inner = bundle_device(given).inner;
       set_priors(input_.known[d], options_.tolerance, is_camera, given, device);
-      device.inner = found.inner;
+      // What a tolerance of 0 holds stays as it was given.
+      for (std::size_t i = 0; i < kIntrinsics; ++i)
+        if (device.prior_sigma[i] > 0) device.inner[i] = found.inner[i];
     }
     stage(kAll, options_.stage_tracks, 50);
     triangulate_all(result_.problem, kLeastAngle);

@@ -85,8 +85,8 @@ class BeforeAWall : public testing::Test {
       return all;
     }
   };
-  static Judged judged(const CalibrationInput& input) {
-    Judged judged{calibrate(input, {.hypotheses = 2}), {}, {}};
+  static Judged judged(const CalibrationInput& input, const GivenTolerance& tolerance = {}) {
+    Judged judged{calibrate(input, {.hypotheses = 2, .tolerance = tolerance}), {}, {}};
     judged.sigma.devices.resize(3);
     if (judged.result.solved)
       judged.sigma = uncertainty(judged.result.problem, judged.result.adjustment);
@@ -143,10 +143,22 @@ TEST_F(BeforeAWall, AKThatTheDataContradictIsNamed) {
 
 TEST_F(BeforeAWall, AToleranceOfZeroHoldsExactly) {
   const CalibrationInput given = input(tracks(600, 0.5, 0), true, 0);
-  const auto result = calibrate(given, {.hypotheses = 2, .tolerance = {0, 0}});
-  ASSERT_TRUE(result.solved);
+  const Judged found = judged(given, {0, 0});
+  ASSERT_TRUE(found.result.solved);
   for (std::size_t d = 0; d < 2; ++d)
-    EXPECT_EQ(result.rig.cameras[d].K, given.rig.cameras[d].K) << d;
+    EXPECT_EQ(found.result.rig.cameras[d].K, given.rig.cameras[d].K) << d;
+  EXPECT_THAT(found.findings(), HasSubstr("given K were kept exactly"));
+}
+
+/// What cannot move shows nothing by itself.
+TEST_F(BeforeAWall, AWrongKThatIsStatedExactlyIsNamed) {
+  for (const GivenTolerance tolerance : {GivenTolerance{0, 0}, GivenTolerance{0, 5}}) {
+    const Judged found = judged(input(tracks(600, 1, 0), true, 0.15), tolerance);
+    ASSERT_TRUE(found.result.solved);
+    EXPECT_THAT(found.findings(), HasSubstr("the data contradict the given K of cam"));
+    EXPECT_THAT(found.findings(), HasSubstr("and was stated exactly as"));
+    EXPECT_NE(found.verdict.grade, Grade::kGood);
+  }
 }
 
 TEST_F(BeforeAWall, TheSkewOfAGivenKIsKept) {

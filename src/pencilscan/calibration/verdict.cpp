@@ -287,9 +287,23 @@ class Judge {
     return result_.given[d] == GivenUse::kTolerance || result_.given[d] == GivenUse::kExact;
   }
 
+  /// The tolerances of given K.
+  [[nodiscard]] std::string tolerances() const {
+    return percent(result_.tolerance.focal) + ", " + formatted(result_.tolerance.center_px) + " px";
+  }
+
+  /// `moved`: tolerances; infinite where there is none.
+  [[nodiscard]] std::string how_far_off(std::size_t d, std::size_t intrinsic, double moved) const {
+    const std::string what = kIntrinsicNames[intrinsic];
+    if (std::isfinite(moved))
+      return what + " " + formatted(moved) + " of its tolerances (" + tolerances() + ") off";
+    const double stated = bundle_device(device_at(input_.rig, d)).inner[intrinsic];
+    return what + " is " + formatted(result_.problem.devices[d].inner[intrinsic], "%.5g") +
+           ", and was stated exactly as " + formatted(stated, "%.5g");
+  }
+
   void judge_given() {
-    const std::string unit =
-        percent(result_.tolerance.focal) + ", " + formatted(result_.tolerance.center_px) + " px";
+    const std::string unit = tolerances();
     const std::string advice =
         "check that K is of this lens, focus and image size, or say how rough it is "
         "(--focal-tolerance, --center-tolerance)";
@@ -301,16 +315,17 @@ class Judge {
       const auto moved = moved_deviations(device_at(input_.rig, d), result_.tolerance, found);
       const auto most =
           static_cast<std::size_t>(std::max_element(moved.begin(), moved.end()) - moved.begin());
-      const std::string by = kIntrinsicNames[most] + std::string(" ") + formatted(moved[most]);
       if (is_given(d) && moved[most] <= kContradictsDeviations) {
-        add_name(moved_within, name(d) + " by " + by);
+        if (moved[most] > 0)
+          add_name(moved_within,
+                   name(d) + " by " + kIntrinsicNames[most] + " " + formatted(moved[most]));
         within[d] = 1;
         continue;
       }
       const bool is_free = result_.given[d] == GivenUse::kContradicted;
       add(Grade::kDoubtful,
-          "the data contradict the given K of " + name(d) + ": " + by + " of its tolerances (" +
-              unit + ") off" +
+          "the data contradict the given K of " + name(d) + ": " +
+              how_far_off(d, most, moved[most]) +
               (is_free ? ", so it was only a start" : ", though it was held near it"),
           advice);
     }
@@ -323,6 +338,8 @@ class Judge {
               formatted(together) +
               " standard deviations, though each alone is near its tolerance (" + unit + ")",
           advice);
+    if (moved_within.empty() && std::count(within.begin(), within.end(), 1) > 0)
+      add(Grade::kGood, "given K were kept exactly");
     if (!moved_within.empty())
       add(Grade::kGood,
           "given K were kept; they moved, in their tolerances (" + unit + "): " + moved_within);
