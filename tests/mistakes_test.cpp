@@ -149,6 +149,19 @@ TEST_F(Newcomer, IsToldWhichOptionsWouldHaveNoEffect) {
   }
 }
 
+TEST_F(Newcomer, IsToldThatAMosaicOfTheRigStandsAboveThatOfTheSimulator) {
+  const std::string simulate = small_scene();
+  EXPECT_THAT(run(simulate + "--interpolated RGGB --out a").error, Not(HasSubstr("no effect")));
+  std::string rig = slurp(folder_ / "r.json");
+  for (auto at = rig.find("\"width\": 64"); at < rig.find("\"projectors\"");
+       at = rig.find("\"width\": 64", at + 40))
+    rig.insert(at, "\"mosaic\": \"RGGB\", ");
+  write("r.json", rig);
+  const Outcome outcome = run(simulate + "--interpolated RGGB --out b");
+  EXPECT_EQ(outcome.code, 0) << outcome.error;
+  EXPECT_THAT(outcome.error, HasSubstr("--interpolated has no effect here: it needs a camera"));
+}
+
 TEST_F(Newcomer, MayGiveOptionsInAnyOrder) {
   // The method stands behind what needs it; "f" is then what is wrong.
   ASSERT_EQ(run("rig ring --out r.json").code, 0);

@@ -249,6 +249,11 @@ void run_simulate(SimulateOptions options) {
   options.photo.interpolated = Mosaic::from_name(options.interpolated);
   const Rig rig = read_rig(options.rig_path);
   warn_of_rig(rig);
+  if (options.photo.interpolated &&
+      std::all_of(rig.cameras.begin(), rig.cameras.end(),
+                  [](const Camera& camera) { return camera.mosaic.has_value(); }))
+    warn_of(
+        "--interpolated has no effect here: it needs a camera whose \"mosaic\" the rig leaves out");
   const TriangleMesh mesh = placed_mesh(options, rig);
   const std::optional<RenderedLight> light = rendered_light(options, rig);
   check_exports(options, rig);
