@@ -27,8 +27,8 @@ constexpr std::array<Known, 16> kKnown = {{
      "Check that this camera was triggered and that its file lies in the frame's "
      "folder under the camera's name."},
     {"no-lines",
-     "Check that the camera sees the object and that the projectors were on; "
-     "compare its picture with the others below."},
+     "Check that the camera sees the object, that the projectors were on, and that there is light "
+     "enough (exposure, aperture); compare its picture with the others below."},
     {"colors-mix",
      "Give projectors whose lines overlap colours of different channels "
      "(blue/cyan against red/yellow), or state color_matrix in the rig."},

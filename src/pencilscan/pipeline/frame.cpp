@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "pencilscan/core/formatted.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/pipeline/coarse_view.h"
 #include "pencilscan/pipeline/frame_warnings.h"
@@ -20,13 +21,18 @@ Frame without(Frame frame, const std::vector<char>& left_out) {
   return frame;
 }
 
-/// Why a frame has no points.
+/// Why a frame has no points: wrong pictures, else their light.
 std::string why_nothing(const PointResult& result) {
-  std::string why = "no curve could be given its projector line";
-  for (const Warning& warning : result.warnings) {
-    if (warning.code == WarningCode::kWrongPicture) why += "; " + warning.text;
-  }
-  return why;
+  const std::string why = "no curve could be given its projector line";
+  std::string of_pictures;
+  for (const Warning& warning : result.warnings)
+    if (warning.code == WarningCode::kWrongPicture) of_pictures += "; " + warning.text;
+  if (!of_pictures.empty()) return why + of_pictures;
+  const double light = signal_to_noise(result);
+  if (light == 0)
+    return why + "; no picture shows a line: are the projectors on, and is their light enough?";
+  return why + "; lines are " + formatted(light, "%.1f") +
+         " times as bright as the noise of the pictures (median)";
 }
 
 /// Heights of lines in the light that the pictures were stored in: those of another frame compare.
@@ -86,6 +92,8 @@ FrameResult measure_frame(const Rig& rig, const Frame& frame, PointResult lines,
   clock("confirmation",
         [&] { result = finish_shape(rig, std::move(result), options.shape.fusion); });
   end_points(frame, result.points);
+  if (auto warning = little_light_warning(result))
+    result.points.warnings.push_back(std::move(*warning));
   return count_motion(rig, std::move(result));
 }
 

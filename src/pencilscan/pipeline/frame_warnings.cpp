@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <string>
+#include <utility>
 
 #include "pencilscan/core/formatted.h"
 #include "pencilscan/core/median.h"
@@ -241,6 +243,41 @@ std::optional<Warning> few_names_warning(const PointResult& result) {
                      "this rig's cameras, in the light of its projectors?",
                  {},
                  {{"share", share}}};
+}
+
+double signal_to_noise(const PointResult& result) {
+  // A profile of amplitude A and Gaussian width w in noise n a pixel is known in its place to
+  // sigma^2 = 2 w n^2 / (A^2 sqrt(pi)), the bound of Cramer and Rao.
+  std::vector<double> ratios;
+  for (const GridGraph& graph : result.graphs)
+    for (const Curve& curve : graph.curves)
+      for (const CurvePoint& point : curve.points)
+        if (point.sigma_px > 0 && point.width_px > 0)
+          ratios.push_back(std::sqrt(2 * point.width_px * std::numbers::inv_sqrtpi) /
+                           point.sigma_px);
+  return upper_median(std::move(ratios));
+}
+
+std::optional<Warning> little_light_warning(const FrameResult& result) {
+  const auto lacks_much = [](const std::vector<Warning>& warnings) {
+    return std::any_of(warnings.begin(), warnings.end(), [](const Warning& warning) {
+      return warning.code == WarningCode::kFewNames || warning.code == WarningCode::kCurvesOnly ||
+             warning.code == WarningCode::kLittleMeasured;
+    });
+  };
+  if (!lacks_much(result.points.warnings) && !lacks_much(result.shape.surface.report.warnings))
+    return std::nullopt;
+  // A ball before two rings: of albedo .8 with the sensor presets medium and high 60, 36, 27 and
+  // 16; of albedo .02 to .05 where more than half of the surface is lost, 6 to 10.
+  constexpr double kFaint = 10;
+  const double ratio = signal_to_noise(result.points);
+  if (ratio == 0 || ratio > kFaint) return std::nullopt;
+  return Warning{WarningCode::kNoLines,
+                 "light is too little: the lines that were found are " + formatted(ratio, "%.1f") +
+                     " times as bright as the noise of the pictures (median), and fainter ones "
+                     "are lost; longer exposure, a wider aperture or brighter projectors help",
+                 {},
+                 {{"signal_to_noise", ratio}}};
 }
 
 Warning another_moment_warning(const Rig& rig, std::size_t camera, const ViewsApart& apart,

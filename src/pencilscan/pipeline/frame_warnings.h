@@ -51,6 +51,12 @@ namespace pencilscan {
 /// That hardly any of the lines in the pictures could be named.
 [[nodiscard]] std::optional<Warning> few_names_warning(const PointResult& result);
 
+/// How bright lines are against the noise of their pictures, the median over all curve points; 0
+/// without any.
+[[nodiscard]] double signal_to_noise(const PointResult& result);
+/// That light is too little, where lines are faint and the result lacks much.
+[[nodiscard]] std::optional<Warning> little_light_warning(const FrameResult& result);
+
 /// That what one camera sees lies apart from what the others see, and that it was left out, or not.
 [[nodiscard]] Warning another_moment_warning(const Rig& rig, std::size_t camera,
                                              const ViewsApart& apart, bool is_left_out);

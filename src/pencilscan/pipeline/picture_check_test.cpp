@@ -212,6 +212,34 @@ TEST_F(PictureCheck, AProjectorThatIsOffStandsNowhereElse) {
     EXPECT_NE(warning.code, WarningCode::kRigIsOff) << warning.text;
 }
 
+TEST_F(PictureCheck, LightThatIsTooLittleIsNamed) {
+  const auto frame = [](double albedo) {
+    Reflectance surface;
+    surface.albedo = albedo;
+    return sample::photographed_frame(*rig_, SimulatedObject(*egg_, surface), photography());
+  };
+  const auto light = [&](const Frame& of) {
+    for (const Warning& warning : reconstruct_frame(*rig_, of).points.warnings)
+      if (warning.code == WarningCode::kNoLines && warning.device.empty())
+        return warning.figures.at(0).second;
+    return 0.0;
+  };
+  EXPECT_EQ(light(*frame_), 0);
+  EXPECT_EQ(light(frame(0.2)), 0);
+  const double dark = light(frame(0.02));
+  EXPECT_GT(dark, 1);
+  EXPECT_LT(dark, 10);
+  // Whether or not anything is left of still darker ones.
+  std::string said;
+  try {
+    for (const Warning& warning : reconstruct_frame(*rig_, frame(0.008)).points.warnings)
+      said += warning.text;
+  } catch (const NothingFound& error) {
+    said = error.what();
+  }
+  EXPECT_THAT(said, HasSubstr("times as bright as the noise of the pictures"));
+}
+
 TEST_F(PictureCheck, MosaicsThatAreNotStatedOrOthersAreNamed) {
   for (const char* name : {"RGGB", "BGGR", "GRBG", "GBRG"}) {
     const Mosaic mosaic = *Mosaic::from_name(name);
