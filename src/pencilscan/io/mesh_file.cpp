@@ -12,6 +12,7 @@
 #include <span>
 #include <sstream>
 #include <string>
+#include <utility>
 
 #include "pencilscan/core/byte_order_mark.h"
 #include "pencilscan/core/check.h"
@@ -60,7 +61,61 @@ std::vector<std::array<float, 3>> optional_colors(const PlyElement& vertices) {
   return colors;
 }
 
+void check_finite(const std::filesystem::path& path, const TriangleMesh& mesh) {
+  for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
+    if (!mesh.vertices[i].allFinite()) {
+      throw InputError(path.string(), "vertex[" + std::to_string(i) + "]", "",
+                       "coordinates must be finite");
+    }
+  }
+}
+
+/// Joins vertices of equal position, in order of first use, whose properties count. STL has one
+/// vertex per corner, and Assimp makes one per corner of an OBJ. InputError where one is not
+/// finite.
+TriangleMesh with_joined_vertices(const std::filesystem::path& path, const TriangleMesh& mesh) {
+  check_finite(path, mesh);
+  TriangleMesh joined;
+  std::map<std::array<double, 3>, int> index_of;
+  std::vector<int> new_index(mesh.vertices.size());
+  const auto keep = [](const auto& of_mesh, std::size_t i, auto& of_joined) {
+    if (!of_mesh.empty()) of_joined.push_back(of_mesh[i]);
+  };
+  for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
+    const Vec3& x = mesh.vertices[i];
+    // + 0.0 makes -0 and 0 one key.
+    const auto [at, is_new] = index_of.try_emplace({x[0] + 0.0, x[1] + 0.0, x[2] + 0.0},
+                                                   static_cast<int>(joined.vertices.size()));
+    if (is_new) {
+      joined.vertices.push_back(x);
+      keep(mesh.sigma, i, joined.sigma);
+      keep(mesh.confidence, i, joined.confidence);
+      keep(mesh.hole, i, joined.hole);
+      keep(mesh.color, i, joined.color);
+    }
+    new_index[i] = at->second;
+  }
+  for (const auto& face : mesh.faces) {
+    std::array<int, 3> corner{};
+    for (std::size_t k = 0; k < 3; ++k) corner[k] = new_index[static_cast<std::size_t>(face[k])];
+    if (corner[0] != corner[1] && corner[1] != corner[2] && corner[2] != corner[0]) {
+      joined.faces.push_back(corner);
+    }
+  }
+  return joined;
+}
+
+/// True where every vertex is the corner of one polygon at most.
+bool has_no_shared_vertices(const PlyColumn& corners, std::size_t vertices) {
+  std::vector<char> used(vertices, 0);
+  return std::all_of(corners.values.begin(), corners.values.end(), [&](double corner) {
+    if (!(corner >= 0 && corner < static_cast<double>(vertices))) return false;
+    return std::exchange(used[static_cast<std::size_t>(corner)], 1) == 0;
+  });
+}
+
 /// PLY is read here rather than by Assimp to keep shared vertices, doubles, sigma and confidence.
+/// Exporters that share none write every face with vertices of its own: those are joined, as STL's.
 TriangleMesh read_ply_mesh(const std::filesystem::path& path) {
   const PlyFile file = read_ply(path);
   const PlyElement* vertices = file.find("vertex");
@@ -92,31 +147,8 @@ TriangleMesh read_ply_mesh(const std::filesystem::path& path) {
         path, [&] { return "face[" + std::to_string(f) + "]"; },
         all.subspan(begin, corners->begin[f + 1] - begin), mesh);
   }
+  if (has_no_shared_vertices(*corners, vertices->count)) return with_joined_vertices(path, mesh);
   return mesh;
-}
-
-/// Joins vertices of equal position, in order of first use. STL has one vertex per corner, and
-/// Assimp makes one per corner of an OBJ.
-TriangleMesh with_joined_vertices(const TriangleMesh& mesh) {
-  TriangleMesh joined;
-  std::map<std::array<double, 3>, int> index_of;
-  std::vector<int> new_index(mesh.vertices.size());
-  for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
-    const Vec3& x = mesh.vertices[i];
-    // + 0.0 makes -0 and 0 one key.
-    const auto [at, is_new] = index_of.try_emplace({x[0] + 0.0, x[1] + 0.0, x[2] + 0.0},
-                                                   static_cast<int>(joined.vertices.size()));
-    if (is_new) joined.vertices.push_back(x);
-    new_index[i] = at->second;
-  }
-  for (const auto& face : mesh.faces) {
-    std::array<int, 3> corner{};
-    for (std::size_t k = 0; k < 3; ++k) corner[k] = new_index[static_cast<std::size_t>(face[k])];
-    if (corner[0] != corner[1] && corner[1] != corner[2] && corner[2] != corner[0]) {
-      joined.faces.push_back(corner);
-    }
-  }
-  return joined;
 }
 
 /// Reads a line of an OBJ with those that it goes on in, which a backslash at its end says; false
@@ -244,16 +276,11 @@ TriangleMesh read_with_assimp(const std::filesystem::path& path, const std::stri
                             first + static_cast<int>(face.mIndices[2])});
     }
   }
-  return with_joined_vertices(mesh);
+  return with_joined_vertices(path, mesh);
 }
 
 void check_mesh(const std::filesystem::path& path, const TriangleMesh& mesh) {
-  for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
-    if (!mesh.vertices[i].allFinite()) {
-      throw InputError(path.string(), "vertex[" + std::to_string(i) + "]", "",
-                       "coordinates must be finite");
-    }
-  }
+  check_finite(path, mesh);
   if (mesh.faces.empty()) throw InputError(path.string(), "faces", "0", "the mesh must have faces");
 }
 
@@ -265,7 +292,7 @@ TriangleMesh read_mesh(const std::filesystem::path& path) {
   if (ending == ".ply") {
     mesh = read_ply_mesh(path);
   } else if (ending == ".off") {
-    mesh = with_joined_vertices(read_off_mesh(path));
+    mesh = with_joined_vertices(path, read_off_mesh(path));
   } else if (ending == ".obj" || ending == ".stl") {
     mesh = read_with_assimp(path, ending);
   } else {

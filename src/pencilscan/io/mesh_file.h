@@ -7,7 +7,8 @@
 namespace pencilscan {
 
 /// Reads PLY (with sigma, confidence, hole and 8-bit sRGB colours where present), OBJ, STL (both by
-/// Assimp) or OFF (vertices of equal position joined in these three); polygons become triangles,
+/// Assimp) or OFF (vertices of equal position joined in these three, and in a PLY whose faces share
+/// none); polygons become triangles,
 /// also those that are not convex. InputError when missing, unreadable, cut off, without faces or
 /// with non-finite vertices.
 [[nodiscard]] TriangleMesh read_mesh(const std::filesystem::path& path);

@@ -11,6 +11,7 @@
 #include "pencilscan/io/curve_file.h"
 #include "pencilscan/io/file.h"
 #include "pencilscan/io/io_fixture.h"
+#include "pencilscan/io/mesh_unit.h"
 #include "pencilscan/io/ply.h"
 
 namespace pencilscan {
@@ -191,6 +192,36 @@ TEST_F(Io, ObjStlAndOffGiveOneClosedTetrahedron) {
   }
 }
 
+/// Exporters write so what has no shared vertices; shading would show every face.
+TEST_F(Io, PlyOfFacesWithVerticesOfTheirOwnIsJoined) {
+  const TriangleMesh ball = make_sphere(30, 8);
+  TriangleMesh split;
+  for (const auto& face : ball.faces) {
+    const int first = static_cast<int>(split.vertices.size());
+    for (const int corner : face) {
+      split.vertices.push_back(ball.vertices[static_cast<std::size_t>(corner)]);
+      split.confidence.push_back(static_cast<float>(corner));
+    }
+    split.faces.push_back({first, first + 1, first + 2});
+  }
+  write_mesh(folder_ / "split.ply", split);
+  const TriangleMesh read = read_mesh(folder_ / "split.ply");
+  EXPECT_EQ(read.vertices.size(), ball.vertices.size());
+  EXPECT_EQ(read.faces.size(), ball.faces.size());
+  EXPECT_EQ(count_edges(read).boundary, 0U);
+  ASSERT_EQ(read.confidence.size(), read.vertices.size());
+  for (std::size_t i = 0; i < read.vertices.size(); ++i) {
+    const auto corner = static_cast<std::size_t>(read.confidence[i]);
+    EXPECT_LT((read.vertices[i] - ball.vertices[corner]).norm(), 1e-5);
+  }
+  // Two vertices at one place are meant where faces share others: seams, and surfaces that touch.
+  TriangleMesh seam = make_box(Vec3(1, 2, 3));
+  seam.vertices.push_back(seam.vertices[0]);
+  seam.faces[0][0] = static_cast<int>(seam.vertices.size()) - 1;
+  write_mesh(folder_ / "seam.ply", seam);
+  EXPECT_EQ(read_mesh(folder_ / "seam.ply").vertices.size(), 9U);
+}
+
 TEST_F(Io, ExportedMeshesAreReadBack) {
   const TriangleMesh ball = make_sphere(30, 8, Vec3(5, 6, 7));
   for (const char* name : {"ball.obj", "ball.stl"}) {
@@ -222,6 +253,12 @@ TEST_F(Io, MeshesSayTheirUnit) {
     }
     return read_file(folder_ / name);
   };
+  for (const char* name : {"b.ply", "b.obj", "b.stl"}) {
+    for (const bool known : {false, true}) {
+      (void)bytes_of(name, known);
+      EXPECT_EQ(mesh_unit_known(folder_ / name), known) << name;
+    }
+  }
   using ::testing::HasSubstr;
   using ::testing::StartsWith;
   EXPECT_THAT(bytes_of("b.ply", true), HasSubstr("\ncomment unit mm, world frame of rig.json\n"));
