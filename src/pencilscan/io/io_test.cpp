@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "pencilscan/io/file.h"
+#include "pencilscan/io/folder_lock.h"
 #include "pencilscan/io/found_files.h"
 #include "pencilscan/io/io_fixture.h"
 #include "pencilscan/io/json_text.h"
@@ -89,6 +90,25 @@ TEST_F(Io, WhatAKilledProgramLeftIsInNobodysWayWhereEachFileHasAName) {
   if (WEXITSTATUS(status) == 2) GTEST_SKIP() << "only root can take /proc away";
   EXPECT_EQ(WEXITSTATUS(status), 0);
   EXPECT_EQ(read_file(path), "new");
+}
+
+TEST_F(Io, AFolderIsLockedByOneAtATime) {
+  const fs::path folder = folder_ / "locked";
+  fs::create_directories(folder);
+  FolderLock first(folder);
+  ASSERT_TRUE(first.is_held());
+  EXPECT_FALSE(first.is_taken());
+  EXPECT_TRUE(FolderLock(folder).is_taken());
+  EXPECT_FALSE(FolderLock(folder).is_held());
+  FolderLock second = std::move(first);
+  EXPECT_TRUE(second.is_held());
+  EXPECT_TRUE(FolderLock(folder).is_taken());
+  second.release();
+  EXPECT_TRUE(FolderLock(folder).is_held());
+  fs::remove(folder);
+  const FolderLock gone(folder);
+  EXPECT_TRUE(gone.is_taken());
+  EXPECT_EQ(gone.error(), ENOENT);
 }
 
 TEST_F(Io, APartialFolderStartsEmptyAndLeavesNothing) {

@@ -1,11 +1,6 @@
 #include "pencilscan/io/partial_folder.h"
 
-#include <fcntl.h>
-#include <sys/file.h>
 #include <sys/stat.h>
-#include <unistd.h>
-
-#include <cerrno>
 
 #include "pencilscan/core/error.h"
 
@@ -36,12 +31,10 @@ ReplacingFolder::ReplacingFolder(const fs::path& target)
                      "must not be a mount point, which cannot be renamed: name a folder in it");
   }
   fs::create_directories(partial_);
-  lock_ = ::open(partial_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  // File systems without locks say something else, and go without.
-  if (lock_ >= 0 && ::flock(lock_, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK) {
-    ::close(lock_);
+  lock_ = FolderLock(partial_);
+  // Where it could not even be opened, writing into it says why.
+  if (lock_.is_taken() && lock_.error() == 0)
     throw InputError(target_.string(), "", "", "is being made by another program");
-  }
   restore();
   fs::remove_all(path());
 }
@@ -53,7 +46,6 @@ ReplacingFolder::~ReplacingFolder() {
   } catch (const fs::filesystem_error&) {
     // What was there is kept in the partial folder, and the next run puts it back.
   }
-  if (lock_ >= 0) ::close(lock_);
 }
 
 /// A program that was killed between two names left what was there under neither.

@@ -4,6 +4,8 @@
 #include <system_error>
 #include <utility>
 
+#include "pencilscan/io/folder_lock.h"
+
 namespace pencilscan {
 
 /// A folder as a user gives it, by a name that others can stand beside: "film/" is "film", and "."
@@ -57,7 +59,7 @@ class ReplacingFolder {
 
   std::filesystem::path target_;
   std::filesystem::path partial_;
-  int lock_ = -1;
+  FolderLock lock_;
 };
 
 }  // namespace pencilscan

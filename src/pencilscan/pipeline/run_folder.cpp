@@ -1,8 +1,5 @@
 #include "pencilscan/pipeline/run_folder.h"
 
-#include <fcntl.h>
-#include <sys/file.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -52,29 +49,6 @@ std::optional<json> json_if_any(const fs::path& file) {
 std::string host_name() {
   std::array<char, 256> name{};
   return ::gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "host";
-}
-
-/// The lock of a folder, which ends with the program.
-struct FolderLock {
-  int file = -1;          ///< -1: not taken
-  bool is_taken = false;  ///< somebody else has it, or has removed the folder
-  int error = 0;          ///< why it could not be opened
-};
-
-/// File systems without locks give neither.
-FolderLock lock_folder(const fs::path& folder) {
-  FolderLock lock;
-  lock.file = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (lock.file < 0) return {-1, true, errno};
-  struct stat status {};
-  const bool locked = ::flock(lock.file, LOCK_EX | LOCK_NB) == 0;
-  lock.is_taken = !locked && errno == EWOULDBLOCK;
-  // A folder that was removed meanwhile has no links left.
-  if (::fstat(lock.file, &status) != 0 || status.st_nlink == 0) lock.is_taken = true;
-  if (locked && !lock.is_taken) return lock;
-  ::close(lock.file);
-  lock.file = -1;
-  return lock;
 }
 
 }  // namespace
@@ -175,10 +149,9 @@ FrameFolder::FrameFolder(const fs::path& out, std::string frame, const std::stri
     std::error_code error;
     fs::create_directories(path_, error);
     if (!error) {
-      const FolderLock lock = lock_folder(path_);
-      lock_ = lock.file;
-      if (!lock.is_taken) break;
-      error = std::error_code(lock.error, std::generic_category());
+      lock_ = FolderLock(path_);
+      if (!lock_.is_taken()) break;
+      error = std::error_code(lock_.error(), std::generic_category());
     }
     if (trial == kTrials) throw StageError(path_.string() + ": cannot be made: " + error.message());
   }
@@ -197,8 +170,7 @@ void FrameFolder::leave() {
   std::error_code ignored;
   if (!path_.empty()) fs::remove_all(path_, ignored);
   path_.clear();
-  if (lock_ >= 0) ::close(lock_);
-  lock_ = -1;
+  lock_.release();
   fs::remove(out_ / kMakingFolder, ignored);  // the last one does it
 }
 
@@ -260,10 +232,8 @@ void remove_abandoned(const fs::path& out) {
        it.increment(error))
     folders.push_back(it->path());
   for (const fs::path& folder : folders) {
-    const FolderLock lock = lock_folder(folder);
-    if (lock.file < 0) continue;
-    fs::remove_all(folder, error);
-    ::close(lock.file);
+    const FolderLock lock(folder);
+    if (lock.is_held()) fs::remove_all(folder, error);
   }
   fs::remove(out / kMakingFolder, error);
 }

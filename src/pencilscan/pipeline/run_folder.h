@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "pencilscan/io/folder_lock.h"
+
 namespace pencilscan {
 
 /// What decides the output of a sequence beside the pictures of each frame: `<out>/inputs.json`.
@@ -76,7 +78,7 @@ class FrameFolder {
   std::filesystem::path out_;
   std::string frame_;
   std::filesystem::path path_;
-  int lock_ = -1;
+  FolderLock lock_;
 };
 
 /// Publishes why a frame could not be done.
