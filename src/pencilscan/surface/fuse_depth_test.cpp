@@ -12,6 +12,7 @@ using sample::ball_points;
 using sample::ball_rig;
 using sample::expect_watertight;
 using sample::hit_ball;
+using sample::kMm;
 using sample::kRadius;
 using sample::share_beyond;
 using sample::worst_deviation;
@@ -33,8 +34,8 @@ TEST(FuseDepth, BallIsClosedAndAccurate) {
   options.cell_spacings = 2;  // the ball needs no finer cells
   const SurfaceResult result = surface_of(rig, points, ball_maps(rig), options);
   expect_watertight(result);
-  EXPECT_LT(worst_deviation(result.mesh), 0.3);  // three sigma of the noise
-  EXPECT_LT(share_beyond(result.mesh, 0.1), 0.1);
+  EXPECT_LT(worst_deviation(result.mesh), 0.3 * kMm);  // three sigma of the noise
+  EXPECT_LT(share_beyond(result.mesh, 0.1 * kMm), 0.1);
   EXPECT_GT(result.report.measured_share, 0.97);
   EXPECT_TRUE(self_intersections(result.mesh).empty());
   EXPECT_GT(result.report.points_used, points.size() * 9 / 10);
@@ -62,33 +63,35 @@ TEST(FuseDepth, FacesLieAsMuchOutsideAsInside) {
     }
   }
   // Vertices on the ball leave half of the largest gap inside; a few of these have no depth.
-  EXPECT_GT(kRadius - least, 0.05);
+  EXPECT_GT(kRadius - least, 0.05 * kMm);
   EXPECT_LT(std::abs(inside / area), 0.3 * (kRadius - least));
 }
 
 TEST(FollowNodes, VerticesReachACurvedSurface) {
   const Rig rig = ball_rig();
-  TriangleMesh mesh = make_sphere(kRadius + 0.5, 24);
+  TriangleMesh mesh = make_sphere(kRadius + 0.5 * kMm, 24);
   follow_nodes(rig, ball_maps(rig, 0), {}, mesh);
-  // What is left is the third order of a ball over two nodes; a mean of positions would leave 0.04.
-  for (const Vec3& v : mesh.vertices) EXPECT_NEAR(v.norm(), kRadius, 0.02);
+  // What is left is the third order of a ball over two nodes; a mean of positions would leave 0.04
+  // mm.
+  for (const Vec3& v : mesh.vertices) EXPECT_NEAR(v.norm(), kRadius, 0.02 * kMm);
 }
 
 TEST(FollowNodes, SlippedNodesDoNotPull) {
   const Rig rig = ball_rig();
   std::vector<DepthMap> maps = ball_maps(rig, 0);
+  constexpr auto kSlip = static_cast<float>(0.9 * kMm);
   Random random(7);
   for (DepthMap& map : maps) {
     for (DepthNode& node : map.nodes) {
-      if (node.measured() && random.uniform() < 0.1) node.w = 1 / (1 / node.w - 0.9F);
+      if (node.measured() && random.uniform() < 0.1) node.w = 1 / (1 / node.w - kSlip);
     }
   }
-  TriangleMesh mesh = make_sphere(kRadius + 0.2, 24);
+  TriangleMesh mesh = make_sphere(kRadius + 0.2 * kMm, 24);
   follow_nodes(rig, maps, {}, mesh);
   double sum = 0;
   for (const Vec3& v : mesh.vertices) sum += std::abs(v.norm() - kRadius);
   // A plain mean would be off by a tenth of the slip.
-  EXPECT_LT(sum / static_cast<double>(mesh.vertices.size()), 0.03);
+  EXPECT_LT(sum / static_cast<double>(mesh.vertices.size()), 0.03 * kMm);
 }
 
 TEST(FollowNodes, NoStepWhereDepthEnds) {
@@ -101,7 +104,7 @@ TEST(FollowNodes, NoStepWhereDepthEnds) {
       if (x && x->x() < 0) map.nodes[i] = DepthNode{};
     }
   }
-  constexpr double kOff = 0.4;
+  constexpr double kOff = 0.4 * kMm;
   TriangleMesh mesh = make_sphere(kRadius + kOff, 48);
   follow_nodes(rig, maps, {}, mesh);
   for (const auto& face : mesh.faces) {

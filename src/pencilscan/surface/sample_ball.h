@@ -1,6 +1,7 @@
 #pragma once
 
-// A ball and what devices all around it measure, for tests.
+// A ball and what devices all around it measure, for tests. Lengths are footprints, as the stages
+// of a frame have them.
 
 #include <gtest/gtest.h>
 
@@ -16,17 +17,19 @@
 
 namespace pencilscan::sample {
 
-inline constexpr double kRadius = 45;     // mm
-inline constexpr double kDistance = 900;  // mm, of the devices from the centre
-inline constexpr double kNoise = 0.1;     // mm along the camera ray
-inline constexpr float kSigma = 0.1F;
+inline constexpr double kFocal = 2400;       // px
+inline constexpr double kDistance = kFocal;  // of the devices from the centre: a pixel covers 1
+inline constexpr double kMm = kDistance / 900;
+inline constexpr double kRadius = 45 * kMm;
+inline constexpr double kNoise = 0.1 * kMm;  // along the camera ray
+inline constexpr auto kSigma = static_cast<float>(kNoise);
 
 inline Device device_at(const Vec3& direction, const std::string& name) {
   Device device;
   device.name = name;
   device.width = 640;
   device.height = 640;
-  device.K << 2400, 0, 319.5, 0, 2400, 319.5, 0, 0, 1;
+  device.K << kFocal, 0, 319.5, 0, kFocal, 319.5, 0, 0, 1;
   device.device_from_world = look_at(kDistance * direction.normalized(), Vec3::Zero());
   return device;
 }
@@ -104,9 +107,9 @@ inline double worst_deviation(const TriangleMesh& mesh) {
   return worst;
 }
 
-inline double share_beyond(const TriangleMesh& mesh, double limit_mm) {
+inline double share_beyond(const TriangleMesh& mesh, double limit) {
   std::size_t count = 0;
-  for (const Vec3& v : mesh.vertices) count += std::abs(v.norm() - kRadius) > limit_mm;
+  for (const Vec3& v : mesh.vertices) count += std::abs(v.norm() - kRadius) > limit;
   return static_cast<double>(count) / static_cast<double>(mesh.vertices.size());
 }
 
@@ -118,7 +121,7 @@ inline void expect_watertight(const SurfaceResult& result) {
   EXPECT_GT(signed_volume(result.mesh), 0);
 }
 
-/// Depth maps that noisy cameras would have of the ball, mm.
+/// Depth maps that noisy cameras would have of the ball.
 inline std::vector<DepthMap> ball_maps(const Rig& rig, double noise = kNoise) {
   std::vector<DepthMap> maps;
   Random random(3);

@@ -10,6 +10,7 @@ namespace {
 
 using sample::ball_rig;
 using sample::hit_ball;
+using sample::kMm;
 using sample::kRadius;
 
 TEST(Silhouettes, InventedBulgeIsDrawnIn) {
@@ -27,17 +28,16 @@ TEST(Silhouettes, InventedBulgeIsDrawnIn) {
   }
   TriangleMesh mesh = make_sphere(kRadius, 48);
   const TriangleMesh ball = mesh;
-  constexpr double kBulge = 20;
+  constexpr double kBulge = 20 * kMm;
   for (Vec3& x : mesh.vertices) {
     const double down = std::max(0.0, -x.z() / kRadius - 0.5);
     x += kBulge * std::min(1.0, 4 * down) * x.normalized();
     mesh.confidence.push_back(down > 0 ? 0.F : 1.F);
   }
-  mesh.sigma.assign(mesh.vertices.size(), 0.1F);
+  mesh.sigma.assign(mesh.vertices.size(), sample::kSigma);
   const TriangleMesh bulged = mesh;
   ASSERT_TRUE(self_intersections(bulged).empty());
-  // A millimetre a round: the devices of this test see 0.4 mm a pixel.
-  EXPECT_GT(carve(rig, silhouettes, {.step = 1}, mesh), 100U);
+  EXPECT_GT(carve(rig, silhouettes, {}, mesh), 100U);
   EXPECT_EQ(count_edges(mesh).boundary, 0U);
   const double excess = signed_volume(bulged) - signed_volume(ball);
   EXPECT_LT(signed_volume(mesh) - signed_volume(ball), 0.35 * excess);

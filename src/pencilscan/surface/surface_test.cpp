@@ -15,6 +15,7 @@ namespace {
 using sample::ball_points;
 using sample::ball_rig;
 using sample::expect_watertight;
+using sample::kMm;
 using sample::kRadius;
 using sample::share_beyond;
 using sample::worst_deviation;
@@ -27,7 +28,7 @@ void mislabel(const Rig& rig, double share, std::vector<MeasuredPoint>& points) 
                                 static_cast<std::uint64_t>(p.v / 40);
     Random random(7, piece);
     if (random.uniform() >= share) continue;
-    const double shift = random.uniform(8, 30) * (random.uniform() < 0.5 ? -1 : 1);
+    const double shift = random.uniform(8, 30) * kMm * (random.uniform() < 0.5 ? -1 : 1);
     const Vec3 x(p.x, p.y, p.z);
     const Vec3 moved = x + shift * (rig.cameras[p.camera].center() - x).normalized();
     p.x = static_cast<float>(moved.x());
@@ -58,7 +59,7 @@ TEST(Surface, BallIsClosedAndAccurate) {
   const SurfaceResult result = reconstruct_surface(rig, points, test_options());
   expect_watertight(result);
   // Three sigma of the noise, which the fit averages down except at the rims.
-  EXPECT_LT(worst_deviation(result.mesh), 0.3);
+  EXPECT_LT(worst_deviation(result.mesh), 0.3 * kMm);
   const double volume = 4.0 / 3 * std::numbers::pi * std::pow(kRadius, 3);
   EXPECT_NEAR(signed_volume(result.mesh) / volume, 1, 0.005);
   EXPECT_GT(result.report.measured_share, 0.98);
@@ -89,8 +90,8 @@ TEST(Surface, WrongLabelsAreVotedOut) {
   const SurfaceResult result = reconstruct_surface(rig, points, test_options());
   expect_watertight(result);
   // The few wrong pieces that stay bend the surface here and there, by far less than they are off.
-  EXPECT_LT(worst_deviation(result.mesh), 1.5);
-  EXPECT_LT(share_beyond(result.mesh, 0.3), 0.02);
+  EXPECT_LT(worst_deviation(result.mesh), 1.5 * kMm);
+  EXPECT_LT(share_beyond(result.mesh, 0.3 * kMm), 0.02);
   std::size_t wrong = 0;
   std::size_t wrong_used = 0;
   std::size_t right_used = 0;
@@ -114,12 +115,12 @@ TEST(Surface, HalfBallIsMeasuredHalfAndClosed) {
   // The rim lies within one line spacing (3.8 mm) of the last points: 8 % of the half's height.
   EXPECT_NEAR(surface_area(result.measured) / half, 1, 0.08);
   EXPECT_GT(count_edges(result.measured).boundary, 0u);
-  for (const Vec3& v : result.measured.vertices) EXPECT_GT(v.x(), -6);
+  for (const Vec3& v : result.measured.vertices) EXPECT_GT(v.x(), -6 * kMm);
   double guessed = 0;
   for (std::size_t v = 0; v < result.mesh.vertices.size(); ++v) {
-    if (result.mesh.vertices[v].x() < -10) {
+    if (result.mesh.vertices[v].x() < -10 * kMm) {
       EXPECT_EQ(result.mesh.confidence[v], 0.0F);
-      EXPECT_GT(result.mesh.sigma[v], 1.0F);
+      EXPECT_GT(double{result.mesh.sigma[v]}, kMm);
       ++guessed;
     }
   }
@@ -132,7 +133,7 @@ TEST(Surface, TwoCamerasAndOneProjectorGiveAClosedSurface) {
   std::erase_if(points, [](const MeasuredPoint& p) { return p.camera > 1 || p.projector != 0; });
   const SurfaceResult result = reconstruct_surface(rig, points, test_options());
   EXPECT_EQ(count_edges(result.mesh).boundary, 0u);
-  EXPECT_LT(worst_deviation(result.measured), 1.0);
+  EXPECT_LT(worst_deviation(result.measured), kMm);
   EXPECT_GT(surface_area(result.measured), 0.15 * surface_area(result.mesh));
 }
 
@@ -142,12 +143,12 @@ TEST(Surface, FarFloatersNeitherStayNorStretchTheCube) {
   const std::size_t count = points.size();
   for (std::size_t i = 0; i < count; i += 400) {  // agreeing wrong patches, 2000 mm off
     MeasuredPoint p = points[i];
-    p.x += 2000;
+    p.x += static_cast<float>(2000 * kMm);
     points.push_back(p);
   }
   const SurfaceResult result = reconstruct_surface(rig, points, test_options());
   expect_watertight(result);
-  EXPECT_LT(worst_deviation(result.mesh), 0.5);
+  EXPECT_LT(worst_deviation(result.mesh), 0.5 * kMm);
   for (std::size_t i = count; i < points.size(); ++i) EXPECT_EQ(result.used[i], 0);
 }
 
@@ -171,8 +172,6 @@ TEST(Surface, BadPointsAreLeftOutOrNamed) {
   points[4].camera = 77;
   EXPECT_THROW(static_cast<void>(reconstruct_surface(rig, points)), InputError);
 }
-
-/// What cameras would measure densely of the ball: quadrics with noise, nodes 4 px apart.
 
 }  // namespace
 }  // namespace pencilscan

@@ -14,6 +14,7 @@ namespace {
 using sample::ball_rig;
 using sample::hit_ball;
 using sample::kDistance;
+using sample::kMm;
 using sample::kRadius;
 
 /// Images of the ball under all patterns: albedo times light, one sample per pixel.
@@ -58,13 +59,13 @@ Rig color_rig() {
   Rig rig = ball_rig();
   for (std::size_t p = 1; p < rig.projectors.size(); p += 2)
     rig.projectors[p].patterns[0].colors = {"red", "yellow"};
-  rig.volume = Sphere{Vec3::Zero(), 60};
+  rig.volume = Sphere{Vec3::Zero(), 60 * kMm};
   return rig;
 }
 
 /// Red below, green above, a soft border between them.
 Vec3 two_colors(const Vec3& x) {
-  const double up = 1 / (1 + std::exp(-x.z() / 5));
+  const double up = 1 / (1 + std::exp(-x.z() / (5 * kMm)));
   return (1 - up) * Vec3(0.8, 0.3, 0.2) + up * Vec3(0.2, 0.6, 0.4);
 }
 
