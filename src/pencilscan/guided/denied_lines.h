@@ -8,12 +8,13 @@
 
 namespace pencilscan {
 
-/// Takes back the labels of the two lines on either side of denied ones, beside them. A surface
-/// that is wrong by whole lines fits the places of all of them, and only the code tells: the
-/// picture shows a line near by in another colour. That happens once in a hundred times beside a
-/// right label (GuidedMatchingOptions::confidence), and outweighs the colours of six lines that
-/// agree, which a wrong surface has by chance every second time: a label two lines away has four
-/// such neighbours at most. What is taken back is undecided, with the reason kContradicted.
+/// Takes back labels beside denied lines: those of the two lines on either side of each. A line is
+/// denied where the picture shows it in another colour than its label has. Such a colour is the
+/// only sign of a surface that is wrong by whole lines, because that fits the places of all lines.
+/// Beside a right label it happens once in a hundred times (GuidedMatchingOptions::confidence). So
+/// it outweighs six lines whose colours agree: on a wrong surface each agrees every second time. A
+/// label two lines away has four such neighbours at most. What is taken back is undecided, with the
+/// reason kContradicted.
 void drop_beside_denied(const GridGraph& graph, std::span<const DeniedRun> denied,
                         std::vector<LabeledRun>& runs, std::vector<UndecidedRun>& undecided);
 

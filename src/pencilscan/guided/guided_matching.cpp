@@ -227,8 +227,9 @@ void CameraMatching::predict() {
   for (const PredictedPoint& p : missing_) missing_places_.add(p.position, p);
 }
 
-/// visit(predicted, across_px) for the missing points beside a curve point, of its direction and
-/// not much thinner: a curve wider than its line is another one, or two.
+/// Calls visit(predicted, across_px) for missing points beside a curve point. Their lines have its
+/// direction and are not much thinner: a curve that is wider than a line shows another line, or
+/// two.
 template <class Visit>
 void CameraMatching::aligned_predictions(const CurvePoint& point, Visit visit) const {
   constexpr float kAlong = 1.5F;  // px
@@ -332,8 +333,8 @@ float CameraMatching::color_margin(const Curve& curve, int begin, int end,
   return evidence.empty() ? 0 : of_name - *std::max_element(evidence.begin(), evidence.end());
 }
 
-/// True where the lines around support a name, or the stretch's own colour on a surface that does
-/// not rest on labels alone: lines of a projector that were all missed in a place have none around.
+/// True where the lines around support a name. On a dense surface the stretch's own colour may do
+/// so instead: where all lines of a projector were missed, there are none around.
 bool CameraMatching::is_supported(const Curve& curve, int begin, int end, const LineName& name,
                                   float margin) const {
   if (has_dense_ && margin > 0 && end - begin >= options_.min_adopted) return true;
@@ -359,8 +360,8 @@ bool CameraMatching::is_long_enough(const std::vector<char>& decided, int begin,
 
 void CameraMatching::adopt_curves() {
   const auto decided = decided_points();
-  // Colour may say less against a name than a guided name is certain: a surface that is not there
-  // predicts lines too, and only their places fit.
+  // A colour denies a name if it says more against it than a guided name is certain. A surface that
+  // is not there predicts lines too: their places fit, their colours do not.
   const float certainty = std::log(options_.confidence / (1 - options_.confidence));
   std::vector<LabeledRun> adopted;
   std::vector<std::optional<LineName>> names;

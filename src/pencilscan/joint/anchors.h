@@ -9,27 +9,30 @@
 
 namespace pencilscan {
 
-/// Which pieces crossings hold. `linked`: per piece, the pieces that its line follows from, on its
-/// own curve and beside it. `is_crossed`: per piece, 1 where a crossing bears its line out. A piece
-/// is held where links along its curve lead to such a piece; and so is a group of others that hang
-/// together if a held curve is linked to it. By one alone a whole group may have the line of a
-/// curve that goes on wrongly: two are asked of a group that `is_ambiguous`.
+/// Which pieces crossings hold; 1: held. `linked`: per piece, the pieces that its line follows
+/// from, on its own curve and beside it. `is_crossed`: per piece, 1 where a crossing bears its line
+/// out.
+///   1. A crossed piece is held.
+///   2. A piece is held where links along its own curve lead to a crossed piece.
+///   3. The other pieces form groups, by their links. All pieces of a group are held where a held
+///      curve is linked to it. A group that `is_ambiguous` needs two such curves: a single one may
+///      go on along the wrong line, and the whole group with it.
 [[nodiscard]] std::vector<char> held_pieces(
     const PieceGraph& graph, const std::vector<std::vector<int>>& linked,
     std::vector<char> is_crossed,
     const std::function<bool(std::span<const int> group)>& is_ambiguous);
 
-/// True where all pieces of a group could as well show lines of another pattern or other lines of
-/// their own, all as far away: codes repeat, and projectors share them. Together those cost less
-/// than half a wrong colour more. The group has more curves than a code word has lines: the colours
-/// of fewer say nothing.
+/// True where a group of pieces could as well show other lines, because codes repeat and projectors
+/// share them. The other lines are of any pattern, and all the same number of lines away. Together
+/// they cost less than half a wrong colour more than the group's own. A group is never ambiguous if
+/// it has no more curves than a code word has lines: the colours of so few curves say nothing.
 [[nodiscard]] bool is_ambiguous_group(const LabelledPieces& pieces,
                                       const std::vector<Decision>& decisions,
                                       const JointOptions& options, std::span<const int> group);
 
-/// Pieces side by side vouch for each other, also for the lines of another projector. So what
-/// neighbours (`beside`: next_pieces) said does not count for pieces that no crossings hold: it is
-/// taken off their margins.
+/// Takes what neighbours said off the margins of pieces that no crossings hold. Pieces side by side
+/// vouch for each other, and they do so for the lines of a wrong projector, too. `beside`: the
+/// neighbours, as next_pieces() gives them.
 void leave_unanchored(const LabelledPieces& pieces, std::span<const NextPiece> beside,
                       const JointOptions& options, std::vector<Decision>& decisions);
 

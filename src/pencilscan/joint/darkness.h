@@ -21,8 +21,8 @@ class Darkness {
   Darkness(const Rig& rig, std::span<const GridGraph> graphs,
            std::span<const LabelledPieces> pieces);
 
-  /// Cost of every label of every piece of graphs[g]: that of the camera that speaks against it
-  /// most, since what two cameras leave dark is mostly dark for one reason.
+  /// Cost of every label of every piece of graphs[g]. Of all cameras, the one that speaks against a
+  /// label most counts, alone: a place that two cameras leave dark is mostly dark for one reason.
   [[nodiscard]] std::vector<std::vector<float>> costs(std::size_t g) const;
 
  private:

@@ -4,10 +4,10 @@
 
 namespace pencilscan {
 
-/// The floor term: what a stated floor says of a label. A curve shows the floor or anything above
-/// it; depths of what shows the floor scatter about the plane, all others are anywhere in the
-/// range. The cost is the negative logarithm of that likelihood over the one without a floor, both
-/// being as likely as not.
+/// The floor term: what a stated floor says of a label. A curve shows either the floor or something
+/// above it; both are equally likely beforehand. Depths of the floor scatter about its plane.
+/// Depths of anything else lie anywhere in the range. The cost is -log(likelihood with the floor /
+/// likelihood without one).
 class FloorCost {
  public:
   /// range: of inverse depths. Without a floor nothing costs anything.

@@ -18,13 +18,13 @@
 namespace pencilscan {
 namespace {
 
-/// Of "no line". What other labels cost is relative to it: where the best of them adds up to more,
-/// the piece has no line.
+/// Cost of the label "no line". The costs of all other labels are relative to it: a piece has no
+/// line where even the best of them costs more.
 constexpr float kOutlierCost = 0;
-/// Of consecutive pieces of one curve that show the same line, in log-likelihood. Crossings tell
-/// where a curve jumps from one line to another: with JointOptions::change_cost, all else has to
-/// prefer the jump by e^6 = 400 to 1. Where nothing crosses, the curve itself is the best evidence
-/// there is, and it has to do so by e^11. Both are chosen, no fit of them is kept;
+/// Reward of two consecutive pieces of one curve that show the same line, as a log-likelihood. A
+/// jump to another line loses it and costs JointOptions::change_cost, together 6. So all other
+/// evidence has to prefer the jump by e^6 = 400 to 1. Where nothing crosses, the curve itself is
+/// the best evidence. There the sum is 11. Both rewards are chosen, no fit of them is kept.
 /// experiments/one_projector.py shows what the second one does.
 constexpr float kSameLineReward = 2;
 constexpr float kSameUncrossedReward = 7;

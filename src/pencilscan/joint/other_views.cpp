@@ -81,12 +81,14 @@ OtherViews::Voices OtherViews::voices_of(std::size_t g) const {
   };
   std::vector<std::size_t> near = graphs_of(adjacent_cameras(rig_, graphs_[g].camera));
   if (!near.empty()) return {std::move(near), 0.7F};  // see below: .67 at 60 degrees
-  // Wide apart, much of the surface that one sees turns away from the other or is hidden from it,
-  // and whole patches at once. Of the surest labels .67 are seen from 60 degrees apart and .43 from
-  // 90 (bunny and hand before six and six, bunny before four and four); of .25, .3, .35 and .43
-  // here, .35 left the fewest wrong names of six objects before four and four.
+  // Cameras far apart see less of the same surface: whole patches turn away from one of them, or
+  // are hidden from it. Measured: of the surest labels, another camera sees .67 from 60 degrees
+  // apart and .43 from 90 degrees (bunny and hand before six and six, bunny before four and four).
+  // Tried here: .25, .3, .35 and .43. With .35 the fewest names were wrong, of six objects before
+  // four and four.
   std::vector<std::size_t> far = graphs_of(adjacent_cameras(rig_, graphs_[g].camera, kFar));
-  // Two that contradict each other would both lose their names, and nobody knows which one moved.
+  // A single camera has no say: if the two contradict each other, both lose their names, and nobody
+  // knows which one moved.
   if (far.size() < 2) return {};
   return {std::move(far), 0.35F};
 }
@@ -145,12 +147,10 @@ void OtherViews::forget(std::span<const std::vector<std::vector<int>>> new_index
 
 std::vector<std::vector<float>> OtherViews::costs(std::size_t g,
                                                   std::span<const PieceBeliefs> beliefs) const {
-  // Probabilities that the other camera sees a curve where a wrong label lies, that the curve it
-  // sees has the label of a true one, and that it has that of a wrong one. All three are chosen, no
-  // fit of them is kept.
-  constexpr float kHitByChance = 0.2F;
-  constexpr float kSameIfTrue = 0.85F;
-  constexpr float kSameByChance = 0.03F;
+  // Three probabilities. All are chosen, no fit of them is kept.
+  constexpr float kHitByChance = 0.2F;    // the other camera sees a curve where a wrong label lies
+  constexpr float kSameIfTrue = 0.85F;    // a curve that it sees has the label, which is true
+  constexpr float kSameByChance = 0.03F;  // ... which is wrong
   const float hit_if_true = voices_[g].hit_if_true;
   const float miss = -std::log((1 - hit_if_true) / (1 - kHitByChance));
   const float unknown_hit = -std::log(hit_if_true / kHitByChance);

@@ -8,11 +8,11 @@
 
 namespace pencilscan {
 
-/// The multi-view term: a label places its piece in space, and another camera should see a curve of
-/// the same family, direction and line there, unless something hides it. The other camera sees it
-/// if one of its curve points lies within 1.8 px across, 1 px along and 26 degrees. Cameras count
-/// whose axes are within 75 degrees, or, where there is none, two and more within 105, and those
-/// less.
+/// The multi-view term. A label places its piece in space. Unless something hides that place,
+/// another camera should see a curve of the same family, direction and line there. It sees one if a
+/// point of its curves lies within 1.8 px across, 1 px along and 26 degrees. The cameras that have
+/// a say are those whose axes lie within 75 degrees of the first camera's. Where there is none,
+/// those within 105 degrees have a smaller say, if there are at least two.
 class OtherViews {
  public:
   OtherViews(const Rig& rig, std::span<const GridGraph> graphs,

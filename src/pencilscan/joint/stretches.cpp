@@ -167,8 +167,8 @@ std::vector<float> margins_of_stretches(const LabelledPieces& pieces, const Pair
 std::vector<char> faint_pieces(const GridGraph& graph, const LabelledPieces& pieces,
                                std::span<const NextPiece> beside,
                                const std::vector<Decision>& decisions) {
-  // Of a line beside it. A second image has a tenth to a quarter; from .25 to .55 as many lines of
-  // twelve objects are named and as many are wrong.
+  // Share of the height of a line beside it. Second images have .1 to .25 of it. The value is not
+  // critical: from .25 to .55, as many lines of twelve objects are named, and as many are wrong.
   constexpr float kFaint = 0.3F;
   const std::size_t count = decisions.size();
   std::vector<float> height;

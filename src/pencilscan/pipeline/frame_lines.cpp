@@ -22,8 +22,9 @@ void leave_out(const Rig& rig, const std::vector<PictureFinding>& findings, Poin
   }
 }
 
-/// Says that the rig is right, whatever curves have no name: points that one camera measured lie on
-/// the lines of the others, or most curves get a name from the surface around them.
+/// True where the rig is right although many curves have no name. Two signs say so, each by itself:
+///   1. points that one camera measured lie on the lines of the others,
+///   2. guided matching names most curves from the surface around them.
 bool is_right_rig(const Rig& rig, const PointOptions& options, const PointResult& result) {
   if (points_lie_on_lines(rig, result)) return true;
   std::vector<GridGraph> graphs = result.graphs;

@@ -19,8 +19,9 @@ struct LineNaming {
   std::optional<Warning> color_warning;  ///< the colours of lines do not tell them apart
 };
 
-/// The curve points of a picture that a right one, with a right rig, could have named: what nothing
-/// crosses, or lies outside the volume (walls, a floor, people), says nothing.
+/// The curve points of a picture that tell whether picture and rig are right: where both are, most
+/// of them have a name. Points of curves that nothing crosses are not among them, nor points
+/// outside the volume (walls, a floor, people): these say nothing.
 struct TellingPoints {
   std::size_t named = 0;
   std::size_t unnamed = 0;
@@ -45,15 +46,20 @@ inline constexpr double kMostNamed = 0.5;  ///< of it: the rest are close togeth
 /// Decides whether lines keep the names that the solution gave with the rig as given, or get names
 /// with a corrected rig. For methods that may correct the rig (MethodCapabilities).
 ///
-/// The rig is doubted where crossings miss each other, or where many curves that others cross have
-/// no name, of one device alone too, or have the colours of other lines (naming_doubt.h). It is not
-/// doubted where two of three signs say that it is right: crossings meet about as closely as noise
-/// lets expect; most such curves of every camera have a name; something else confirms it:
-/// `is_confirmed`, asked only where it matters.
+/// Without enough crossings the rig stays as given. It is wrong where one of these signs says so:
+///   1. crossings miss each other,
+///   2. curves have the colours of other lines (naming_doubt.h).
+/// Otherwise it is in doubt where a fifth of the telling points or more have no name, unless two of
+/// these three signs say that it is right:
+///   1. crossings meet about as closely as noise lets expect,
+///   2. most telling points of every camera have a name,
+///   3. `is_confirmed()` is true. It is asked only where it decides.
 ///
-/// A rig in doubt is corrected from the crossings (refine_rig_on_frames). The names with the
-/// corrected rig are taken if its crossings agree, or agree better, or if clearly more curves have
-/// a name.
+/// A rig that is wrong or in doubt is corrected from the crossings (refine_rig_on_frames()). The
+/// names with the corrected rig are taken
+///   1. of a wrong rig, if the crossings agree, or miss less and more points have a name, or miss
+///      about as much and clearly more points have a name,
+///   2. of a rig in doubt, if the crossings agree and clearly more points have a name.
 [[nodiscard]] LineNaming name_lines(const Rig& rig, const std::vector<ColorFamily>& families,
                                     const std::vector<GridGraph>& graphs, Labeling labeling,
                                     const PointOptions& options,

@@ -26,12 +26,16 @@ Opinion opinion_of(const SurfacePatch& patch, const Camera& camera, const Eigen:
   return {1 / w, std::hypot(patch.sigma / w, model) * ray_length};
 }
 
-/// Standard deviation of a settled point, mm along the ray. Neither a point's noise nor a patch's
-/// knows what the quadratic cannot follow, curve ends at depth steps or errors that neighbours
-/// share. So the error grows more slowly than the propagated one (`propagated`), but also with the
-/// disagreement of the points around, where they lie to one side, with the patch's bend and where
-/// point and patch are `deviations` of their own apart. Exponents and scale fitted to the errors of
-/// rendered objects, most of them those of experiments/objects.py.
+/// Standard deviation of a settled point along the ray. `propagated`: the one that follows from the
+/// noise of point and patch. The noise does not hold all errors: a quadratic patch cannot follow
+/// every surface, curves end at depth steps, and neighbours share errors. So the result grows with
+///   - `propagated`, but more slowly than it does,
+///   - the disagreement of the points around (patch.spread),
+///   - how far these points lie to one side (patch.one_sidedness),
+///   - the bend of the patch,
+///   - `deviations`: how many of their own deviations point and patch lie apart.
+/// Exponents and scale are fitted to the errors of rendered objects, most of them those of
+/// experiments/objects.py.
 double settled_sigma(double propagated, double deviations, const Camera& camera, double footprint,
                      const SurfacePatch& patch) {
   constexpr double kScale = 0.43;

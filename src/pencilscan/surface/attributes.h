@@ -12,10 +12,10 @@ namespace pencilscan {
 
 /// Sets sigma and confidence of every vertex from the samples near it. A vertex is measured if a
 /// sample of its own side lies within the reach, if samples surround it, and if it faces a camera
-/// that took one of them. The reach grows where
-/// the light sheets graze the surface. Beyond the last line only a part of it counts. Returns what
-/// each sigma rests on. The last vertices may be the `middles` of edges between others: between two
-/// that are measured and surrounded, they take the mean of what is known of both.
+/// that took one of them. The reach grows where the light sheets graze the surface. Beyond the last
+/// line only a part of it counts. Returns what each sigma rests on. `middles`: the ends of edges
+/// whose middles are the last vertices of the mesh. A middle between two vertices that are measured
+/// and surrounded takes the mean of what is known of both.
 std::vector<SurfaceEvidence> attribute_vertices(std::span<const SurfaceSample> samples,
                                                 double reach_spacings, double spacing,
                                                 TriangleMesh& mesh,

@@ -10,15 +10,17 @@
 
 namespace pencilscan {
 
-/// Per vertex, 1 where it counts as measured and no point lies within `reach` of it, or one of the
-/// places that pictures deny lies there and is nearer than any point. Only points and places whose
-/// camera the vertex faces count: those on the other side of something thin say nothing of this
-/// side. Depth grows from labelled lines; where all of them were taken back, nothing speaks for it.
-/// Lines of a face that light meets at 60 degrees lie two line spacings apart, and where one of
-/// them was not found the middle of the gap is two spacings from the next: so far right surface may
-/// lie from its points. Where one camera alone has depth (`maps`), a point of this camera has to
-/// lie within twice the reach: windows grow no farther from a labelled line, and surfaces that
-/// others close reach into gaps.
+/// Vertices that count as measured although no labelled line speaks for them; per vertex, 1: so it
+/// is. Depth grows from labelled lines. Where all of these were taken back, nothing speaks for it.
+///   1. No point lies within `reach` of the vertex. Or a place that pictures deny (`denied`) lies
+///      there, nearer than any point.
+///   2. Where one camera alone has depth (`maps`), no point of this camera lies within twice the
+///      reach. Windows grow no farther from a labelled line, but a surface that others close
+///      reaches into gaps.
+/// Only points and places count whose camera the vertex faces: those behind something thin say
+/// nothing of its front. `reach`: two line spacings. On a face that light meets at 60 degrees,
+/// lines lie two spacings apart. Where one was not found, the middle of the gap is so far from the
+/// next.
 [[nodiscard]] std::vector<char> unsupported_vertices(const Rig& rig, const TriangleMesh& mesh,
                                                      std::span<const DepthMap> maps,
                                                      std::span<const MeasuredPoint> points,
