@@ -5,6 +5,7 @@
 #include <limits>
 #include <optional>
 
+#include "pencilscan/pipeline/seen_depths.h"
 #include "pencilscan/surface/point_grid.h"
 
 namespace pencilscan {
@@ -13,6 +14,7 @@ namespace {
 constexpr double kNear = 3;           // px
 constexpr double kOn = 1;             // px
 constexpr double kMostSigma = 0.5;    // px
+constexpr int kHidingCell = 16;       // px
 constexpr double kLeastCosine = 0.5;  // between where a surface faces, about, and the camera
 
 /// A curve point or what should lie on one: families are far from each other.
@@ -26,43 +28,13 @@ struct Seen {
   bool faces = false;  ///< this camera, and its place is well known
 };
 
-/// The nearest points of each cell hide those behind them.
-class NearestDepths {
- public:
-  explicit NearestDepths(const Camera& camera)
-      : columns_(camera.width / kCell + 1),
-        focal_(camera.focal_px()),
-        depths_(static_cast<std::size_t>(columns_ * (camera.height / kCell + 1)),
-                std::numeric_limits<double>::max()) {}
-
-  void add(const Seen& seen) {
-    double& depth = depths_[cell(seen.pixel)];
-    depth = std::min(depth, seen.depth);
-  }
-  [[nodiscard]] bool hides(const Seen& seen) const {
-    return seen.depth > depths_[cell(seen.pixel)] * (1 + kCell / focal_);
-  }
-
- private:
-  static constexpr int kCell = 16;  // px
-
-  [[nodiscard]] std::size_t cell(const Vec2& pixel) const {
-    return static_cast<std::size_t>(pixel.y() / kCell) * static_cast<std::size_t>(columns_) +
-           static_cast<std::size_t>(pixel.x() / kCell);
-  }
-
-  int columns_;
-  double focal_;
-  std::vector<double> depths_;
-};
-
 }  // namespace
 
 ShownLines shown_lines(const Rig& rig, const std::vector<ColorFamily>& families,
                        const GridGraph& graph, std::span<const std::vector<MeasuredPoint>> points) {
   const Camera& camera = rig.camera(graph.camera);
   std::vector<Seen> seen;
-  NearestDepths nearest(camera);
+  SeenDepths depths(camera, kHidingCell);
   for (std::size_t c = 0; c < points.size(); ++c) {
     if (static_cast<int>(c) == graph.camera) continue;
     for (const MeasuredPoint& p : points[c]) {
@@ -71,12 +43,9 @@ ShownLines shown_lines(const Rig& rig, const std::vector<ColorFamily>& families,
       if (!pixel || !camera.contains(*pixel)) continue;
       Seen s{*pixel, (camera.device_from_world * x).z(),
              family_of(families, {p.projector, p.pattern}), false};
-      // A surface that one device sees and another one lights faces about the middle of them.
-      const Vec3 facing = (rig.cameras[c].center() - x).normalized() +
-                          (rig.projectors[p.projector].center() - x).normalized();
-      s.faces = facing.normalized().dot((camera.center() - x).normalized()) > kLeastCosine &&
+      s.faces = about_facing(rig, p).dot((camera.center() - x).normalized()) > kLeastCosine &&
                 double{p.sigma} * camera.focal_px() < kMostSigma * s.depth;
-      nearest.add(s);
+      depths.add(s.pixel, s.depth);
       seen.push_back(s);
     }
   }
@@ -86,9 +55,15 @@ ShownLines shown_lines(const Rig& rig, const std::vector<ColorFamily>& families,
       places.push_back(place(point.position.cast<double>(), curve.family));
   }
   const PointGrid curves(places, kNear);
+  // A surface that falls away from the camera by 45 degrees is not hidden by what it has in a cell.
+  const double within_cell = 1 + kHidingCell / camera.focal_px();
+  const auto is_hidden = [&](const Seen& s) {
+    const SeenDepths::Range* range = depths.at(s.pixel);
+    return range != nullptr && s.depth > range->nearest * within_cell;
+  };
   ShownLines shown;
   for (const Seen& s : seen) {
-    if (!s.faces || nearest.hides(s)) continue;
+    if (!s.faces || is_hidden(s)) continue;
     double least = std::numeric_limits<double>::max();
     curves.for_each_within(place(s.pixel, s.family), kNear,
                            [&](std::size_t, double squared) { least = std::min(least, squared); });

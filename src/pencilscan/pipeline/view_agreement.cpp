@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <optional>
 #include <utility>
 
 #include "pencilscan/core/median.h"
 #include "pencilscan/core/parallel.h"
+#include "pencilscan/pipeline/seen_depths.h"
 #include "pencilscan/rig/object_space.h"
 
 namespace pencilscan {
@@ -18,57 +18,32 @@ constexpr std::size_t kLeastPoints = 200;
 /// (docs/sensors.md); where one picture is another camera's, .05 and less.
 constexpr double kLeastSame = 0.5;
 
-/// Depths that a camera measured, by cells of the picture.
-class MeasuredDepths {
- public:
-  MeasuredDepths(const Camera& camera, std::span<const MeasuredPoint> points)
-      : camera_(camera),
-        columns_(camera.width / kCell + 1),
-        cells_(static_cast<std::size_t>(columns_ * (camera.height / kCell + 1))) {
-    for (const MeasuredPoint& p : points) {
-      const std::optional<std::size_t> at = cell({double{p.u}, double{p.v}});
-      if (!at) continue;
-      const double depth = depth_of(p);
-      cells_[*at] = {std::min(cells_[*at].nearest, depth), std::max(cells_[*at].farthest, depth)};
-    }
-  }
+constexpr int kMeasuredCell = 8;  // px
 
-  /// Says of a point of another camera whether this one measured it; what lies behind says nothing.
-  void judge(const MeasuredPoint& p, double tolerance, PairAgreement& agreement) const {
-    const std::optional<Vec2> pixel = camera_.project(position_of(p));
-    const std::optional<std::size_t> at = pixel ? cell(*pixel) : std::nullopt;
-    if (!at || cells_[*at].farthest < cells_[*at].nearest) return;
-    const double depth = depth_of(p);
-    if (depth < cells_[*at].nearest - tolerance) {
-      ++agreement.apart;
-    } else if (depth <= cells_[*at].farthest + tolerance) {
-      ++agreement.same;
-    }
-  }
+double depth_in(const Camera& camera, const MeasuredPoint& p) {
+  return (camera.device_from_world * position_of(p)).z();
+}
 
- private:
-  static constexpr int kCell = 8;  // px
-  struct Depths {
-    double nearest = std::numeric_limits<double>::max();
-    double farthest = std::numeric_limits<double>::lowest();
-  };
+SeenDepths measured_depths(const Camera& camera, std::span<const MeasuredPoint> points) {
+  SeenDepths depths(camera, kMeasuredCell);
+  for (const MeasuredPoint& p : points) depths.add({double{p.u}, double{p.v}}, depth_in(camera, p));
+  return depths;
+}
 
-  [[nodiscard]] double depth_of(const MeasuredPoint& p) const {
-    return (camera_.device_from_world * position_of(p)).z();
+/// Says of a point of another camera whether this one, which has these depths, measured it; what
+/// lies behind says nothing.
+void judge_point(const MeasuredPoint& p, const Camera& camera, const SeenDepths& depths,
+                 double tolerance, PairAgreement& agreement) {
+  const std::optional<Vec2> pixel = camera.project(position_of(p));
+  const SeenDepths::Range* range = pixel ? depths.at(*pixel) : nullptr;
+  if (range == nullptr) return;
+  const double depth = depth_in(camera, p);
+  if (depth < range->nearest - tolerance) {
+    ++agreement.apart;
+  } else if (depth <= range->farthest + tolerance) {
+    ++agreement.same;
   }
-  [[nodiscard]] std::optional<std::size_t> cell(const Vec2& pixel) const {
-    const Vec2 at = (pixel / kCell).array().floor();
-    if (!(at.minCoeff() >= 0) || at.x() >= columns_) return std::nullopt;
-    const std::size_t index =
-        static_cast<std::size_t>(at.y()) * static_cast<std::size_t>(columns_) +
-        static_cast<std::size_t>(at.x());
-    return index < cells_.size() ? std::optional(index) : std::nullopt;
-  }
-
-  const Camera& camera_;
-  int columns_;
-  std::vector<Depths> cells_;
-};
+}
 
 }  // namespace
 
@@ -84,10 +59,12 @@ ViewAgreement::ViewAgreement(const Rig& rig, std::span<const std::vector<Measure
   const double tolerance = kSpacings * line_spacing(rig);
   std::vector<PairAgreement> said(count_ * count_);
   parallel_for(count_, [&](std::size_t b) {
-    const MeasuredDepths depths(rig.cameras[b], points[b]);
+    const Camera& camera = rig.cameras[b];
+    const SeenDepths depths = measured_depths(camera, points[b]);
     for (std::size_t a = 0; a < count_; ++a) {
       if (a == b) continue;
-      for (const MeasuredPoint& p : points[a]) depths.judge(p, tolerance, said[a * count_ + b]);
+      for (const MeasuredPoint& p : points[a])
+        judge_point(p, camera, depths, tolerance, said[a * count_ + b]);
     }
   });
   for (std::size_t a = 0; a < count_; ++a) {
