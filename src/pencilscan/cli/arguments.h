@@ -69,6 +69,13 @@ template <class Number>
   return number_that<Number>([=](Number value) { return value >= low && value <= high; },
                              "from " + number_text(low) + " to " + number_text(high));
 }
+/// An option for a number from `low` to `high`. What `value` has is its default.
+template <class Number>
+CLI::Option* add_number(CLI::App& command, const std::string& name, Number& value,
+                        std::type_identity_t<Number> low, std::type_identity_t<Number> high,
+                        const std::string& text) {
+  return command.add_option(name, value, text)->check(between(low, high))->capture_default_str();
+}
 [[nodiscard]] inline CLI::Validator above_zero() {
   return number_that<double>([](double value) { return value > 0; }, "above 0");
 }

@@ -76,11 +76,9 @@ void add_lab_command(CLI::App& app) {
           ->excludes(distance);
   CLI::Option* page = command->add_flag("--page", options->page, "The page, instead of all at once")
                           ->needs(is_virtual);
-  command->add_option("--port", options->port, "Of the page; 0: any free one")
-      ->check(between(0, 65535))
+  add_number(*command, "--port", options->port, 0, 65535, "Of the page; 0: any free one")
       ->check(only_where([options] { return options->page || !options->is_virtual; },
-                         "needs --page where --virtual is"))
-      ->capture_default_str();
+                         "needs --page where --virtual is"));
   command
       ->add_option("--mesh", made.mesh_path,
                    "The object (PLY, OBJ, STL or OFF), fitted into the volume")

@@ -128,11 +128,8 @@ void add_reconstruct_options(CLI::App& command, ReconstructOptions& options) {
                        "surface from the labelled curves alone, without depth between them");
   CLI::Option* no_mesh =
       command.add_flag("--no-mesh", options.no_mesh, "labelled points alone, without a surface");
-  command
-      .add_option("--join-pixels", options.join_pixels,
-                  "N: join N x N pixels to one, for a quicker, coarser look")
-      ->check(between(1, 16))
-      ->capture_default_str();
+  add_number(command, "--join-pixels", options.join_pixels, 1, 16,
+             "N: join N x N pixels to one, for a quicker, coarser look");
   command
       .add_flag("--depth-maps", options.depth_maps,
                 "depth and its deviation per camera: float TIFF and 16-bit PNG")

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "pencilscan/cli/command.h"
+#include "pencilscan/cli/page_arguments.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/page/page.h"
 
@@ -51,26 +52,12 @@ void add_report_command(CLI::App& app) {
   auto options = std::make_shared<ReportOptions>();
   CLI::App* command = app.add_subcommand(
       "report", "One HTML file of an output folder, to look at in any browser and to mail.");
-  command
-      ->add_option("folder", options->folder,
-                   "output folder of reconstruct, calibrate, scan or an experiment, or a folder of "
-                   "several runs")
-      ->required();
   command->add_option("--out", options->out, "the file; default: <folder>/report.html");
   add_overwrite(*command, options->overwrite, "Replace a report that is there");
-  command->add_option("--title", options->page.title, "default: the folder's name");
-  command->add_option("--truth", options->page.sources.truth,
-                      "true mesh, or a folder with <frame>/mesh.ply: shows distances to it");
-  command->add_option("--rig", options->page.sources.rig,
-                      "the rig, where the folder does not hold it");
-  command->add_option("--frames", options->page.sources.frames,
-                      "the captured frames, where the folder has no pictures");
-  command
-      ->add_option("--max-size", options->max_megabytes,
-                   "megabytes to aim at; of long sequences, some frames get points and images and "
-                   "the others their shape")
-      ->check(between(1.0, 2000.0))
-      ->capture_default_str();
+  add_page_arguments(*command, options->folder, options->page);
+  add_number(*command, "--max-size", options->max_megabytes, 1, 2000,
+             "megabytes to aim at; of long sequences, some frames get points and images and "
+             "the others their shape");
   add_common_options(*command, options->common, "pencilscan report result");
   command->callback([options] { run_report(*options); });
 }

@@ -101,35 +101,31 @@ void add_ring(CLI::App& group) {
   auto options = std::make_shared<RingCommand>();
   CLI::App* command = group.add_subcommand("ring", "Write a ring of cameras and projectors");
   RingOptions& ring = options->ring;
-  const auto number = [&](const char* flag, auto& value, double low, double high,
-                          const char* text) {
-    using Number = std::remove_reference_t<decltype(value)>;
-    command->add_option(flag, value, text)
-        ->check(between(static_cast<Number>(low), static_cast<Number>(high)))
-        ->capture_default_str();
-  };
   command->add_option("--out", options->out, "The rig file to write (rig.json)")->required();
   add_overwrite(*command, options->overwrite, "Replace a rig file that is there");
-  number("--cameras", ring.cameras, 1, 256, "Number of cameras");
-  number("--projectors", ring.projectors, 1, 256, "Number of projectors");
-  number("--distance-mm", ring.distance_mm, 1, 1e6, "Distance of the devices to the centre");
-  number("--volume-radius-mm", ring.volume_radius_mm, 0.1, 1e6, "Radius of the working volume");
-  number("--arc-deg", options->arc_deg, 1, 360, "Part of the circle to use");
-  number("--camera-elevation-deg", options->camera_elevation_deg, -80, 80, "Cameras");
-  number("--vertical-elevation-deg", options->vertical_elevation_deg, -80, 80,
-         "Projectors of vertical lines");
-  number("--horizontal-elevation-deg", options->horizontal_elevation_deg, -80, 80,
-         "Projectors of horizontal lines: about 30 degrees off the cameras");
-  number("--camera-width", ring.camera_width, 16, 65536, "px");
-  number("--camera-height", ring.camera_height, 16, 65536, "px");
-  number("--camera-focal-px", ring.camera_focal_px, 1, 1e6, "px");
-  number("--projector-width", ring.projector_width, 16, 65536, "px");
-  number("--projector-height", ring.projector_height, 16, 65536, "px");
-  number("--projector-focal-px", ring.projector_focal_px, 1, 1e6, "px");
-  number("--pitch-px", ring.pitch_px, 1, 1e4, "Distance of neighbouring lines");
-  number("--line-width-px", ring.line_width_px, 0.1, 1e4, "Width of a line");
-  number("--offset-px", ring.offset_px, -0.5, 1e5, "Centre of the first line");
-  number("--order", ring.order, 1, 20, "Lines in a row whose colours tell where they are");
+  add_number(*command, "--cameras", ring.cameras, 1, 256, "Number of cameras");
+  add_number(*command, "--projectors", ring.projectors, 1, 256, "Number of projectors");
+  add_number(*command, "--distance-mm", ring.distance_mm, 1, 1e6,
+             "Distance of the devices to the centre");
+  add_number(*command, "--volume-radius-mm", ring.volume_radius_mm, 0.1, 1e6,
+             "Radius of the working volume");
+  add_number(*command, "--arc-deg", options->arc_deg, 1, 360, "Part of the circle to use");
+  add_number(*command, "--camera-elevation-deg", options->camera_elevation_deg, -80, 80, "Cameras");
+  add_number(*command, "--vertical-elevation-deg", options->vertical_elevation_deg, -80, 80,
+             "Projectors of vertical lines");
+  add_number(*command, "--horizontal-elevation-deg", options->horizontal_elevation_deg, -80, 80,
+             "Projectors of horizontal lines: about 30 degrees off the cameras");
+  add_number(*command, "--camera-width", ring.camera_width, 16, 65536, "px");
+  add_number(*command, "--camera-height", ring.camera_height, 16, 65536, "px");
+  add_number(*command, "--camera-focal-px", ring.camera_focal_px, 1, 1e6, "px");
+  add_number(*command, "--projector-width", ring.projector_width, 16, 65536, "px");
+  add_number(*command, "--projector-height", ring.projector_height, 16, 65536, "px");
+  add_number(*command, "--projector-focal-px", ring.projector_focal_px, 1, 1e6, "px");
+  add_number(*command, "--pitch-px", ring.pitch_px, 1, 1e4, "Distance of neighbouring lines");
+  add_number(*command, "--line-width-px", ring.line_width_px, 0.1, 1e4, "Width of a line");
+  add_number(*command, "--offset-px", ring.offset_px, -0.5, 1e5, "Centre of the first line");
+  add_number(*command, "--order", ring.order, 1, 20,
+             "Lines in a row whose colours tell where they are");
   command->add_option("--lines", options->lines, "Lines of the projectors in turn")
       ->check(one_of({"vertical", "horizontal"}))
       ->capture_default_str();

@@ -332,9 +332,7 @@ void add_picture(CLI::App& group) {
   command->add_option("--rig", options->rig_path, "The rig (rig.json)")->required();
   command->add_option("--out", options->out, "The picture to write (rig.png)")->required();
   add_overwrite(*command, options->overwrite, "Replace a picture that is there");
-  command->add_option("--side-px", options->side_px, "Side of each of the two views")
-      ->check(between(300, 5000))
-      ->capture_default_str();
+  add_number(*command, "--side-px", options->side_px, 300, 5000, "Side of each of the two views");
   add_common_options(*command, options->common,
                      "pencilscan rig picture --rig rig.json --out rig.png");
   command->callback([options] { run_picture(*options); });

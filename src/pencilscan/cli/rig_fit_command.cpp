@@ -47,9 +47,8 @@ void add_rig_fit_options(CLI::App& command, RigFitCommand& options) {
   CLI::Option* frames =
       command.add_option("--frames", options.frames,
                          "Folder of frame folders, or a recording: does the rig still fit them?");
-  command.add_option("--frame-count", options.frame_count, "Frames to look at, evenly picked")
-      ->check(between(1, 1000))
-      ->capture_default_str()
+  add_number(command, "--frame-count", options.frame_count, 1, 1000,
+             "Frames to look at, evenly picked")
       ->needs(frames);
   command
       .add_option("--put-back", options.put_back,

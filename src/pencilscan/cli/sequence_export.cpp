@@ -63,9 +63,8 @@ void add_sequence_export(CLI::App& group) {
   command->add_option("--zarr", options->zarr, "A Zarr group for Python (surface.zarr)");
   command->add_option("--usd", options->usd,
                       "USD text with time samples for Blender and Houdini (film.usda)");
-  command->add_option("--frames-per-second", options->frames_per_second, "Of the film")
-      ->check(between(0.001, 1e6))
-      ->capture_default_str();
+  add_number(*command, "--frames-per-second", options->frames_per_second, 0.001, 1e6,
+             "Of the film");
   command->add_flag("--measured", options->measured_only,
                     "What was measured, without what closes the surface");
   add_overwrite(*command, options->overwrite, "Replace files that are there");

@@ -218,17 +218,11 @@ void add_submit(CLI::App& group) {
   command->add_option("--limit", options->limit, "Tasks of Slurm at once; 0: as many as it likes")
       ->check(of_slurm("--limit"))
       ->capture_default_str();
-  command
-      ->add_option("--max-tasks", options->max_tasks,
-                   "Slurm's MaxArraySize is 1001 as it comes; tasks of longer sequences take "
-                   "several chunks of 50 frames")
-      ->check(between(1, 1000000))
-      ->capture_default_str();
-  command
-      ->add_option("--retries", options->retries,
-                   "How often a task that was killed is started again")
-      ->check(between(0, 100))
-      ->capture_default_str();
+  add_number(*command, "--max-tasks", options->max_tasks, 1, 1000000,
+             "Slurm's MaxArraySize is 1001 as it comes; tasks of longer sequences take "
+             "several chunks of 50 frames");
+  add_number(*command, "--retries", options->retries, 0, 100,
+             "How often a task that was killed is started again");
   command
       ->add_option("--sbatch", options->sbatch,
                    "A further option for sbatch, such as --sbatch=--partition=long")
@@ -290,13 +284,10 @@ void add_finish(CLI::App& group) {
   command->add_option("--out", options->out, "The output folder of reconstruct")->required();
   command->add_flag("--resubmit", options->resubmit,
                     "Run the tasks with missing frames again, as they were submitted");
-  command
-      ->add_option("--rounds", options->rounds,
-                   "Slurm: how often the job that finishes may itself resubmit")
-      ->check(between(0, 100))
+  add_number(*command, "--rounds", options->rounds, 0, 100,
+             "Slurm: how often the job that finishes may itself resubmit")
       ->check(told_where_not(
-          "--rounds", [options] { return options->resubmit; }, "needs --resubmit"))
-      ->capture_default_str();
+          "--rounds", [options] { return options->resubmit; }, "needs --resubmit"));
   add_common_options(*command, options->common, "pencilscan sequence finish --out result");
   command->callback([options] { run_finish(*options); });
 }

@@ -37,9 +37,7 @@ void add_scene_options(CLI::App& command, SimulateOptions& options) {
   command.add_option("--up", options.up, "Axis of the mesh that points up")
       ->transform(choice(axes))
       ->default_str("z");
-  command.add_option("--frame-count", options.frame_count, "Frames of a moving object")
-      ->check(between(1, 999999))
-      ->capture_default_str();
+  add_number(command, "--frame-count", options.frame_count, 1, 999999, "Frames of a moving object");
   const auto moves = [&options](const char* option) {
     return told_where_not(
         option, [&options] { return options.frame_count > 1; }, "needs --frame-count 2 or more");
@@ -78,20 +76,16 @@ void add_scene_options(CLI::App& command, SimulateOptions& options) {
         option, [&options] { return options.surface.texture.kind != TextureKind::kNone; },
         "needs --texture checker, noise or stripes");
   };
-  command
-      .add_option("--albedo", options.surface.albedo,
-                  "Share of the light that the surface gives back")
-      ->check(between(0.0, 1.0))
-      ->check(renders)
-      ->capture_default_str();
+  add_number(command, "--albedo", options.surface.albedo, 0, 1,
+             "Share of the light that the surface gives back")
+      ->check(renders);
   command.add_option("--texture", options.surface.texture.kind, "What varies the albedo")
       ->transform(choice(textures))
       ->check(renders)
       ->default_str("none");
-  command.add_option("--contrast", options.surface.texture.contrast, "Contrast of the texture")
-      ->check(between(0.0, 1.0))
-      ->check(textured("--contrast"))
-      ->capture_default_str();
+  add_number(command, "--contrast", options.surface.texture.contrast, 0, 1,
+             "Contrast of the texture")
+      ->check(textured("--contrast"));
   command
       .add_option("--texture-mm", options.surface.texture.period_mm, "Period of the texture, mm")
       ->check(above_zero())
@@ -101,21 +95,18 @@ void add_scene_options(CLI::App& command, SimulateOptions& options) {
       ->check(zero_or_more())
       ->check(renders)
       ->capture_default_str();
-  command.add_option("--roughness", options.surface.roughness, "1 / exponent of that lobe")
-      ->check(between(1e-4, 1.0))
+  add_number(command, "--roughness", options.surface.roughness, 1e-4, 1,
+             "1 / exponent of that lobe")
       ->check(told_where_not(
           "--roughness", [&options] { return options.surface.specular > 0; },
-          "needs --specular above 0"))
-      ->capture_default_str();
+          "needs --specular above 0"));
   command.add_flag("--flat", options.flat, "One normal per face (cubes); else smooth shading");
 }
 
 void add_device_options(CLI::App& command, SimulateOptions& options) {
   const CLI::Validator renders = only_of_own_light(options);
-  command.add_option("--samples", options.photo.render.samples, "Rays per pixel and axis")
-      ->check(between(1, 16))
-      ->check(renders)
-      ->capture_default_str();
+  add_number(command, "--samples", options.photo.render.samples, 1, 16, "Rays per pixel and axis")
+      ->check(renders);
   command
       .add_option("--exposure", options.photo.render.exposure,
                   "Image value of a white surface that faces a projector at the centre")

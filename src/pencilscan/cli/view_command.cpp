@@ -7,6 +7,7 @@
 #include <thread>
 
 #include "pencilscan/cli/command.h"
+#include "pencilscan/cli/page_arguments.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/server/view_server.h"
 
@@ -58,25 +59,12 @@ void add_view_command(CLI::App& app) {
   CLI::App* command = app.add_subcommand(
       "view", "The report with the full data, for a browser on this computer (Ctrl-C stops).");
   command
-      ->add_option("folder", options->folder,
-                   "output folder of reconstruct, calibrate, scan or an experiment, or a folder of "
-                   "several runs")
-      ->required();
-  command
       ->add_option("--listen", options->view.address,
                    "address of this computer to listen on; with another one than the default, "
                    "other computers reach the page")
       ->capture_default_str();
-  command->add_option("--port", options->view.port, "0: any free one")
-      ->check(between(0, 65535))
-      ->capture_default_str();
-  command->add_option("--title", options->view.page.title, "default: the folder's name");
-  command->add_option("--truth", options->view.page.sources.truth,
-                      "true mesh, or a folder with <frame>/mesh.ply: shows distances to it");
-  command->add_option("--rig", options->view.page.sources.rig,
-                      "the rig, where the folder does not hold it");
-  command->add_option("--frames", options->view.page.sources.frames,
-                      "the captured frames, where the folder has no pictures");
+  add_number(*command, "--port", options->view.port, 0, 65535, "0: any free one");
+  add_page_arguments(*command, options->folder, options->view.page);
   add_common_options(*command, options->common, "pencilscan view result");
   command->callback([options] { run_view(*options); });
 }
