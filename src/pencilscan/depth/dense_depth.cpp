@@ -5,7 +5,6 @@
 #include <cmath>
 #include <opencv2/core.hpp>
 
-#include "pencilscan/core/median.h"
 #include "pencilscan/depth/seeds.h"
 
 namespace pencilscan {
@@ -146,7 +145,6 @@ class FloorView {
 };
 
 constexpr std::size_t kPilots = 100;
-constexpr std::size_t kEnoughPilots = 20;  // ten each tell the noise in the dark and the bright
 constexpr double kFacing = 0.5;  // cosine; flatter, a plane from other cameras is off in its slope
 
 double cost(const WindowFit& fit) { return static_cast<double>(fit.misfit); }
@@ -212,82 +210,6 @@ std::vector<PilotWindow> pilot_windows(const CameraLight& light, const RayScene&
   std::vector<PilotWindow> pilots;
   for (std::size_t i = 0; i < all.size(); i += step) pilots.push_back(all[i]);
   return pilots;
-}
-
-void measure_light(std::span<const PilotWindow> pilots, const DepthOptions& options,
-                   CameraLight& light) {
-  /// take(fit, fitter) for each pilot window that fits.
-  const auto run = [&](float blur, auto take) {
-    light.blur_px = blur;
-    WindowFitter fitter(light, options.half);
-    for (const auto& [pixel, start] : pilots) {
-      if (const auto fit = fitter.fit(pixel, start, 5)) take(*fit, fitter);
-    }
-  };
-  // Of all pilots: a blur with which few windows fit shall not win by these few. Where half of them
-  // do not, more fits are better.
-  const auto median_misfit = [&](float blur) {
-    constexpr float kNoFit = 1e9F;
-    std::vector<float> values;
-    run(blur, [&](const WindowFit& fit, const WindowFitter&) { values.push_back(fit.misfit); });
-    const auto missing = static_cast<int>(pilots.size() - values.size());
-    values.resize(pilots.size(), kNoFit);
-    return std::pair(values.empty() ? kNoFit : upper_median(std::move(values)), missing);
-  };
-  const float before = light.blur_px;
-  // Golden section for the blur.
-  float low = 0.3F, high = 2.5F;
-  constexpr float kGolden = 0.618034F;
-  float a = high - kGolden * (high - low), b = low + kGolden * (high - low);
-  auto fa = median_misfit(a), fb = median_misfit(b);
-  for (int round = 0; round < 4; ++round) {
-    if (fa <= fb) {
-      high = b;
-      b = a;
-      fb = fa;
-      a = high - kGolden * (high - low);
-      fa = median_misfit(a);
-    } else {
-      low = a;
-      a = b;
-      fa = fb;
-      b = low + kGolden * (high - low);
-      fb = median_misfit(b);
-    }
-  }
-  using Samples = std::vector<std::pair<float, float>>;  // mean and variance of a window
-  std::vector<Samples> samples_of(light.families.size());
-  std::vector<float> residuals;
-  run(0.5F * (low + high), [&](const WindowFit& fit, const WindowFitter& fitter) {
-    residuals.push_back(fit.relative_residual);
-    for (std::size_t f = 0; f < samples_of.size(); ++f)
-      samples_of[f].emplace_back(fitter.family_mean(f), fitter.family_variance(f));
-  });
-  light.is_measured = residuals.size() >= kEnoughPilots;
-  if (residuals.empty()) {
-    light.blur_px = before;
-    return;
-  }
-  light.usual_residual = upper_median(std::move(residuals));
-  // Noise per family: a line through the medians of the darker and the brighter half.
-  for (std::size_t f = 0; f < samples_of.size(); ++f) {
-    Samples& samples = samples_of[f];
-    if (samples.size() < kEnoughPilots) continue;
-    std::sort(samples.begin(), samples.end());
-    const auto half_median = [&](std::size_t from, std::size_t to) {
-      std::vector<float> v;
-      for (std::size_t k = from; k < to; ++k) v.push_back(samples[k].second);
-      return std::pair(samples[(from + to) / 2].first, upper_median(std::move(v)));
-    };
-    const auto dark = half_median(0, samples.size() / 2);
-    const auto bright = half_median(samples.size() / 2, samples.size());
-    NoiseModel noise;
-    noise.slope = bright.first > dark.first + 1e-4F
-                      ? std::max(0.F, (bright.second - dark.second) / (bright.first - dark.first))
-                      : 0.F;
-    noise.offset = std::max({dark.second - noise.slope * dark.first, 0.2F * dark.second, 1e-7F});
-    light.noise[f] = noise;
-  }
 }
 
 void grow(const CameraLight& light, const ObjectSpace& space, const DepthOptions& options,

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "pencilscan/depth/depth_map.h"
+#include "pencilscan/depth/pilot_light.h"
 #include "pencilscan/depth/window_fit.h"
 #include "pencilscan/geometry/ray_scene.h"
 #include "pencilscan/labeling/measured_point.h"
@@ -29,12 +30,6 @@ struct DepthOptions {
 /// those of wide lines.
 [[nodiscard]] DepthOptions options_for(const CameraLight& light, DepthOptions options);
 
-/// A window whose depth is known about: pictures show their blur and noise there.
-struct PilotWindow {
-  Vec2 pixel = Vec2::Zero();
-  Quadric start = Quadric::Zero();
-};
-
 /// Evenly picked labelled points of a camera.
 [[nodiscard]] std::vector<PilotWindow> pilot_windows(const CameraLight& light, int camera,
                                                      std::span<const MeasuredPoint> points,
@@ -43,11 +38,6 @@ struct PilotWindow {
 [[nodiscard]] std::vector<PilotWindow> pilot_windows(const CameraLight& light,
                                                      const RayScene& surface, const DepthMap& map,
                                                      const DepthOptions& options);
-
-/// Fills in the blur and noise that the images of a light show in pilot windows. Without windows
-/// that fit it stays as it is.
-void measure_light(std::span<const PilotWindow> pilots, const DepthOptions& options,
-                   CameraLight& light);
 
 /// The depth map of camera `camera` (index in the rig), one node every options.stride px. Windows
 /// of nodes near labelled curve points start from these; grow() goes on from there. Of `points`,

@@ -70,7 +70,7 @@ DepthResult measure_depth(const Rig& rig, const std::vector<ColorFamily>& famili
       }
     }
     light.noise.assign(families.size(), NoiseModel{});
-    measure_light(pilot_windows(light, static_cast<int>(c), points, depth), depth, light);
+    measure_light(pilot_windows(light, static_cast<int>(c), points, depth), depth.half, light);
     result.maps[i] = dense_depth(light, static_cast<int>(c), points, space, depth);
     with_wider_windows(
         light, binning_for(static_cast<double>(light.spacing_px), depth), result.maps[i],
@@ -116,7 +116,7 @@ void guided_depth(const Rig& rig, const RayScene& surface, const DepthStageOptio
     }
     // Labels told little of its blur and noise. The surface of other cameras may tell more.
     CameraLight light = result.lights[i];
-    measure_light(pilot_windows(light, surface, map, depth), depth, light);
+    measure_light(pilot_windows(light, surface, map, depth), depth.half, light);
     DepthMap again = map;
     const std::size_t found_again = completed(light, again);
     found[i] = completed(result.lights[i], map);
