@@ -12,6 +12,7 @@
 #include <opencv2/core/utility.hpp>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "cpu_seconds.h"
@@ -22,6 +23,7 @@
 #include "pencilscan/io/image.h"
 #include "pencilscan/pipeline/frame.h"
 #include "pencilscan/pipeline/frame_files.h"
+#include "pencilscan/pipeline/sensor_frame.h"
 #include "pencilscan/pipeline/sequence.h"
 #include "pencilscan/rig/camera_light.h"
 #include "pencilscan/rig/rig.h"
@@ -102,12 +104,19 @@ void run(const Rig& stated, const std::filesystem::path& folder, int threads, in
     FrameResult result;
     std::vector<StageTime> times;
     const StageClock clock({}, times);
-    points.measure([&] { result.points = measure_points(rig, frame, options, clock); });
+    SensorFrame seen;
+    points.measure([&] {
+      seen = sensor_frame(rig, frame);
+      PointResult curves = detect_frame(seen.rig, seen.frame, options, clock);
+      curves = check_pictures(seen.rig, seen.frame, std::move(curves));
+      PointResult lines = solve_frame(seen.rig, seen.frame, std::move(curves), options, clock);
+      result.points = place_points(seen.rig, std::move(lines), options, clock);
+    });
     shape.measure([&] {
       if (!with_shape) return;
-      result.shape = measure_shape(rig, frame, result.points, {}, {}, clock);
-      result = match_on_surface(rig, std::move(result), {}, clock);
-      result = finish_shape(rig, std::move(result));
+      result.shape = measure_shape(seen.rig, seen.frame, result.points, {}, {}, clock);
+      result = match_on_surface(seen.rig, std::move(result), {}, clock);
+      result = finish_shape(seen.rig, std::move(result));
     });
     if (i == 0) {
       for (const StageTime& time : times) stages.push_back(time.stage);

@@ -16,7 +16,7 @@ TEST(Races, NoneWhilePointsAreMeasured) {
   photo.render.samples = 1;
   const Frame frame = sample::photographed_frame(rig, ball, photo);
   const ThreadLimit limit(4);
-  EXPECT_FALSE(measure_points(rig, frame).points.empty());
+  EXPECT_FALSE(sample::labelled_points(rig, frame).points.empty());
 }
 
 }  // namespace

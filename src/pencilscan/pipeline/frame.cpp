@@ -97,16 +97,6 @@ FrameResult measure_frame(const Rig& rig, const Frame& frame, PointResult lines,
   return count_motion(rig, std::move(result));
 }
 
-PointResult measure_points(const Rig& stated, const Frame& frame, const PointOptions& options,
-                           const StageClock& clock) {
-  const SensorFrame sensor = sensor_frame(with_registered_patterns(stated), frame);
-  const Rig& rig = sensor.rig;
-  PointResult curves = detect_frame(rig, sensor.frame, options, clock);
-  curves = check_pictures(rig, sensor.frame, std::move(curves));
-  PointResult lines = solve_frame(rig, sensor.frame, std::move(curves), options, clock);
-  return place_points(rig, std::move(lines), options, clock);
-}
-
 Rig in_footprints(const Rig& rig) {
   return with_registered_patterns(scaled(rig, 1 / footprint(rig)));
 }

@@ -202,11 +202,6 @@ void forget_camera(std::size_t camera, PointResult& result);
                                         const FrameOptions& options, const FrameLinks& links,
                                         const StageClock& clock);
 
-/// The points of a frame without a surface. `rig`: of any unit, which lengths are then taken in.
-[[nodiscard]] PointResult measure_points(const Rig& rig, const Frame& frame,
-                                         const PointOptions& options = {},
-                                         const StageClock& clock = {});
-
 /// A result in footprints in the rig's unit, without `scene`. Warns of motion within the exposure.
 [[nodiscard]] FrameResult in_unit_of(const Rig& rig, FrameResult result);
 

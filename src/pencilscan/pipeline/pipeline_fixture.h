@@ -22,7 +22,8 @@ namespace pencilscan {
 /// Before a ball: the paper's Fig. 6 with small images.
 inline Rig small_rig() { return sample::small_rig(480, 360, 110); }
 
-inline TriangleMesh ball() { return make_sphere(95, 48); }
+inline constexpr double kBallMm = 95;  // radius
+inline TriangleMesh ball() { return make_sphere(kBallMm, 48); }
 
 inline Frame render_frame(const Rig& rig, const TriangleMesh& mesh) {
   const SimulatedObject object(mesh);

@@ -23,6 +23,7 @@
 #include "pencilscan/pipeline/pipeline_fixture.h"
 #include "pencilscan/pipeline/rig_fit.h"
 #include "pencilscan/pipeline/rig_refinement.h"
+#include "pencilscan/pipeline/sample_frame.h"
 #include "pencilscan/pipeline/sequence.h"
 #include "pencilscan/rig/device_list.h"
 #include "pencilscan/rig/object_space.h"
@@ -46,7 +47,7 @@ TEST_F(PipelineTest, JointAndMultiviewLabelTheBallAndLinearWorksWithOneCamera) {
         std::tuple(MethodOptions(MultiviewOptions{}), 0.02, 0.85)}) {
     PointOptions options;
     options.method = method;
-    const PointResult result = measure_points(*rig_, *frame_, options);
+    const PointResult result = sample::labelled_points(*rig_, *frame_, options);
     const auto verdicts = judge_points(truth, result.points);
     EXPECT_LT(label_figures(truth, result.points, verdicts).wrong.value(), max_wrong);
     EXPECT_GT(line_recall(*rig_, lines, result.points).recall.value(), min_recall);
@@ -58,7 +59,7 @@ TEST_F(PipelineTest, JointAndMultiviewLabelTheBallAndLinearWorksWithOneCamera) {
   one.images.resize(1);
   PointOptions options;
   options.method = LinearOptions{};
-  const PointResult linear = measure_points(minimum, one, options);
+  const PointResult linear = sample::labelled_points(minimum, one, options);
   ASSERT_GT(linear.points.size(), 500U);
   const TruthScene one_truth(ball(), minimum);
   const auto linear_verdicts = judge_points(one_truth, linear.points);
@@ -66,7 +67,8 @@ TEST_F(PipelineTest, JointAndMultiviewLabelTheBallAndLinearWorksWithOneCamera) {
 }
 
 TEST_F(PipelineTest, TheSurfaceTakesWrongLabelsAwayAndFindsTheirLinesAgain) {
-  const TruthScene truth(ball(), *rig_);
+  const Rig rig = in_footprints(*rig_);
+  const TruthScene truth(make_sphere(kBallMm / footprint(*rig_), 48), rig);
   std::vector<TrueLinePixel> lines;
   for (int c = 0; c < 2; ++c) {
     const auto part = true_line_pixels(truth, c);
@@ -76,11 +78,11 @@ TEST_F(PipelineTest, TheSurfaceTakesWrongLabelsAwayAndFindsTheirLinesAgain) {
     return label_figures(truth, result.points, judge_points(truth, result.points)).wrong.value();
   };
   const auto recall = [&](const PointResult& result) {
-    return line_recall(*rig_, lines, result.points).recall.value();
+    return line_recall(rig, lines, result.points).recall.value();
   };
   const ShapeOptions shape_options = quick().output.frame.shape;
-  FrameResult made{measure_points(*rig_, *frame_), {}, {}};
-  made.shape = measure_shape(*rig_, *frame_, made.points, shape_options);
+  FrameResult made{sample::points_in_footprints(rig, *frame_), {}, {}};
+  made.shape = measure_shape(rig, *frame_, made.points, shape_options);
   PointResult& result = made.points;
   const double recall_before = recall(result);
   // Every tenth run gets its neighbour's line.
@@ -90,9 +92,9 @@ TEST_F(PipelineTest, TheSurfaceTakesWrongLabelsAwayAndFindsTheirLinesAgain) {
       runs[k].label.plane = runs[k].label.line;
     }
   }
-  result.points = triangulate(*rig_, result.graphs, result.labeling);
+  result.points = triangulate(rig, result.graphs, result.labeling);
   ASSERT_GT(wrong(result), 0.03);
-  made = match_on_surface(*rig_, std::move(made));
+  made = match_on_surface(rig, std::move(made));
   EXPECT_LT(wrong(result), 0.003);
   EXPECT_GT(recall(result), recall_before - 0.01);
   EXPECT_GT(result.contradicted, 100U);
@@ -101,12 +103,14 @@ TEST_F(PipelineTest, TheSurfaceTakesWrongLabelsAwayAndFindsTheirLinesAgain) {
 
 TEST_F(PipelineTest, SurfaceWhosePointsWereTakenBackIsNotMeasured) {
   const FrameOptions options = quick().output.frame;
-  FrameResult made{measure_points(*rig_, *frame_), {}, {}};
-  made.shape = measure_shape(*rig_, *frame_, made.points, options.shape);
-  made = match_on_surface(*rig_, std::move(made));
-  made = finish_shape(*rig_, std::move(made), options.shape.fusion);
-  const double reach = 2 * line_spacing(*rig_);
-  std::erase_if(made.points.points, [](const MeasuredPoint& p) { return p.z > 20; });
+  const Rig rig = in_footprints(*rig_);
+  const double cut = 20 / footprint(*rig_);  // height, footprints
+  FrameResult made{sample::points_in_footprints(rig, *frame_), {}, {}};
+  made.shape = measure_shape(rig, *frame_, made.points, options.shape);
+  made = match_on_surface(rig, std::move(made));
+  made = finish_shape(rig, std::move(made), options.shape.fusion);
+  const double reach = 2 * line_spacing(rig);
+  std::erase_if(made.points.points, [&](const MeasuredPoint& p) { return double{p.z} > cut; });
   const auto highest = [](const TriangleMesh& mesh) {
     double z = -1e9;
     for (const Vec3& x : mesh.vertices) z = std::max(z, x.z());
@@ -118,12 +122,12 @@ TEST_F(PipelineTest, SurfaceWhosePointsWereTakenBackIsNotMeasured) {
   };
   const double area = whole_area();
   const double share = made.shape.surface.report.measured_share;
-  ASSERT_GT(highest(made.shape.surface.measured), 20 + 2 * reach);
-  made = finish_shape(*rig_, std::move(made), options.shape.fusion);
+  ASSERT_GT(highest(made.shape.surface.measured), cut + 2 * reach);
+  made = finish_shape(rig, std::move(made), options.shape.fusion);
   const SurfaceResult& surface = made.shape.surface;
-  EXPECT_LT(highest(surface.measured), 20 + reach);
-  EXPECT_GT(highest(surface.measured), 20);
-  EXPECT_GT(highest(surface.mesh), 20 + 2 * reach);  // closed as before
+  EXPECT_LT(highest(surface.measured), cut + reach);
+  EXPECT_GT(highest(surface.measured), cut);
+  EXPECT_GT(highest(surface.mesh), cut + 2 * reach);  // closed as before
   EXPECT_LT(surface.report.measured_share, 0.9 * share);
   const auto measured_area =
       made.shape.holes.area_mm2[static_cast<std::size_t>(HoleReason::kMeasured)];
@@ -152,7 +156,7 @@ TEST_F(PipelineTest, LinesWithoutACodeAreToldApartWhereFourProjectorsShareAColou
     projector.patterns.front().alphabet = 1;
     projector.patterns.front().sequence = {0};
   }
-  const PointResult result = measure_points(rig, render_frame(rig, ball()), {});
+  const PointResult result = sample::labelled_points(rig, render_frame(rig, ball()), {});
   ASSERT_GT(result.points.size(), 5000U);
   const TruthScene truth(ball(), rig);
   const auto verdicts = judge_points(truth, result.points);
@@ -177,9 +181,9 @@ TEST_F(PipelineTest, KnownLateralColourCostsNextToNothing) {
     registration.colors[2] = {-shifts[d], 0.9998};
   }
   const Frame frame = render_frame(shifted, ball());
-  const double without = distance_from_ball(measure_points(*rig_, *frame_));
-  const double known = distance_from_ball(measure_points(shifted, frame));
-  const double unknown = distance_from_ball(measure_points(*rig_, frame));
+  const double without = distance_from_ball(sample::labelled_points(*rig_, *frame_));
+  const double known = distance_from_ball(sample::labelled_points(shifted, frame));
+  const double unknown = distance_from_ball(sample::labelled_points(*rig_, frame));
   EXPECT_LT(known, 1.1 * without + 0.002);  // float32 images, no noise: 2 um are of resampling
   EXPECT_GT(unknown, 3 * without);
 }
@@ -194,7 +198,7 @@ TEST_F(PipelineTest, SingleProjectorLabelsTheGridOfOneProjector) {
   rig.projectors[0].patterns.push_back(across);
   PointOptions options;
   options.method = SingleProjectorOptions{};
-  const PointResult result = measure_points(rig, render_frame(rig, ball()), options);
+  const PointResult result = sample::labelled_points(rig, render_frame(rig, ball()), options);
   ASSERT_GT(result.points.size(), 1000U);
   const TruthScene truth(ball(), rig);
   const auto verdicts = judge_points(truth, result.points);
@@ -250,9 +254,9 @@ TEST_F(PipelineTest, BytesAreTheSameForAnyThreadCount) {
 
 TEST_F(PipelineTest, WrongRigIsToldFromATrueOne) {
   const auto hint = testing::Contains(testing::Field(&Warning::code, WarningCode::kRigIsOff));
-  EXPECT_THAT(measure_points(*rig_, *frame_).warnings, testing::Not(hint));
+  EXPECT_THAT(sample::labelled_points(*rig_, *frame_).warnings, testing::Not(hint));
   const Rig wrong = corrected_rig(*rig_, {{{0, 0.7, 0}, {}}, {}, {{0, 0.5, 0}, {}}, {}});
-  EXPECT_THAT(measure_points(wrong, *frame_).warnings, hint);
+  EXPECT_THAT(sample::labelled_points(wrong, *frame_).warnings, hint);
 }
 
 /// Every device of the small rig about `px` pixels off.
@@ -279,9 +283,9 @@ std::pair<std::size_t, std::size_t> same_and_other_names(const std::vector<Measu
 }
 
 TEST_F(PipelineTest, LinesAreNamedRightWithARigThatIsOff) {
-  const auto truth = measure_points(*rig_, *frame_).points;
+  const auto truth = sample::labelled_points(*rig_, *frame_).points;
   for (const double px : {1.0, 2.0, 4.0}) {
-    const auto points = measure_points(rig_off_by(px, *rig_), *frame_).points;
+    const auto points = sample::labelled_points(rig_off_by(px, *rig_), *frame_).points;
     const auto [same, other] = same_and_other_names(truth, points);
     EXPECT_GT(same, 9 * truth.size() / 10) << px;
     EXPECT_LT(other, truth.size() / 200) << px;
@@ -307,9 +311,9 @@ cv::Mat bent(const cv::Mat& image, float amplitude) {
 TEST_F(PipelineTest, LinesThatAreBentAreNamedRightWithARigThatIsOff) {
   Frame frame = *frame_;
   for (cv::Mat& image : frame.images) image = bent(image, 0.8F);
-  const auto truth = measure_points(*rig_, frame).points;
+  const auto truth = sample::labelled_points(*rig_, frame).points;
   for (const double px : {1.0, 2.0, 3.0}) {
-    const auto points = measure_points(rig_off_by(px, *rig_), frame).points;
+    const auto points = sample::labelled_points(rig_off_by(px, *rig_), frame).points;
     const auto [same, other] = same_and_other_names(truth, points);
     EXPECT_GT(same, 85 * truth.size() / 100) << px;
     EXPECT_LT(other, truth.size() / 50) << px;

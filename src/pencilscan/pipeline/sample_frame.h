@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <opencv2/core.hpp>
+#include <utility>
 
 #include "pencilscan/pipeline/frame.h"
 #include "pencilscan/simulation/photography.h"
@@ -23,6 +24,21 @@ Frame photographed_frame(const Rig& rig, const Object& object, const Photography
     frame.images.push_back(values);
   }
   return frame;
+}
+
+/// The labelled points of a frame as a user gets them without a surface, in the rig's unit.
+inline PointResult labelled_points(const Rig& rig, const Frame& frame,
+                                   const PointOptions& options = {}) {
+  FrameOptions points_alone;
+  points_alone.points = options;
+  points_alone.meshes = false;
+  return reconstruct_frame(rig, frame, points_alone).points;
+}
+
+/// What the stages of a surface take: points of a rig in footprints (in_footprints()).
+inline PointResult points_in_footprints(const Rig& rig, const Frame& frame) {
+  PointResult lines = solve_frame(rig, frame, check_pictures(rig, frame, detect_frame(rig, frame)));
+  return place_points(rig, std::move(lines));
 }
 
 }  // namespace pencilscan::sample
