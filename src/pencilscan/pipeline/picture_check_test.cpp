@@ -214,7 +214,7 @@ TEST_F(PictureCheck, AProjectorThatIsOffStandsNowhereElse) {
   lit.projectors.erase(lit.projectors.begin() + 2);
   const Frame frame =
       sample::photographed_frame(lit, SimulatedObject(make_sphere(120, 40)), photography());
-  for (const Warning& warning : measure_points(rig, frame).warnings)
+  for (const Warning& warning : sample::labelled_points(rig, frame).warnings)
     EXPECT_NE(warning.code, WarningCode::kRigIsOff) << warning.text;
 }
 
