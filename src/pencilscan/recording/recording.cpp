@@ -13,10 +13,6 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-/// Of one recording: days at 30 frames a second. What is known of each takes memory, whether its
-/// pictures are there or not.
-constexpr std::int64_t kMostFrames = 10'000'000;
-
 std::vector<std::string> camera_names(const fs::path& folder, const json& attributes) {
   const std::string file = (folder / ".zattrs").string();
   const json list = attributes.value("cameras", json());

@@ -75,6 +75,32 @@ TEST_F(RecordingFolder, MetadataThatCannotBeMeantIsRefused) {
               ::testing::HasSubstr("must have at most 10000000 frames"));
 }
 
+// The tables of times are read whole, in so many chunks at most (io/zarr_array.cpp).
+TEST_F(RecordingFolder, TheLongestRecordingOfTheMostCamerasCanBeRead) {
+  constexpr std::int64_t kMostChunks = 1'000'000;
+  constexpr std::int64_t kMostFrames = 10'000'000;
+  constexpr std::int64_t kCameras = 256;  // of a rig
+  RecordingWriter writer(folder_, {{"cam0", 1, 1, 1, 8, 0}});
+  writer.write(0, 0, cv::Mat::zeros(1, 1, CV_8U), 0);
+  writer.close();
+  for (const char* table : {"timestamp_ns", "valid"}) {
+    const auto rows = read_json(folder_ / table / ".zarray").at("chunks").at(0).get<std::int64_t>();
+    EXPECT_EQ(read_json(folder_ / table / ".zarray").at("chunks").at(1), 1);
+    EXPECT_LE((kMostFrames + rows - 1) / rows * kCameras, kMostChunks) << table;
+  }
+}
+
+// A row beyond it could be written and not be read.
+TEST_F(RecordingFolder, MoreFramesThanCanBeReadAreRefused) {
+  RecordingWriter writer(folder_, {{"cam0", 1, 1, 1, 8, 0}});
+  const cv::Mat pixel = cv::Mat::zeros(1, 1, CV_8U);
+  writer.write(0, 0, pixel, 0);
+  EXPECT_THROW(writer.write(10'000'000, 0, pixel, 0), StageError);
+  EXPECT_THROW(writer.write_missing(10'000'000, 0, 0), StageError);
+  writer.close();
+  EXPECT_EQ(Recording::open(folder_).row_count(), 1U);
+}
+
 TEST_F(RecordingFolder, GivesBackWhatWasWritten) {
   const std::vector<RecordedCamera> cameras = three_kinds();
   for (const auto compression :

@@ -16,11 +16,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Rows of time stamps and validity in one chunk of one camera: half a kilobyte that is written
-/// anew with every picture.
-constexpr std::int64_t kTableRows = 64;
+/// Rows of time stamps and validity in one chunk of one camera: 36 kilobytes that are written anew
+/// with every picture. So kMostFrames of 256 cameras, the most that a rig has, are 625,152 chunks;
+/// of more than a million a table is not read (io/zarr_array.cpp).
+constexpr std::int64_t kTableRows = 4096;
 /// Rows by which the arrays grow: so many pictures of a camera cost one more `.zarray` each.
-constexpr std::int64_t kGrowth = 16 * kTableRows;
+constexpr std::int64_t kGrowth = 1024;
 
 template <class Number>
 std::span<const std::uint8_t> as_bytes_of(std::span<const Number> numbers) {
@@ -93,6 +94,13 @@ struct RecordingWriter::State {
     write_zarr_group(folder, all);
   }
 
+  /// What cannot be read is not written.
+  void check_row(std::size_t row) const {
+    if (row < static_cast<std::size_t>(kMostFrames)) return;
+    throw StageError(folder.string() + ": the recording is full: it has at most " +
+                     std::to_string(kMostFrames) + " frames");
+  }
+
   /// Makes the arrays state at least row + 1 rows.
   void reach(std::size_t row) {
     const std::lock_guard lock(growing);
@@ -163,6 +171,7 @@ void RecordingWriter::write(std::size_t row, std::size_t camera, const cv::Mat& 
                             std::int64_t timestamp_ns) {
   State& state = *state_;
   PENCILSCAN_CHECK(!state.closed && camera < state.cameras.size());
+  state.check_row(row);
   const RecordedCamera& of = state.cameras[camera];
   PENCILSCAN_CHECK(image.cols == of.width && image.rows == of.height &&
                    image.type() == of.image_type());
@@ -176,6 +185,7 @@ void RecordingWriter::write(std::size_t row, std::size_t camera, const cv::Mat& 
 void RecordingWriter::write_missing(std::size_t row, std::size_t camera,
                                     std::int64_t timestamp_ns) {
   PENCILSCAN_CHECK(!state_->closed && camera < state_->cameras.size());
+  state_->check_row(row);
   state_->note(row, camera, timestamp_ns, false);
 }
 

@@ -40,7 +40,8 @@ class RecordingWriter {
 
   /// A picture of the camera's size and type (RecordedCamera::image_type, RGB), and when its
   /// exposure began by the camera's clock, or kUnknownTime. Rows may come in any order, each once;
-  /// what is never written is a missing picture. StageError when the disk is full.
+  /// what is never written is a missing picture. StageError when the disk is full, or the row is
+  /// beyond the 10,000,000 that a recording has.
   void write(std::size_t row, std::size_t camera, const cv::Mat& image, std::int64_t timestamp_ns);
   /// A picture that the camera announced but did not deliver whole: its time alone.
   void write_missing(std::size_t row, std::size_t camera, std::int64_t timestamp_ns);
