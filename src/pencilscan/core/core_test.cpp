@@ -1,4 +1,6 @@
 #include <gtest/gtest.h>
+#include <pthread.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -110,6 +112,33 @@ TEST(RunAtOnce, HearsThatItIsToStop) {
   std::atomic<int> bodies{0};
   EXPECT_THROW(run_at_once(1000, 2, [&](std::size_t) { stop = ++bodies > 5; }), Cancelled);
   EXPECT_LT(bodies, 10);
+}
+
+/// Bytes of address space that this process has.
+rlim_t address_space() {
+  std::ifstream pages("/proc/self/statm");
+  rlim_t count = 0;
+  pages >> count;
+  return count * static_cast<rlim_t>(::sysconf(_SC_PAGESIZE));
+}
+
+/// Ends with 0 where all is done although the system gives one more thread and no second one.
+[[noreturn]] void run_where_threads_are_few() {
+  constexpr std::size_t kStack = std::size_t{1} << 30;  // with all that comes with a thread
+  pthread_attr_t attributes;
+  ::pthread_attr_init(&attributes);
+  ::pthread_attr_setstacksize(&attributes, kStack);
+  ::pthread_setattr_default_np(&attributes);
+  rlimit limit{};
+  limit.rlim_cur = limit.rlim_max = address_space() + kStack * 3 / 2;
+  ::setrlimit(RLIMIT_AS, &limit);
+  std::atomic<int> done{0};
+  run_at_once(100, 8, [&](std::size_t) { ++done; });
+  ::_exit(done == 100 ? 0 : 1);
+}
+
+TEST(RunAtOnce, GoesOnWithFewerThreadsWhereTheSystemGivesNoMore) {
+  EXPECT_EXIT(run_where_threads_are_few(), testing::ExitedWithCode(0), "");
 }
 
 TEST(Random, NormalHasUnitVarianceAndUniformItsMoments) {

@@ -44,6 +44,20 @@ namespace {
 
 void run_loop(std::size_t count, const std::function<void(std::size_t)>& body);
 
+/// Does `work` here and on so many other threads; on fewer where the system gives no more.
+template <class Work>
+void work_with(std::size_t others, const Work& work) {
+  std::vector<std::thread> threads;
+  threads.reserve(others);
+  try {
+    while (threads.size() < others) threads.emplace_back(work);
+  } catch (const std::exception&) {
+    // What the missing ones would do, the others do.
+  }
+  work();
+  for (std::thread& thread : threads) thread.join();
+}
+
 }  // namespace
 
 void parallel_for(std::size_t count, const std::function<void(std::size_t)>& body) {
@@ -85,10 +99,7 @@ void run_at_once(std::size_t count, std::size_t at_once,
       }
     }
   };
-  std::vector<std::thread> others;
-  for (std::size_t t = 1; t < std::min(at_once, count); ++t) others.emplace_back(work);
-  work();
-  for (std::thread& thread : others) thread.join();
+  work_with(std::max<std::size_t>(1, std::min(at_once, count)) - 1, work);
   if (failure) std::rethrow_exception(failure);
 }
 
@@ -119,10 +130,7 @@ void run_loop(std::size_t count, const std::function<void(std::size_t)>& body) {
       }
     }
   };
-  std::vector<std::thread> pool;
-  for (std::size_t t = 1; t < threads; ++t) pool.emplace_back(work);
-  work();
-  for (std::thread& thread : pool) thread.join();
+  work_with(std::max<std::size_t>(1, threads) - 1, work);
   if (failure) std::rethrow_exception(failure);
 }
 
