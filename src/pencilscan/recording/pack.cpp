@@ -5,6 +5,7 @@
 #include <charconv>
 #include <cstdio>
 #include <map>
+#include <mutex>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <sstream>
@@ -352,6 +353,8 @@ PackReport unpack_recording(const Recording& recording, const FrameSets& sets, c
   report.frames = sets.sets.size();
   for (const RecordedCamera& camera : recording.cameras()) report.cameras.push_back(camera.name);
   std::atomic<std::size_t> pictures{0};
+  std::mutex telling;
+  std::size_t done = 0;  // guarded by `telling`
   const std::size_t cameras = recording.cameras().size();
   parallel_for(sets.sets.size(), [&](std::size_t k) {
     fs::create_directories(out / six_digits(k));
@@ -363,8 +366,9 @@ PackReport unpack_recording(const Recording& recording, const FrameSets& sets, c
                   recording.cameras()[c].bit_depth);
       ++pictures;
     }
-    if (progress)
-      progress("unpacking", static_cast<double>(k + 1) / static_cast<double>(report.frames));
+    if (!progress) return;
+    const std::lock_guard lock(telling);
+    progress("unpacking", static_cast<double>(++done) / static_cast<double>(report.frames));
   });
   report.pictures = pictures;
   report.missing = report.frames * cameras - report.pictures;

@@ -3,7 +3,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <atomic>
+#include <chrono>
 #include <fstream>
+#include <thread>
 
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/error_of.h"
@@ -231,6 +234,27 @@ TEST_F(Pack, ProgressEndsAtTheEnd) {
   double last = 0;
   pack_recording(frames(), packed(), {}, [&](std::string_view, double share) { last = share; });
   EXPECT_EQ(last, 1);
+}
+
+TEST_F(Pack, UnpackingTellsHowFarItIsOneCallAtATime) {
+  constexpr std::size_t kFrames = 40;
+  for (std::size_t k = 0; k < kFrames; ++k) put(six_digits(k) + "/cam0.png", CV_8UC1, 3);
+  pack_recording(frames(), packed());
+  const Recording recording = Recording::open(packed());
+  std::atomic<int> inside{0};
+  std::atomic<bool> overlapped{false};
+  std::vector<double> shares;
+  unpack_recording(recording, group_frames(recording), temporary_.path() / "again",
+                   [&](std::string_view, double share) {
+                     if (++inside > 1) overlapped = true;
+                     if (!overlapped) shares.push_back(share);
+                     std::this_thread::sleep_for(std::chrono::milliseconds(1));
+                     --inside;
+                   });
+  EXPECT_FALSE(overlapped);
+  EXPECT_EQ(shares.size(), kFrames);
+  EXPECT_TRUE(std::is_sorted(shares.begin(), shares.end()));
+  EXPECT_EQ(shares.back(), 1);
 }
 
 TEST_F(Pack, ATimeStampThatIsNoWholeNumberIsRefused) {
