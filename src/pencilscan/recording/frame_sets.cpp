@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <cstdlib>
 #include <limits>
 #include <tuple>
@@ -26,12 +27,20 @@ constexpr std::size_t kBlock = 64;
 /// Lags that are tried where clocks do not share their start.
 constexpr int kMaxLag = 100;
 
+/// a - b, also of times whose difference no int64 holds.
+double difference_ns(std::int64_t a, std::int64_t b) {
+  const auto size = [](std::int64_t more, std::int64_t less) {
+    return static_cast<double>(static_cast<std::uint64_t>(more) - static_cast<std::uint64_t>(less));
+  };
+  return a < b ? -size(b, a) : size(a, b);
+}
+
 Track track_of(const ShotTimes& camera, std::int64_t origin) {
   Track track;
   for (std::size_t row = 0; row < camera.times_ns.size(); ++row) {
     if (camera.times_ns[row] == kUnknownTime) continue;
     track.rows.push_back(row);
-    track.times.push_back(static_cast<double>(camera.times_ns[row] - origin));
+    track.times.push_back(difference_ns(camera.times_ns[row], origin));
   }
   return track;
 }

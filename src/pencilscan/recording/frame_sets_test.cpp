@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 #include <map>
 
 #include "pencilscan/core/random.h"
@@ -253,6 +254,18 @@ TEST(FrameSets, LatePicturesAreNamed) {
   trigger.cameras[0].late = {{5, 3e6}, {6, 12e6}};
   sets = group_frames(trigger.shots());
   EXPECT_THAT(sets.clocks[0].late, ElementsAre(6));
+}
+
+TEST(FrameSets, TimesNearBothEndsOfTheirRangeAreInOrder) {
+  constexpr std::int64_t kFarthest = std::numeric_limits<std::int64_t>::max() - 1000;
+  ShotTimes shots;
+  shots.times_ns = {-kFarthest, 0, kFarthest};
+  shots.valid = {1, 1, 1};
+  const std::vector<ShotTimes> cameras = {shots, shots};
+  const FrameSets sets = group_frames(cameras);
+  EXPECT_EQ(sets.period_ns, static_cast<double>(kFarthest));
+  EXPECT_TRUE(sets.by_row);
+  EXPECT_EQ(sets.sets.size(), 3U);
 }
 
 TEST(FrameSets, WithoutTimesRowsAreMoments) {
