@@ -11,6 +11,8 @@
 #include "pencilscan/pipeline/frame_warnings.h"
 #include "pencilscan/pipeline/sample_frame.h"
 #include "pencilscan/planning/ring.h"
+#include "pencilscan/recording/pack.h"
+#include "pencilscan/rig/sample_devices.h"
 #include "pencilscan/simulation/simulated_object.h"
 
 namespace pencilscan {
@@ -303,6 +305,16 @@ TEST(FewNames, IsSaidBelowATenthOfTheLines) {
   EXPECT_THAT(warning->text, HasSubstr("only 9.9 % of the lines"));
   result.labeling.runs[1][0].end = 100;
   EXPECT_FALSE(few_names_warning(result));
+}
+
+TEST(PlainFaults, ColorsOfAPictureOfManyPixelsAreSeen) {
+  // In every eighth row more pixels than a thousandth of what an int holds.
+  const Rig rig = sample::small_rig(480, 360, 110);
+  cv::Mat picture(3600, 5000, CV_8UC3, cv::Scalar(60, 0, 0));
+  picture.rowRange(0, 600).setTo(cv::Scalar(200, 0, 0));
+  Frame frame;
+  frame.images = {picture, cv::Mat()};
+  EXPECT_TRUE(plain_faults(rig, frame).empty());
 }
 
 }  // namespace
