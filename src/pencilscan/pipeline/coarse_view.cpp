@@ -9,7 +9,6 @@
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/depth/wide_windows.h"
 #include "pencilscan/io/linear_light.h"
-#include "pencilscan/pipeline/frame_warnings.h"
 #include "pencilscan/rig/binning.h"
 #include "pencilscan/rig/camera_light.h"
 
@@ -129,24 +128,9 @@ void to_fine(int n, std::size_t camera, PointResult& result) {
   }
 }
 
-/// What is said of the whole frame.
-void to_fine(const CoarseView& view, PointResult& result) {
-  const auto scale = [](double n, CrossingDisagreement& crossings) {
-    crossings.median_px *= n;
-    crossings.expected_px *= n;
-    if (crossings.shift_px) *crossings.shift_px *= n;
-  };
-  scale(view.unit, result.crossings);
-  for (std::size_t d = 0; d < result.device_crossings.size(); ++d)
-    scale(d < view.binning.size() ? view.binning[d] : view.unit, result.device_crossings[d]);
-  for (Warning& warning : result.warnings) {
-    if (warning.code == WarningCode::kRigIsOff)
-      warning = rig_warning(result.crossings, result.rig_in_frame);
-    if (warning.code == WarningCode::kDeviceIsOff) {
-      if (auto again = device_warning(view.rig, result.device_crossings))
-        warning = std::move(*again);
-    }
-  }
+/// The crossings of one camera. What they miss each other by is in pixels of projectors.
+void to_fine(int n, CrossingDisagreement& crossings) {
+  if (crossings.shift_px) *crossings.shift_px *= n;
 }
 
 /// Two points that follow each other on one line of a picture.
@@ -225,9 +209,10 @@ FrameResult in_fine_pixels(const CoarseView& view, FrameResult result) {
     detection.joined_pixels = view.binning[c];
     if (view.binning[c] > 1) detection.saturated_pixels = view.overexposed_pixels[c];
     to_fine(view.binning[c], c, result.points);
+    if (c < result.points.device_crossings.size())
+      to_fine(view.binning[c], result.points.device_crossings[c]);
   }
   refine_points(view, result.points, result.shape.surface.used);
-  to_fine(view, result.points);
   scale_lengths(view.unit, result.shape);
   for (DepthMap& map : result.shape.depth.maps) {
     const int binning = view.binning[static_cast<std::size_t>(map.camera)];

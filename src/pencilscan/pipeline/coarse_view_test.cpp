@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "pencilscan/core/median.h"
+#include "pencilscan/pipeline/frame_warnings.h"
 #include "pencilscan/rig/sample_devices.h"
 #include "pencilscan/simulation/panel_light.h"
 #include "pencilscan/simulation/render.h"
@@ -81,6 +82,37 @@ TEST(CoarseView, MosaicsAndOverexposedPixelsAreJoinedAsTheyAre) {
   for (const auto& [u, v] : {std::pair(3, 4), {10, 5}, {11, 20}})
     EXPECT_LT(cv::norm(of_plain.at<cv::Vec3f>(v, u) - of_mosaic.at<cv::Vec3f>(v, u)), 1e-5);
   EXPECT_EQ(of_plain.at<cv::Vec3f>(12, 24)[0], 1);
+}
+
+// Crossings miss each other in pixels of the projector, which stay as they are.
+TEST(CoarseView, OnlyWhatIsInCameraPixelsIsScaled) {
+  const Rig rig = fine_rig(4);
+  Frame frame;
+  frame.images.resize(rig.cameras.size());
+  FrameOptions options;
+  options.joined_pixels = 4;
+  const auto view = coarse_view(in_footprints(rig), frame, options);
+  ASSERT_TRUE(view);
+  FrameResult coarse;
+  PointResult& points = coarse.points;
+  points.detections.resize(rig.cameras.size());
+  points.graphs.resize(rig.cameras.size());
+  points.crossings = {1000, 0.3, 0.1, {}};
+  points.device_crossings.assign(rig.cameras.size() + rig.projectors.size(), {500, 0.6, 0.2, {}});
+  points.device_crossings[0].shift_px = Vec2(0.5, -1);
+  const Warning said = rig_warning(points.crossings, points.rig_in_frame);
+  const Warning named = naming_warning("projector proj0");
+  points.warnings = {said, named};
+  const PointResult fine = in_fine_pixels(*view, std::move(coarse)).points;
+  EXPECT_EQ(fine.crossings.median_px, 0.3);
+  EXPECT_EQ(fine.crossings.expected_px, 0.1);
+  for (const CrossingDisagreement& of_device : fine.device_crossings) {
+    EXPECT_EQ(of_device.median_px, 0.6);
+    EXPECT_EQ(of_device.expected_px, 0.2);
+  }
+  EXPECT_EQ(*fine.device_crossings[0].shift_px, Vec2(2, -4));
+  EXPECT_EQ(fine.warnings[0].text, said.text);
+  EXPECT_EQ(fine.warnings[1].text, named.text);
 }
 
 TEST(CoarseView, JoinedPixelsGiveTheShapeOfLargerOnesAndMorePoints) {
