@@ -24,6 +24,8 @@ const char* to_string(WarningCode code) {
       return "rig-is-off";
     case WarningCode::kDeviceIsOff:
       return "device-is-off";
+    case WarningCode::kNamesDoubtful:
+      return "names-doubtful";
     case WarningCode::kPointsLeftOut:
       return "points-left-out";
     case WarningCode::kTooFewPoints:

@@ -18,6 +18,7 @@ enum class WarningCode {
   kBlackLevel,   ///< figure "median": of the first camera's values, below the black that is stated
   kRigIsOff,     ///< figures "median_px", "expected_px": how crossing lines miss each other
   kDeviceIsOff,  ///< the same of one device's crossings, the others' meet
+  kNamesDoubtful,   ///< most lines of a device have no name, or have the colours of other lines
   kPointsLeftOut,   ///< coordinates are not finite or absurd
   kTooFewPoints,    ///< for a surface
   kUnsupported,     ///< hardly any point has another curve beside it

@@ -19,7 +19,7 @@ struct Known {
 };
 
 /// What to do about warnings, by their code (core/warning.h).
-constexpr std::array<Known, 16> kKnown = {{
+constexpr std::array<Known, 17> kKnown = {{
     {"saturated",
      "Close the aperture or shorten the exposure until the brightest lines stay below "
      "full scale, and capture again."},
@@ -41,6 +41,9 @@ constexpr std::array<Known, 16> kKnown = {{
     {"device-is-off",
      "Run rig check with --frames: it says how far the device moved. Put it back, or run "
      "reconstruct with --refine-rig."},
+    {"names-doubtful",
+     "Run rig check with --frames on several frames: it says which device moved, or shows or sees "
+     "something else than the rig states."},
     {"wrong-picture",
      "Look at its picture below. If it is the right one, the camera was moved: rig check with "
      "--frames says how far; put it back, or run reconstruct with --refine-rig."},

@@ -166,5 +166,12 @@ TEST(WideWindows, FinerPixelsMeasureAsMuchOfTheSurface) {
             few.shape.surface.report.measured_share - 0.02);
 }
 
+// Programs find the figures that core/warning.h promises for a code.
+TEST(FrameWarnings, DoubtfulNamesAreNoRigThatIsOff) {
+  EXPECT_STREQ(to_string(rig_warning({1000, 0.3, 0.1, {}}, RigInFrame::kAsGiven).code),
+               "rig-is-off");
+  EXPECT_STREQ(to_string(naming_warning("projector proj0").code), "names-doubtful");
+}
+
 }  // namespace
 }  // namespace pencilscan

@@ -123,7 +123,7 @@ Warning alike_warning(const std::string& projectors) {
 }
 
 Warning naming_warning(const std::string& doubt) {
-  return {WarningCode::kRigIsOff,
+  return {WarningCode::kNamesDoubtful,
           doubt +
               ": a device stands farther from where the rig has it than this frame can tell, "
               "or shows or sees something else; rig check --frames looks at several frames"};

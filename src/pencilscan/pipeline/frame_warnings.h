@@ -29,9 +29,9 @@ namespace pencilscan {
 
 /// `projectors`: of NamingDoubt::alike().
 [[nodiscard]] Warning alike_warning(const std::string& projectors);
-/// Crossings miss each other by more than noise; what was done about it.
-/// Of NamingDoubt::text().
+/// Of NamingDoubt::of_projectors().
 [[nodiscard]] Warning naming_warning(const std::string& doubt);
+/// Crossings miss each other by more than noise; what was done about it.
 [[nodiscard]] Warning rig_warning(const CrossingDisagreement& crossings, RigInFrame rig_in_frame);
 
 /// The one device whose crossings miss each other by far more than noise, where the rig as a whole
