@@ -13,10 +13,12 @@
 namespace pencilscan {
 namespace {
 
-/// The frame without the pictures that were left out.
+/// The frame without the cameras that were left out: their plain pictures are as wrong.
 Frame without(Frame frame, const std::vector<char>& left_out) {
   for (std::size_t c = 0; c < left_out.size(); ++c) {
-    if (left_out[c] != 0) frame.images[c] = cv::Mat();
+    if (left_out[c] == 0) continue;
+    for (auto* pictures : {&frame.images, &frame.plain})
+      if (c < pictures->size()) (*pictures)[c] = cv::Mat();
   }
   return frame;
 }

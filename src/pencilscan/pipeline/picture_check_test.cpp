@@ -292,6 +292,22 @@ TEST_F(PictureCheck, AMovedCameraIsNamed) {
   EXPECT_THAT(said[0], HasSubstr("camera cam2: its picture does not fit the rig"));
 }
 
+// A camera whose picture is left out colours nothing, neither by its picture in plain light.
+TEST_F(PictureCheck, ACameraThatIsLeftOutGivesNoColor) {
+  const cv::Size size = frame_->images[0].size();
+  Frame frame = with(0, cv::Mat::zeros(size, CV_32FC3));
+  frame.plain.assign(rig_->cameras.size(), cv::Mat(size, CV_32FC3, cv::Scalar::all(0.4)));
+  frame.plain[0] = cv::Mat(size, CV_32FC3, cv::Scalar(0, 0.4, 0));
+  FrameOptions options;
+  options.shape.fusion.max_depth = 5;
+  const FrameResult result = reconstruct_frame(*rig_, frame, options);
+  ASSERT_EQ(result.points.left_out[0], 1);
+  const auto& colors = result.shape.surface.mesh.color;
+  ASSERT_FALSE(colors.empty());
+  const auto is_green = [](const std::array<float, 3>& c) { return c[1] > 1.05F * c[0]; };
+  EXPECT_EQ(std::count_if(colors.begin(), colors.end(), is_green), 0);
+}
+
 TEST(FewNames, IsSaidBelowATenthOfTheLines) {
   PointResult result;
   EXPECT_FALSE(few_names_warning(result));
