@@ -129,9 +129,17 @@ struct FrameResult {
   std::vector<StageTime> times;
 };
 
-/// No curve of a frame could be given its line: the pictures themselves are why.
-struct NothingFound : StageError {
+/// A frame has no result, and the pictures themselves are why: another time gives none either.
+struct PicturesAtFault : StageError {
   using StageError::StageError;
+};
+/// No curve of a frame could be given its line.
+struct NothingFound : PicturesAtFault {
+  using PicturesAtFault::PicturesAtFault;
+};
+/// Two projectors show each other's patterns.
+struct ProjectorsExchanged : PicturesAtFault {
+  using PicturesAtFault::PicturesAtFault;
 };
 
 /// The shape in one frame: the stages below in order. They work in footprints (rig/rig.h), so that
@@ -159,7 +167,7 @@ void forget_camera(std::size_t camera, PointResult& result);
 
 /// Solution: the line of each curve. Of a method that may correct the rig (joint), pictures that do
 /// not fit are left out, and where crossing lines say that the rig is off, lines are named with the
-/// devices as the frame corrects them. StageError when two projectors are exchanged.
+/// devices as the frame corrects them. ProjectorsExchanged when two projectors are.
 [[nodiscard]] PointResult solve_frame(const Rig& rig, const Frame& frame, PointResult curves,
                                       const PointOptions& options = {},
                                       const StageClock& clock = {});

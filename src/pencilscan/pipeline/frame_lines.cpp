@@ -2,7 +2,6 @@
 #include <optional>
 #include <utility>
 
-#include "pencilscan/core/error.h"
 #include "pencilscan/pipeline/frame.h"
 #include "pencilscan/pipeline/frame_warnings.h"
 #include "pencilscan/pipeline/line_naming.h"
@@ -47,7 +46,7 @@ std::optional<Rig> label_lines(const Rig& rig, const Frame& frame, const PointOp
   if (const auto pair = exchanged_projectors(rig, frame, result, options)) {
     const std::string one = rig.projector(pair->first).name;
     const std::string other = rig.projector(pair->second).name;
-    throw StageError(
+    throw ProjectorsExchanged(
         "projectors " + one + " and " + other +
         " show each other's patterns: their outputs or cables are exchanged (put them "
         "back; frames that are taken already fit a rig with the two patterns exchanged)");

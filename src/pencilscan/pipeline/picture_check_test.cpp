@@ -8,8 +8,13 @@
 #include <utility>
 
 #include "pencilscan/core/error.h"
+#include "pencilscan/io/file.h"
+#include "pencilscan/io/frame_failure.h"
+#include "pencilscan/io/image.h"
+#include "pencilscan/io/temporary_folder.h"
 #include "pencilscan/pipeline/frame_warnings.h"
 #include "pencilscan/pipeline/sample_frame.h"
+#include "pencilscan/pipeline/sequence.h"
 #include "pencilscan/planning/ring.h"
 #include "pencilscan/recording/pack.h"
 #include "pencilscan/rig/sample_devices.h"
@@ -18,6 +23,7 @@
 namespace pencilscan {
 namespace {
 
+namespace fs = std::filesystem;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
@@ -170,6 +176,34 @@ TEST_F(PictureCheck, ExchangedProjectorsThatStandOppositeAreNamed) {
 
 TEST_F(PictureCheck, ProjectorsOfOnePatternCannotBeExchanged) {
   EXPECT_EQ(refusal_of(*rig_, *frame_, 0, 2), "nothing");
+}
+
+// The same frame gives the same another time, so that it is not made again. Those that follow are
+// made: their surface starts from the one before it, or anew.
+TEST_F(PictureCheck, ExchangedProjectorsAreNoPassingFailure) {
+  const TemporaryFolder temporary("exchanged_projectors");
+  Rig rig = *rig_;
+  std::swap(rig.projectors[0].patterns, rig.projectors[1].patterns);
+  write_rig(rig, temporary.path() / "rig.json");
+  const Frame right = sample::photographed_frame(rig, SimulatedObject(*egg_), photography());
+  for (const std::size_t k : {0U, 1U}) {
+    for (std::size_t c = 0; c < rig.cameras.size(); ++c)
+      write_image(temporary.path() / "frames" / six_digits(k) / (rig.cameras[c].name + ".png"),
+                  (k == 0 ? *frame_ : right).images[c], 8);
+  }
+  SequenceOptions options;
+  options.output.pictures = false;
+  options.output.tracks = true;
+  options.output.frame.shape.fusion.max_depth = 5;
+  const fs::path out = temporary.path() / "out";
+  const SequenceOutcome outcome = reconstruct_sequence(temporary.path() / "rig.json",
+                                                       temporary.path() / "frames", out, options);
+  ASSERT_EQ(outcome.frames.size(), 2U);
+  EXPECT_THAT(outcome.frames[0].failure, HasSubstr("projectors proj0 and proj1 show"));
+  const auto failure = read_failure(out / outcome.frames[0].name);
+  ASSERT_TRUE(failure);
+  EXPECT_FALSE(failure->is_passing);
+  EXPECT_TRUE(outcome.frames[1].done) << outcome.frames[1].failure;
 }
 
 TEST_F(PictureCheck, TurnedAndMirroredPicturesAreNamed) {

@@ -159,7 +159,7 @@ std::optional<FrameFailure> make_frame(const Run& run, std::size_t index, bool i
     return std::nullopt;
   } catch (const InputError& error) {
     return FrameFailure{error.what(), false};
-  } catch (const NothingFound& error) {
+  } catch (const PicturesAtFault& error) {
     return FrameFailure{error.what(), false};
   } catch (const std::exception& error) {
     return FrameFailure{in_plain_words(error), true};
