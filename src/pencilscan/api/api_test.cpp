@@ -131,6 +131,25 @@ TEST(Api, AConfidenceThatIsNoNumberIsRefused) {
               HasSubstr("must be in [0, 1]"));
 }
 
+// Pictures of 16 bits that hold 12 of a sensor: lines are as high as in the pictures that were
+// given, whoever tells of them.
+TEST(Api, DetectedCurvesAreAsHighAsThoseOfTheResult) {
+  std::map<std::string, cv::Mat> images = frame().images;
+  for (auto& [name, image] : images) image.convertTo(image, CV_16U, 4095.0 / 255);
+  ReconstructionOptions options;
+  options.mesh = false;
+  const auto heights = [](const CurveFile& curves) {
+    double sum = 0;
+    for (const CurveSample& sample : curves.samples) sum += static_cast<double>(sample.amplitude);
+    return sum / static_cast<double>(curves.samples.size());
+  };
+  const DetectedFrame detected = detect(rig(), views(images), options);
+  const double expected = heights(reconstruct(rig(), views(images), options).curves);
+  EXPECT_NEAR(heights(detected.curves()), expected, 0.05 * expected);
+  EXPECT_NEAR(heights(reconstruct(detected, label(detected), options).curves), expected,
+              0.05 * expected);
+}
+
 TEST(Api, ANegativeNumberOfThreadsIsRefused) {
   ReconstructionOptions options;
   options.threads = -1;

@@ -161,7 +161,9 @@ DetectedFrame detect(const Rig& rig, const Images& images, const ReconstructionO
     inner->found = detect_frame(inner->sensor.rig, inner->sensor.frame, how.points, clock);
   });
   inner->found.labeling = no_labels(rig.cameras.size());
-  inner->curves = describe_curves(rig, inner->found);
+  PointResult told = inner->found;
+  restore_light(inner->sensor.frame, told);
+  inner->curves = describe_curves(rig, told);
   inner->grid = grid_of(inner->found.graphs);
   return DetectedFrame(std::move(inner));
 }

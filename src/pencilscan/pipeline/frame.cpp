@@ -37,14 +37,6 @@ std::string why_nothing(const PointResult& result) {
          " times as bright as the noise of the pictures (median)";
 }
 
-/// Heights of lines in the light that the pictures were stored in: those of another frame compare.
-void restore_light(const Frame& frame, PointResult& result) {
-  for (std::size_t c = 0; c < frame.gains.size(); ++c) {
-    for (Curve& curve : result.graphs[c].curves)
-      for (CurvePoint& point : curve.points) point.amplitude /= frame.gains[c];
-  }
-}
-
 /// What is done once no line's name changes any more.
 void end_points(const Frame& frame, PointResult& result) {
   if (auto warning = few_names_warning(result)) result.warnings.push_back(std::move(*warning));
@@ -52,6 +44,13 @@ void end_points(const Frame& frame, PointResult& result) {
 }
 
 }  // namespace
+
+void restore_light(const Frame& frame, PointResult& result) {
+  for (std::size_t c = 0; c < frame.gains.size(); ++c) {
+    for (Curve& curve : result.graphs[c].curves)
+      for (CurvePoint& point : curve.points) point.amplitude /= frame.gains[c];
+  }
+}
 
 FrameResult reconstruct_frame(const Rig& stated, const Frame& frame, const FrameOptions& options,
                               const FrameLinks& links) {

@@ -159,6 +159,10 @@ struct ProjectorsExchanged : PicturesAtFault {
                                        const PointOptions& options = {},
                                        const StageClock& clock = {});
 
+/// Heights of lines in the light that the pictures were stored in (Frame::gains), so that those of
+/// other frames compare. Done once, when no stage follows.
+void restore_light(const Frame& frame, PointResult& result);
+
 /// Leaves a picture out: what was found in it, and the labels of that.
 void forget_camera(std::size_t camera, PointResult& result);
 
