@@ -44,6 +44,17 @@ class Newcomer : public ProgramTest {
     write_mesh();
     return "simulate --rig r.json --mesh mesh.obj --samples 1 ";
   }
+  /// A rig of three small cameras and projectors, and its Gray-code captures of that mesh.
+  void write_captures() {
+    write_mesh();
+    EXPECT_EQ(run("rig ring --out r.json --cameras 3 --projectors 3 --camera-width 160 "
+                  "--camera-height 120 --camera-focal-px 287 --projector-width 256 "
+                  "--projector-height 192 --projector-focal-px 460 --pitch-px 16")
+                  .code,
+              0);
+    EXPECT_EQ(run("simulate --rig r.json --mesh mesh.obj --samples 1 --gray-code --out cap").code,
+              0);
+  }
   /// `arguments` refuse to replace `file`, leave it alone, and replace it with --overwrite.
   void expect_kept(const std::string& arguments, const std::string& file) {
     fs::create_directories((folder_ / file).parent_path());
@@ -219,6 +230,25 @@ TEST_F(Newcomer, FiguresReplaceFiguresOnly) {
   EXPECT_THAT(slurp(folder_ / "figures.json"), HasSubstr("\"coverage\""));
   expect_bad("rig check --rig rig.json --json rig.json", "--json = rig.json: must be a new file");
   EXPECT_EQ(slurp(folder_ / "rig.json"), rig);
+}
+
+TEST_F(Newcomer, AScanLeavesNoMeshOfAnEarlierOne) {
+  write_captures();
+  const std::string scan = "scan --captures cap/captures --rig r.json --out surface ";
+  ASSERT_EQ(run(scan).code, 0);
+  EXPECT_TRUE(fs::exists(folder_ / "surface/mesh.ply"));
+  expect_bad(scan + "--no-mesh", "is there already: ");
+  ASSERT_EQ(run(scan + "--no-mesh --overwrite").code, 0);
+  EXPECT_TRUE(fs::exists(folder_ / "surface/points.ply"));
+  EXPECT_FALSE(fs::exists(folder_ / "surface/mesh.ply"));
+  ASSERT_EQ(run(scan + "--overwrite").code, 0);
+  const Outcome few = run(scan + "--step 8 --overwrite");
+  EXPECT_EQ(few.code, 1);
+  EXPECT_THAT(few.error, HasSubstr("too few for a mesh; surface/points.ply has them"));
+  EXPECT_FALSE(fs::exists(folder_ / "surface/mesh.ply"));
+  fs::remove(folder_ / "surface/points.ply");
+  write("surface/mesh.ply", "mine");
+  expect_bad(scan + "--no-mesh", "surface/mesh.ply: is there already: ");
 }
 
 TEST_F(Newcomer, AFolderWithoutResultsHasNoReport) {

@@ -1,6 +1,7 @@
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <system_error>
 
 #include "pencilscan/cli/command.h"
 #include "pencilscan/core/counted_progress.h"
@@ -15,6 +16,9 @@ namespace pencilscan::cli {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr const char* kPointsFile = "points.ply";
+constexpr const char* kMeshFile = "mesh.ply";
 
 struct ScanCommand {
   CommonOptions common;
@@ -34,15 +38,26 @@ double median_spacing(std::vector<SurfaceSample> samples) {
   return middle->spacing;
 }
 
+/// Points and mesh of one scan: a mesh of an earlier one does not stay beside new points.
+void write_scan(const fs::path& out, const std::vector<MeasuredPoint>& points,
+                const TriangleMesh& mesh, bool unit_known) {
+  std::error_code failure;
+  fs::remove(out / kMeshFile, failure);
+  if (failure && failure != std::errc::not_a_directory)
+    throw StageError((out / kMeshFile).string() + ": cannot be removed: " + failure.message());
+  write_points(out / kPointsFile, points, unit_known);
+  if (!mesh.faces.empty()) write_mesh(out / kMeshFile, mesh, unit_known);
+}
+
 void run_scan(const ScanCommand& command) {
   const ThreadLimit threads(command.common.threads);
   const Stopwatch watch;
   const fs::path out(command.out);
-  refuse_existing("--out", out / "points.ply", command.overwrite);
-  if (!command.no_mesh) refuse_existing("--out", out / "mesh.ply", command.overwrite);
+  for (const char* file : {kPointsFile, kMeshFile})
+    refuse_existing("--out", out / file, command.overwrite);
   const Rig rig = read_rig(command.rig);
   const auto pairs = list_captures(command.captures, rig);
-  const Progress progress = stderr_progress("nothing was written");
+  Progress progress = stderr_progress("nothing was written");
   std::vector<MeasuredPoint> points;
   std::vector<SurfaceSample> samples;
   std::vector<PairYield> yields;
@@ -62,18 +77,21 @@ void run_scan(const ScanCommand& command) {
   tell_steps(progress, "decoding: pair", pairs.size(), pairs.size());
   warn_of(misfit_warning(yields));
   if (points.empty()) throw StageError("no pixel could be measured: see pencilscan calibrate");
-  write_points(out / "points.ply", points, rig.unit_known);
   nlohmann::ordered_json figures{
       {"pairs", pairs.size()}, {"points", points.size()}, {"codes_without_point", missed}};
+  TriangleMesh mesh;
   if (!command.no_mesh) {
     progress("meshing", 0);
     const double cell = command.cell_mm > 0 ? command.cell_mm : 1.5 * median_spacing(samples);
-    const TriangleMesh mesh = scan_mesh(samples, cell);
-    if (mesh.faces.empty()) throw StageError("the points are too few for a mesh");
-    write_mesh(out / "mesh.ply", mesh, rig.unit_known);
+    mesh = scan_mesh(samples, cell);
     progress("meshing", 1);
     figures["faces"] = mesh.faces.size();
   }
+  progress = {};  // from here on something is written
+  write_scan(out, points, mesh, rig.unit_known);
+  if (!command.no_mesh && mesh.faces.empty())
+    throw StageError("the points are too few for a mesh; " + (out / kPointsFile).string() +
+                     " has them");
   figures["seconds"] = watch.seconds();
   print_figures(command.common, figures);
 }
