@@ -223,6 +223,20 @@ TEST_F(Newcomer, ReplacesNoReportOfAnotherRig) {
              "calibration.html is not of this rig");
 }
 
+TEST_F(Newcomer, AReportNamesTheRigThatItIsOf) {
+  write_captures();
+  write("rig.json", "mine");
+  // Too few correspondences for a rig.
+  const std::string calibrate =
+      "calibrate --captures cap/captures --devices r.json --known-distance cam0 cam1 850 ";
+  EXPECT_EQ(run(calibrate + "--out rig.json --overwrite").code, 1);
+  EXPECT_EQ(slurp(folder_ / "rig.json"), "mine");
+  EXPECT_THAT(slurp(folder_ / "calibration.json"), HasSubstr("\"verdict\": \"unusable\""));
+  EXPECT_THAT(slurp(folder_ / "calibration.json"), Not(HasSubstr("rig.json")));
+  // The next attempt replaces it, whatever its rig is called.
+  EXPECT_EQ(run(calibrate + "--out other.json").code, 1);
+}
+
 TEST_F(Newcomer, FiguresReplaceFiguresOnly) {
   ASSERT_EQ(run("rig ring --out rig.json --json figures.json").code, 0);
   const std::string rig = slurp(folder_ / "rig.json");

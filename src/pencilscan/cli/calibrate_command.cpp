@@ -2,6 +2,7 @@
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "pencilscan/calibration/from_captures.h"
 #include "pencilscan/cli/arguments.h"
@@ -61,13 +62,18 @@ Rig placed_rig(const CalibrationResult& result) {
   return rig;
 }
 
-/// The rig under its name; one that is unusable only where it was asked for, under a name that says
-/// so.
-void write_result(const CalibrateCommand& command, const CapturesCalibration& calibration) {
-  if (calibration.is_usable()) return write_rig(calibration.result.rig, command.out);
-  if (!command.keep_unusable || !calibration.result.solved) return;
-  write_rig(placed_rig(calibration.result), unusable_path(command));
-  std::cerr << "the unusable rig is " << unusable_path(command).string() << "\n";
+/// Where the rig goes: one that is unusable only where it was asked for, under a name that says so.
+std::optional<fs::path> rig_path(const CalibrateCommand& command,
+                                 const CapturesCalibration& calibration) {
+  if (calibration.is_usable()) return command.out;
+  if (!command.keep_unusable || !calibration.result.solved) return std::nullopt;
+  return unusable_path(command);
+}
+
+void write_result(const CapturesCalibration& calibration, const fs::path& path) {
+  if (calibration.is_usable()) return write_rig(calibration.result.rig, path);
+  write_rig(placed_rig(calibration.result), path);
+  std::cerr << "the unusable rig is " << path.string() << "\n";
 }
 
 void check_new(const CalibrateCommand& command, const fs::path& file) {
@@ -79,7 +85,7 @@ void check_new(const CalibrateCommand& command, const fs::path& file) {
 
 constexpr const char* kReportFile = "calibration.json";
 constexpr const char* kPageFile = "calibration.html";
-/// Key of the report: the rig file that it is of.
+/// Key of the report: the rig file that it is of. There is none where no rig was written.
 constexpr const char* kReportedRig = "rig";
 
 /// The report lies beside the rig: that of another rig is not replaced unasked.
@@ -91,12 +97,10 @@ void check_report(const CalibrateCommand& command) {
   const bool is_there = fs::exists(report, ignored);
   if (command.overwrite || (!is_there && !fs::exists(page, ignored))) return;
   const auto earlier = is_there ? read_json(report) : nlohmann::json();
-  // An unusable calibration leaves its report without a rig: the next attempt replaces it. Earlier
-  // versions did not say which rig a report is of.
+  // That of an unusable calibration is of no rig that anybody uses: the next attempt replaces it.
   if (earlier.is_object()) {
-    const bool says = earlier.contains(kReportedRig);
-    if (says && earlier[kReportedRig] == out.filename().string()) return;
-    if (!says && earlier.value("verdict", nlohmann::json()) == "unusable") return;
+    if (earlier.value("verdict", nlohmann::json()) == "unusable") return;
+    if (earlier.value(kReportedRig, nlohmann::json()) == out.filename().string()) return;
   }
   throw InputError("command line", "--out", command.out,
                    "must be in another folder: " + (is_there ? report : page).string() +
@@ -139,11 +143,12 @@ void run_calibrate(const CalibrateCommand& command) {
   const Verdict& verdict = calibration.verdict;
   const fs::path folder = fs::path(command.out).parent_path();
   nlohmann::ordered_json report_json = calibration_json(calibration);
-  report_json[kReportedRig] = fs::path(command.out).filename().string();
+  const std::optional<fs::path> rig = rig_path(command, calibration);
+  if (rig) report_json[kReportedRig] = rig->filename().string();
   write_json(folder / kReportFile, report_json);
   write_text(folder / kPageFile,
              calibration_page(report_json, "Calibration", "pencilscan " PENCILSCAN_VERSION));
-  write_result(command, calibration);
+  if (rig) write_result(calibration, *rig);
   print_verdict(verdict);
   print_remarks(calibration.color);
   nlohmann::ordered_json figures = calibration_figures(calibration);
