@@ -93,7 +93,7 @@ void append(std::string& text, const std::optional<T>& value) {
   if (value) append(text, *value);
 }
 
-/// Two functions cannot be told apart.
+/// Two functions cannot be told apart: only whether there is one is said.
 template <class Signature>
 void append(std::string& text, const std::function<Signature>& value) {
   text += value ? "function" : "none";
@@ -139,7 +139,8 @@ void append(std::string& text, const T& value) {
 
 }  // namespace fields_detail
 
-/// All values of `options` and of the structs in it, in order. Equal exactly where the values are.
+/// All values of `options` and of the structs in it, in order. Equal exactly where the values are,
+/// but for functions: who has different ones has to tell them apart otherwise.
 template <class Options>
 [[nodiscard]] std::string fields_text(const Options& options) {
   std::string text;

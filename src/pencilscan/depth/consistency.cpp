@@ -23,7 +23,7 @@ struct Node {
 /// Another node that agrees or disagrees, with the device through which that was found.
 struct Link {
   std::uint32_t other;
-  std::uint16_t group;      ///< camera; cameras + projector; or these + a map that contradicts
+  std::uint16_t group;      ///< map; maps + projector; or these + a map that contradicts
   float disagreement = -1;  ///< of a support: distance across the surface over its deviation
 };
 
@@ -78,9 +78,9 @@ class Comparison {
     links.contradiction.resize(nodes_.size());
     parallel_chunks(nodes_.size(), [&](std::size_t i) { compare_with_cameras(i, links); });
     for (std::size_t p = 0; p < rig_.projectors.size(); ++p) compare_with_projector(p, links);
-    // Whoever contradicts is contradicted: by groups of their own, after those of cameras and
+    // Whoever contradicts is contradicted: by groups of their own, after those of maps and
     // projectors.
-    const std::size_t voices = rig_.cameras.size() + rig_.projectors.size();
+    const std::size_t voices = maps_.size() + rig_.projectors.size();
     std::vector<std::vector<Link>> heard(nodes_.size());
     for (std::size_t i = 0; i < nodes_.size(); ++i) {
       for (const Link& link : links.contradiction[i]) {

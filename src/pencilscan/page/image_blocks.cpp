@@ -16,7 +16,7 @@
 namespace pencilscan {
 namespace {
 
-constexpr int kStride = 4;  ///< of depth and hole maps, px: that of the pipeline's depth grid
+constexpr int kStride = 4;  ///< of depth and hole maps on the page, px: as DepthOptions::stride
 
 /// `image` is RGB or grey, 8 bit.
 EncodedImage encode(const cv::Mat& image, const std::string& ending, const std::string& type,

@@ -2,6 +2,7 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -102,10 +103,11 @@ class SeenCurves {
   }
 
  private:
-  /// Layers and colours are far from each other.
-  static Vec3 place_of(const Vec2& pixel, std::size_t layer, std::uint8_t color) {
-    constexpr double kFar = 1000;  // px: more than any margin
-    return {pixel.x(), pixel.y(), kFar * (256.0 * static_cast<double>(layer) + color)};
+  /// Layers and colours lie farther from each other than nearest() looks: two margins, of which
+  /// margin_ is the whole number.
+  [[nodiscard]] Vec3 place_of(const Vec2& pixel, std::size_t layer, std::uint8_t color) const {
+    const auto set = 8 * layer + static_cast<std::size_t>(std::countr_zero(color));
+    return {pixel.x(), pixel.y(), 4.0 * margin_ * static_cast<double>(set)};
   }
   [[nodiscard]] std::size_t index(int x, int y) const {
     return static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) +

@@ -29,7 +29,9 @@ struct SequenceOptions {
   std::filesystem::path plain_frames;  ///< the same moments without patterns, for colour; or empty
   bool overwrite = false;              ///< replace the results of other inputs or options
   std::optional<Shard> shard;          ///< of several programs that share the frames; nothing: all
-  std::string program;                 ///< which program this is: output of another is not resumed
+  /// Which program this is: output of another is not resumed. Programs with functions of their own
+  /// in the options (JointOptions::inference) name those here too: nothing else tells them apart.
+  std::string program;
 };
 
 struct FrameOutcome {
