@@ -185,15 +185,12 @@ class FrameProgress {
 
   /// Links of the i-th frame, whose stages are told as part of it.
   FrameLinks links(std::size_t i) {
-    FrameLinks telling;
-    if (!progress_) return telling;
-    const std::string frame = "frame " + std::to_string(i + 1) + " of " + std::to_string(frames_);
-    telling.progress = [this, frame](std::string_view stage, double) {
-      const std::lock_guard lock(mutex_);
-      progress_(frame + ": " + std::string(stage),
-                static_cast<double>(done_) / static_cast<double>(frames_));
-    };
-    return telling;
+    return links("frame " + std::to_string(i + 1) + " of " + std::to_string(frames_));
+  }
+
+  /// Links of a frame of the chunk before, from which a surface comes.
+  FrameLinks links_before(const std::string& name) {
+    return links("frame " + name + " of the chunk before");
   }
 
   void done(const std::string& name) {
@@ -202,6 +199,17 @@ class FrameProgress {
   }
 
  private:
+  FrameLinks links(const std::string& frame) {
+    FrameLinks telling;
+    if (!progress_) return telling;
+    telling.progress = [this, frame](std::string_view stage, double) {
+      const std::lock_guard lock(mutex_);
+      progress_(frame + ": " + std::string(stage),
+                static_cast<double>(done_) / static_cast<double>(frames_));
+    };
+    return telling;
+  }
+
   const Progress& progress_;
   std::size_t frames_;
   std::mutex mutex_;
@@ -240,7 +248,10 @@ std::vector<FrameOutcome> make_frames(const Run& run, const std::vector<std::siz
   SurfaceChain chain(run.out, run.frames.names(), run.keys, own, there);
   run_at_once(chain.steps().size(), frames_at_once(run.rig), [&](std::size_t k) {
     const ChainStep& step = chain.steps()[k];
-    const FrameLinks links = frame_progress.links(std::min(outcome_of[step.frame], own.size() - 1));
+    const std::size_t own_index = outcome_of[step.frame];
+    const FrameLinks links = own_index < own.size()
+                                 ? frame_progress.links(own_index)
+                                 : frame_progress.links_before(run.frames.name(step.frame));
     chain.end(k, make(step.frame, step.is_written, chain.linked(links, k)));
   });
   return outcomes;

@@ -10,7 +10,9 @@
 #include <csignal>
 #include <fstream>
 #include <map>
+#include <mutex>
 #include <opencv2/core.hpp>
+#include <set>
 #include <utility>
 
 #include "pencilscan/core/error.h"
@@ -342,6 +344,28 @@ TEST_F(Sequence, ShardsInAnyNumberGiveTheSameBytes) {
   EXPECT_THAT(error_of([&] { (void)run(recording(), temporary_.path() / "none", {}); }),
               HasSubstr("60.0.0.0"));
   EXPECT_FALSE(fs::exists(temporary_.path() / "none"));
+}
+
+// A surface starts some frames before a chunk: those are of no shard's own.
+TEST_F(Sequence, FramesBeforeAChunkAreNotCountedAmongItsOwn) {
+  SequenceOptions options;
+  options.output.pictures = false;
+  options.output.tracks = true;
+  options.shard = Shard{2, 3};
+  std::mutex mutex;
+  std::multiset<std::string> told;
+  (void)reconstruct_sequence(rig_file(), frames(), temporary_.path() / "out", options,
+                             [&](std::string_view what, double) {
+                               const std::lock_guard lock(mutex);
+                               told.emplace(what);
+                             });
+  const auto count = [&](const std::string& start) {
+    return std::count_if(told.begin(), told.end(),
+                         [&](const std::string& what) { return what.starts_with(start); });
+  };
+  for (const char* name : {"000096", "000097", "000098", "000099"})
+    EXPECT_GT(count("frame " + std::string(name) + " of the chunk before: "), 0) << name;
+  EXPECT_EQ(count("frame 10 of 10: "), count("frame 1 of 10: "));
 }
 
 TEST_F(Sequence, NeverReplacesItsFrames) {
