@@ -120,8 +120,14 @@ ExposureMotion motion_in_exposure(const Rig& rig, const DepthStageOptions& optio
   for (int round = 0; round < 2; ++round) {
     parallel_for(cameras, [&](std::size_t c) {
       const CameraLight& light = result.lights[c];
-      if (round == 0) lines[c] = lines_at_nodes(rig, light, result.maps[c], stride);
-      measure_blurs(light, result.maps[c], options_for(light, options.depth).half, lines[c]);
+      const DepthMap& map = result.maps[c];
+      const int half = options_for(light, options.depth).half;
+      if (round == 0) {
+        lines[c] = lines_at_nodes(rig, light, map, stride);
+        const double overlap = window_overlap(map, half, stride);
+        for (NodeLines& entry : lines[c]) entry.blur.overlap = overlap;
+      }
+      measure_blurs(light, map, half, lines[c]);
     });
     std::vector<LineBlur> all;
     for (auto& of_camera : lines) {
@@ -130,9 +136,8 @@ ExposureMotion motion_in_exposure(const Rig& rig, const DepthStageOptions& optio
       for (const NodeLines& entry : of_camera) all.push_back(entry.blur);
     }
     std::vector<double> expected;
-    const int half = options_for(result.lights.front(), options.depth).half;
-    motion = exposure_motion(all, window_overlap(result.maps.front(), half, stride),
-                             unknown_blur_px2(result.lights), round == 0 ? &expected : nullptr);
+    motion =
+        exposure_motion(all, unknown_blur_px2(result.lights), round == 0 ? &expected : nullptr);
     if (expected.empty()) break;
     std::size_t next = 0;
     for (auto& of_camera : lines) {

@@ -115,7 +115,7 @@ BlurEquations BlurEquations::without_first(Index n) const {
   return result;
 }
 
-BlurFit::BlurFit(std::span<const LineBlur> lines, double overlap) : lines_(lines), columns_(lines) {
+BlurFit::BlurFit(std::span<const LineBlur> lines) : lines_(lines), columns_(lines) {
   rows_.resize(static_cast<Index>(lines.size()), columns_.count());
   root_.resize(static_cast<Index>(lines.size()));
   values_.resize(static_cast<Index>(lines.size()));
@@ -128,7 +128,7 @@ BlurFit::BlurFit(std::span<const LineBlur> lines, double overlap) : lines_(lines
     values_[at] = root_[at] * lines[i].variance_px2;
   }
   weigh();
-  weight_ /= overlap;
+  for (std::size_t i = 0; i < lines.size(); ++i) weight_[static_cast<Index>(i)] /= lines[i].overlap;
 }
 
 MotionEquations BlurFit::equations() const {

@@ -68,11 +68,10 @@ struct MotionEquations {
   std::array<std::vector<BlurEquations>, 3> without;
 };
 
-/// The variances of all lines over their deviations, with weights against outliers. `overlap`: how
-/// many windows see a pixel.
+/// The variances of all lines over their deviations, with weights against outliers.
 class BlurFit {
  public:
-  BlurFit(std::span<const LineBlur> lines, double overlap);
+  explicit BlurFit(std::span<const LineBlur> lines);
 
   [[nodiscard]] const BlurColumns& columns() const { return columns_; }
 

@@ -194,11 +194,11 @@ bool is_beyond_doubt(double length, const Deviations& deviations, std::size_t pa
 
 }  // namespace
 
-ExposureMotion exposure_motion(std::span<const LineBlur> lines, double overlap, double unknown_px2,
+ExposureMotion exposure_motion(std::span<const LineBlur> lines, double unknown_px2,
                                std::vector<double>* expected) {
   ExposureMotion motion;
   if (lines.size() < kLeastLines) return motion;
-  const BlurFit fit(lines, overlap);
+  const BlurFit fit(lines);
   const MotionEquations equations = fit.equations();
   if (equations.pairs < kLeastPairs) return motion;
   motion.is_judged = true;

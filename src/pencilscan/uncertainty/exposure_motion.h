@@ -40,6 +40,7 @@ struct LineBlur {
   double projector_depth = 1;   ///< likewise
   double variance_px2 = 0;      ///< of the blur across the lines
   double deviation_px2 = 1;     ///< of that number, > 0
+  double overlap = 1;  ///< >= 1: so many lines of its camera see the same pixel and count as one
 };
 
 /// The rigid motion of the object from the beginning of an exposure to its end.
@@ -57,14 +58,13 @@ struct ExposureMotion {
   [[nodiscard]] Vec3 way_of(const Vec3& point) const { return shift + turn.cross(point - pivot); }
 };
 
-/// Robust least squares over the lines' variances. `overlap`: how many of them see the same pixel,
-/// >= 1, as which they count once. `unknown_px2`: variance that pictures may have along some of
-/// their directions beyond the baseline. `expected`, if given, becomes the variance that the fit
-/// has at each place. Motion counts as seen where it makes the fit better than chance does, is
-/// several deviations long by jackknives over pairs of camera and projector, over cameras and over
-/// projectors, and adds more than a share of the blur itself, as which the baseline is not
+/// Robust least squares over the lines' variances. `unknown_px2`: variance that pictures may have
+/// along some of their directions beyond the baseline. `expected`, if given, becomes the variance
+/// that the fit has at each place. Motion counts as seen where it makes the fit better than chance
+/// does, is several deviations long by jackknives over pairs of camera and projector, over cameras
+/// and over projectors, and adds more than a share of the blur itself, as which the baseline is not
 /// believed. A turn is taken in where it is needed.
-[[nodiscard]] ExposureMotion exposure_motion(std::span<const LineBlur> lines, double overlap,
+[[nodiscard]] ExposureMotion exposure_motion(std::span<const LineBlur> lines,
                                              double unknown_px2 = 0,
                                              std::vector<double>* expected = nullptr);
 

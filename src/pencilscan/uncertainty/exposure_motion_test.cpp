@@ -63,7 +63,7 @@ constexpr double kNoise = 0.05;  // px^2, of one window
 TEST(ExposureMotion, WhatRestsIsNotSeenToMove) {
   for (std::uint64_t seed = 1; seed <= 8; ++seed) {
     const ExposureMotion motion =
-        exposure_motion(lines_of(Vec3::Zero(), Vec3::Zero(), kNoise, seed), 1);
+        exposure_motion(lines_of(Vec3::Zero(), Vec3::Zero(), kNoise, seed));
     EXPECT_TRUE(motion.is_judged);
     EXPECT_FALSE(motion.is_seen) << seed;
     EXPECT_LT(motion.at_most, 1.2) << seed;
@@ -84,7 +84,7 @@ TEST(ExposureMotion, ThePixelsShapeIsNoMotion) {
   for (const double shift : {0.0, 2.0}) {
     std::vector<LineBlur> lines = lines_of(Vec3(shift, 0, 0), Vec3::Zero(), kLittle, 7);
     add_pixel_shape(lines);
-    const ExposureMotion motion = exposure_motion(lines, 1);
+    const ExposureMotion motion = exposure_motion(lines);
     EXPECT_EQ(motion.is_seen, shift > 0);
     if (motion.is_seen) {
       EXPECT_NEAR(motion.way, shift, 4 * motion.way_deviation + 0.1);
@@ -94,7 +94,7 @@ TEST(ExposureMotion, ThePixelsShapeIsNoMotion) {
 
 TEST(BlurFit, LeavesOutEachPairEachCameraAndEachProjector) {
   std::vector<LineBlur> lines = lines_of(Vec3(2, 0, 0), Vec3::Zero(), kNoise, 8);
-  const MotionEquations ring = BlurFit(lines, 1).equations();
+  const MotionEquations ring = BlurFit(lines).equations();
   EXPECT_EQ(ring.pairs, 12U);
   EXPECT_EQ(ring.without[0].size(), 12U);
   EXPECT_EQ(ring.without[1].size(), 6U);
@@ -104,12 +104,12 @@ TEST(BlurFit, LeavesOutEachPairEachCameraAndEachProjector) {
   EXPECT_LT(ring.without[1].front().S.trace(), ring.without[0].front().S.trace());
   EXPECT_LT(ring.without[0].front().S.trace(), all);
   std::erase_if(lines, [](const LineBlur& line) { return line.camera != 2; });
-  EXPECT_TRUE(BlurFit(lines, 1).equations().without[1].empty());
+  EXPECT_TRUE(BlurFit(lines).equations().without[1].empty());
 }
 
 TEST(ExposureMotion, AShiftIsFoundWithItsDirection) {
   for (const Vec3& shift : {Vec3(2, 0, 0), Vec3(0.7, -1, 0.7), Vec3(0, 0, 4)}) {
-    const ExposureMotion motion = exposure_motion(lines_of(shift, Vec3::Zero(), kNoise, 3), 1);
+    const ExposureMotion motion = exposure_motion(lines_of(shift, Vec3::Zero(), kNoise, 3));
     ASSERT_TRUE(motion.is_seen) << shift.transpose();
     const double sign = motion.shift.dot(shift) > 0 ? 1 : -1;
     // Four deviations: a chance of 1e-4 in one dimension, more in three.
@@ -123,15 +123,15 @@ TEST(ExposureMotion, AShiftIsFoundWithItsDirection) {
 TEST(ExposureMotion, WhatThePicturesMayHaveThemselvesIsNoMotion) {
   const std::vector<LineBlur> lines = lines_of(Vec3(2, 0, 0), Vec3::Zero(), kNoise, 3);
   constexpr double kUnknownPx2 = 2.0;
-  const ExposureMotion motion = exposure_motion(lines, 1, kUnknownPx2);
+  const ExposureMotion motion = exposure_motion(lines, kUnknownPx2);
   EXPECT_FALSE(motion.is_seen);
   EXPECT_GT(motion.at_most, 2);
-  EXPECT_TRUE(exposure_motion(lines, 1, kUnknownPx2 / 100).is_seen);
+  EXPECT_TRUE(exposure_motion(lines, kUnknownPx2 / 100).is_seen);
 }
 
 TEST(ExposureMotion, ATurnIsFoundWithItsAxis) {
   const Vec3 turn(0, 0.01, 0.04);  // rad: 3.3 at the rim of the ball
-  const ExposureMotion motion = exposure_motion(lines_of(Vec3(1, 0, 0), turn, kNoise, 4), 1);
+  const ExposureMotion motion = exposure_motion(lines_of(Vec3(1, 0, 0), turn, kNoise, 4));
   ASSERT_TRUE(motion.is_seen);
   const double sign = motion.turn.dot(turn) > 0 ? 1 : -1;
   EXPECT_LT((sign * motion.turn - turn).norm(), 0.2 * turn.norm());
@@ -142,7 +142,7 @@ TEST(ExposureMotion, ATurnIsFoundWithItsAxis) {
 TEST(ExposureMotion, TheFitSaysWhatVarianceToExpect) {
   const std::vector<LineBlur> lines = lines_of(Vec3(2, 1, 0), Vec3::Zero(), kNoise, 5);
   std::vector<double> expected;
-  static_cast<void>(exposure_motion(lines, 1, 0, &expected));
+  static_cast<void>(exposure_motion(lines, 0, &expected));
   ASSERT_EQ(expected.size(), lines.size());
   std::size_t near = 0;
   for (std::size_t i = 0; i < lines.size(); ++i)
@@ -152,10 +152,10 @@ TEST(ExposureMotion, TheFitSaysWhatVarianceToExpect) {
 
 TEST(ExposureMotion, FewLinesOrPairsAreNotJudged) {
   std::vector<LineBlur> lines = lines_of(Vec3(3, 0, 0), Vec3::Zero(), kNoise, 6);
-  EXPECT_FALSE(exposure_motion(std::span(lines).first(400), 1).is_judged);
+  EXPECT_FALSE(exposure_motion(std::span(lines).first(400)).is_judged);
   std::erase_if(lines, [](const LineBlur& line) { return line.camera > 1; });
   lines.insert(lines.end(), lines.begin(), lines.end());
-  EXPECT_FALSE(exposure_motion(lines, 1).is_judged) << "four pairs";
+  EXPECT_FALSE(exposure_motion(lines).is_judged) << "four pairs";
 }
 
 TEST(ExposureMotion, SigmaGrowsAcrossTheSurfaceAlone) {
