@@ -94,7 +94,8 @@ TEST(MotionInExposure, TheOrderOfCamerasDoesNotMatter) {
     rig.cameras[c].mosaic = Mosaic::from_name("RGGB");
     frame.images[c] = sampled(frame.images[c], *rig.cameras[c].mosaic);
   }
-  const PointResult points = measure_points(rig, frame);
+  rig = in_footprints(rig);
+  const PointResult points = sample::points_in_footprints(rig, frame);
   const DepthStageOptions options;
   DepthResult depth =
       measure_depth(rig, points.families, frame.images, points.detections, points.points, options);
