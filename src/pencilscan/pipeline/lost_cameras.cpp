@@ -349,6 +349,21 @@ std::vector<PairAgreement> agreement_of_cameras(const Rig& rig, std::span<const 
   return said;
 }
 
+std::string contradicted_camera(const Rig& rig, std::span<const FrameCurves> frames,
+                                std::span<const Labeling> labelings) {
+  const std::vector<PairAgreement> said = agreement_of_cameras(rig, frames, labelings);
+  // A right camera beside a wrong one is contradicted too: the one with the least on its side.
+  const auto least = std::min_element(
+      said.begin(), said.end(),
+      [](const PairAgreement& a, const PairAgreement& b) { return a.share() < b.share(); });
+  return least->is_doubtful() ? rig.cameras[static_cast<std::size_t>(least - said.begin())].name
+                              : std::string();
+}
+
+std::string contradiction_text(const std::string& camera) {
+  return "what " + camera + " measures lies elsewhere than what the other cameras do";
+}
+
 std::vector<FoundCamera> find_lost_cameras(const Rig& rig, std::span<const FrameCurves> frames,
                                            std::span<const Labeling> labelings,
                                            const CameraSearchOptions& options) {

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "pencilscan/pipeline/rig_refinement.h"
@@ -31,6 +32,12 @@ struct CameraSearchOptions {
 [[nodiscard]] std::vector<PairAgreement> agreement_of_cameras(const Rig& rig,
                                                               std::span<const FrameCurves> frames,
                                                               std::span<const Labeling> labelings);
+
+/// Name of the camera most of whose points lie in front of or behind what the others measured: it
+/// has the names of other lines, at which crossings and colours agree. Empty: none.
+[[nodiscard]] std::string contradicted_camera(const Rig& rig, std::span<const FrameCurves> frames,
+                                              std::span<const Labeling> labelings);
+[[nodiscard]] std::string contradiction_text(const std::string& camera);
 
 /// Cameras few of whose curves have names in `labelings`, or the wrong ones by their colours, that
 /// are found elsewhere; where there are none, the one of those that contradict others which is

@@ -382,5 +382,27 @@ TEST_F(PipelineTest, ACameraThatWasKnockedIsFoundByTheSurfaceOfTheOthers) {
   }
 }
 
+/// Turned so far that crossings meet at the names of other lines.
+TEST(RigCheck, ACameraThatMeasuresWhatTheOthersDoNotIsNoFit) {
+  RingOptions ring;
+  ring.cameras = ring.projectors = 3;
+  ring.camera_width = 640;
+  ring.camera_height = 480;
+  ring.camera_focal_px = 1150;
+  const Rig rig = make_ring(ring);
+  TriangleMesh egg = make_sphere(100, 40);
+  for (Vec3& vertex : egg.vertices) vertex = vertex.cwiseProduct(Vec3(1, 0.8, 1.3));
+  const Frame frame = sample::photographed_frame(rig, SimulatedObject(egg), {});
+  const PointResult seen = detect_frame(rig, frame);
+  const FrameCurves curves{seen.families, seen.graphs};
+  EXPECT_EQ(check_rig_on_frames(rig, {&curves, 1}).verdict, RigVerdict::kFits);
+  Rig wrong = rig;
+  wrong.cameras[1].device_from_world =
+      corrected_pose(wrong.cameras[1], {Vec3(12, 0, 0), Vec3::Zero()});
+  const RigFit fit = check_rig_on_frames(wrong, {&curves, 1});
+  EXPECT_NE(fit.verdict, RigVerdict::kFits) << fit.text;
+  EXPECT_NE(fit.verdict, RigVerdict::kUnknown) << fit.text;
+}
+
 }  // namespace
 }  // namespace pencilscan

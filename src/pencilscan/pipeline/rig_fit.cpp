@@ -119,6 +119,62 @@ std::string verdict_text(const RigFit& fit) {
   return {};
 }
 
+Rig with_moved(const Rig& rig, std::span<const DeviceMove> moved) {
+  RigCorrection correction(device_count(rig));
+  for (const DeviceMove& move : moved) correction[move.device] = move.correction;
+  return corrected_rig(rig, correction);
+}
+
+bool are_alike(std::span<const DeviceMove> a, std::span<const DeviceMove> b, double shift_px) {
+  return std::is_permutation(
+      a.begin(), a.end(), b.begin(), b.end(), [&](const DeviceMove& x, const DeviceMove& y) {
+        return x.device == y.device && std::abs(x.shift_px - y.shift_px) < shift_px;
+      });
+}
+
+/// Names of lines, and the devices that have to be put back for their crossings to meet.
+struct Explanation {
+  std::vector<Labeling> labelings;
+  NamedCrossings named;
+  MovedDevices found;
+  Rig put_back;
+  std::string contradicted;  ///< a camera that measures what the others do not; empty: none
+
+  [[nodiscard]] bool is_doubtful() const {
+    return !contradicted.empty() || !named.doubt.text().empty();
+  }
+};
+
+Explanation explanation_of(const Rig& rig, std::span<const FrameCurves> frames,
+                           std::vector<Labeling> labelings, const MovedDevicesOptions& options) {
+  Explanation result{std::move(labelings), NamedCrossings(rig), {}, {}, {}};
+  result.named = named_crossings(rig, frames, result.labelings);
+  result.found = find_moved_devices(rig, result.named.tracks, options);
+  result.put_back = with_moved(rig, result.found.moved);
+  result.contradicted = contradicted_camera(result.put_back, frames, result.labelings);
+  return result;
+}
+
+/// Looks what moved by the first names, then names lines with that put back, and so on, as long as
+/// more lines have names and no more devices are accused: names that a device has from a wrong
+/// place draw it to where they are right, and others with it.
+Explanation explain(const Rig& rig, std::span<const FrameCurves> frames,
+                    std::vector<Labeling> first_labels, const MovedDevicesOptions& options) {
+  constexpr int kMostRounds = 4;
+  Explanation best = explanation_of(rig, frames, std::move(first_labels), options);
+  for (int round = 1; round < kMostRounds && !best.found.moved.empty(); ++round) {
+    Explanation next = explanation_of(rig, frames, labels_of(best.put_back, frames), options);
+    const bool stays = are_alike(next.found.moved, best.found.moved, options.smallest_px);
+    if (next.named.labelled_share < best.named.labelled_share ||
+        next.found.moved.size() > best.found.moved.size() ||
+        (next.is_doubtful() && !best.is_doubtful()))
+      break;
+    best = std::move(next);
+    if (stays) break;
+  }
+  return best;
+}
+
 double thousandth(double value) { return std::isfinite(value) ? std::round(1e3 * value) / 1e3 : 0; }
 
 ordered_json disagreement_json(const CrossingDisagreement& d) {
@@ -149,37 +205,33 @@ RigFit check_rig_on_frames(const Rig& stated, std::span<const FrameCurves> frame
                            const MovedDevicesOptions& options) {
   const double unit = footprint(stated);
   const Rig rig = with_registered_patterns(scaled(stated, 1 / unit));
-  const std::vector<Labeling> labelings = labels_of(rig, frames);
-  NamedCrossings named = named_crossings(rig, frames, labelings);
-  const std::vector<PairAgreement> said = agreement_of_cameras(rig, frames, labelings);
-  const bool is_contradicted = std::any_of(
-      said.begin(), said.end(), [](const PairAgreement& views) { return views.is_doubtful(); });
-  if (is_contradicted || !named.doubt.text().empty()) {
+  Explanation explained = explain(rig, frames, labels_of(rig, frames), options);
+  if (explained.is_doubtful()) {
     // All frames together, and colours, may tell where a device stands.
     RigRefinementOptions refinement;
     refinement.refine.max_remaining = std::numeric_limits<double>::infinity();
-    const RigRefinement found = refine_rig_on_frames(rig, frames, refinement);
-    if (found.report.refined) {
-      NamedCrossings again = named_crossings(rig, frames, found.labelings);
-      if (again.doubt.text().empty()) named = std::move(again);
+    RigRefinement refined = refine_rig_on_frames(rig, frames, refinement);
+    if (refined.report.refined) {
+      Explanation again = explain(rig, frames, std::move(refined.labelings), options);
+      if (!again.is_doubtful()) explained = std::move(again);
     }
   }
-  const MovedDevices found = find_moved_devices(rig, named.tracks, options);
-  RigCorrection correction(device_count(rig));
-  for (const DeviceMove& move : found.moved) correction[move.device] = move.correction;
-  const Rig put_back = corrected_rig(rig, correction);
+  const NamedCrossings& named = explained.named;
+  const MovedDevices& found = explained.found;
 
   RigFit fit;
   fit.frames = frames.size();
   fit.labelled_share = named.labelled_share;
   fit.before = crossing_disagreement(rig, named.tracks);
-  fit.after = crossing_disagreement(put_back, named.tracks);
+  fit.after = crossing_disagreement(explained.put_back, named.tracks);
   fit.doubt = named.doubt.text();
-  const auto per_device_after = device_disagreements(put_back, named.tracks);
+  const auto per_device_after = device_disagreements(explained.put_back, named.tracks);
   if (const auto d = device_that_is_off(per_device_after); d && fit.doubt.empty()) {
     fit.doubt = misses_text(device_at(rig, *d), per_device_after[*d]) +
                 ", and putting devices back does not help";
   }
+  if (fit.doubt.empty() && !explained.contradicted.empty())
+    fit.doubt = contradiction_text(explained.contradicted);
   const auto per_device = device_disagreements(rig, named.tracks);
   for (std::size_t d = 0; d < device_count(rig); ++d) {
     fit.devices.push_back({device_at(rig, d).name, d >= rig.cameras.size(), per_device[d],

@@ -56,19 +56,6 @@ ShownColorCount shown_colors(const Rig& rig, std::span<const FrameCurves> frames
   return count;
 }
 
-/// A camera most of whose points lie in front of or behind what the others measured: it has the
-/// names of other lines, at which crossings and colours agree. Empty: none.
-std::string contradicted_camera(const Rig& rig, std::span<const FrameCurves> frames,
-                                std::span<const Labeling> labelings) {
-  const std::vector<PairAgreement> said = agreement_of_cameras(rig, frames, labelings);
-  // A right camera beside a wrong one is contradicted too: the one with the least on its side.
-  const auto least = std::min_element(
-      said.begin(), said.end(),
-      [](const PairAgreement& a, const PairAgreement& b) { return a.share() < b.share(); });
-  return least->is_doubtful() ? rig.cameras[static_cast<std::size_t>(least - said.begin())].name
-                              : std::string();
-}
-
 /// Where few devices moved and all others are as calibrated, refinement starts with those put back.
 void put_back_few(const Rig& calibrated, std::span<const CrossingTrack> tracks, Attempt& attempt) {
   constexpr std::size_t kFewOf = 4;
@@ -133,7 +120,7 @@ std::string objection(std::span<const FrameCurves> frames, const Attempt& attemp
   if (const std::string denied = doubt.denied(); !denied.empty())
     return "the colours of " + denied + " speak against its lines' names";
   if (const std::string camera = contradicted_camera(rig, frames, labelings); !camera.empty())
-    return "what " + camera + " measures lies elsewhere than what the other cameras do";
+    return contradiction_text(camera);
   if (!is_for_rig) return {};
   if (const std::string unnamed = doubt.text(); !unnamed.empty()) return unnamed;
   const auto per_device = device_disagreements(rig, attempt.tracks);
