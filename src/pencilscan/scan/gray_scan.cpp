@@ -22,6 +22,7 @@ struct Meeting {
   Vec3 point;        ///< on the camera ray
   double miss_px;    ///< distance of the point's projection from the panel coordinate
   double mm_per_px;  ///< along the camera ray per panel pixel
+  Vec2 along;        ///< unit: where on the panel the point moves with its depth
   double angle;      ///< between the rays
 };
 
@@ -46,7 +47,9 @@ std::optional<Meeting> meet(const Device& camera, const Device& projector, const
   const auto farther = projector.project(result.point + step * a.direction);
   if (!projected || !farther) return std::nullopt;
   result.miss_px = (*projected - panel).norm();
-  result.mm_per_px = step / std::max((*farther - *projected).norm(), 1e-9);
+  const Vec2 moved = *farther - *projected;
+  result.mm_per_px = step / std::max(moved.norm(), 1e-9);
+  result.along = moved.normalized();
   result.angle = std::asin(std::sqrt(std::min(sine2, 1.0)));
   return result;
 }
@@ -94,7 +97,7 @@ GrayScan gray_scan(const Rig& rig, std::size_t camera, std::size_t projector,
       m.sample.normal = (under->point - at->point).cross(beside->point - at->point).normalized();
       if (!m.sample.normal.allFinite()) continue;
       if (m.sample.normal.dot(m.sample.to_camera) < 0) m.sample.normal = -m.sample.normal;
-      m.sample.sigma = at->mm_per_px * map->sigma_panel_px().norm() / std::sqrt(2.0);
+      m.sample.sigma = at->mm_per_px * at->along.cwiseProduct(map->sigma_panel_px()).norm();
       m.sample.spacing = (beside->point - at->point).norm() * options.step_px;
       m.sample.confidence = 1;
       m.sample.camera = static_cast<std::uint8_t>(camera);

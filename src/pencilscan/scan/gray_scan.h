@@ -29,7 +29,8 @@ struct GrayScan {
 
 /// Triangulates every decoded pixel of a lattice: camera ray and panel ray, each panel coordinate
 /// from a quadratic through its surroundings (gray/local_map.h). Normals come from the
-/// slopes of that quadratic. sigma is along the camera ray.
+/// slopes of that quadratic. sigma is along the camera ray: what the error of the panel coordinates
+/// along the epipolar line makes there; across it the two rays miss each other, and depth stays.
 [[nodiscard]] GrayScan gray_scan(const Rig& rig, std::size_t camera, std::size_t projector,
                                  const DecodedView& decoded, const GrayScanOptions& options = {});
 

@@ -3,8 +3,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <vector>
 
+#include "pencilscan/core/random.h"
 #include "pencilscan/simulation/render.h"
 
 namespace pencilscan {
@@ -52,6 +55,60 @@ TEST(GrayScan, MeasuresASphere) {
   EXPECT_LT(*middle, 0.1);  // a panel pixel is 3 mm of depth here
   std::sort(angles.begin(), angles.end());
   EXPECT_GT(angles[angles.size() / 10], 0.97);  // outward
+}
+
+/// What small_rig() decodes of the plane through the origin across the camera's axis, with noise
+/// in the places where rows, and where columns, change; camera px.
+DecodedView decoded_plane(const Rig& rig, const Vec2& noise_px) {
+  const Camera& camera = rig.cameras[0];
+  const Vec3 normal = camera.center().normalized();
+  const auto panel = [&](int u, int v) {
+    const Ray ray = camera.ray(Vec2(u, v));
+    const double depth = -ray.origin.dot(normal) / ray.direction.dot(normal);
+    return *rig.projectors[0].project(ray.origin + depth * ray.direction);
+  };
+  Random random(5);
+  DecodedView view;
+  view.state.create(128, 128);
+  view.state.setTo(static_cast<std::uint8_t>(PixelState::kValid));
+  for (std::size_t axis = 0; axis < 2; ++axis) {
+    const auto k = static_cast<Eigen::Index>(axis);
+    view.code[axis].create(128, 128);
+    for (std::size_t direction = 0; direction < 2; ++direction) {
+      auto& crossing = view.crossing[axis][direction];
+      crossing.create(128, 128);
+      for (int v = 0; v < 128; ++v) {
+        for (int u = 0; u < 128; ++u) {
+          const double here = panel(u, v)[k];
+          const double next = direction == 0 ? panel(u + 1, v)[k] : panel(u, v + 1)[k];
+          view.code[axis](v, u) = static_cast<int>(std::lround(here));
+          const double edge = std::floor(std::max(here, next) - 0.5) + 0.5;
+          const double at = (edge - here) / (next - here) + noise_px[k] * random.normal();
+          const bool changes = std::lround(here) != std::lround(next) && at >= 0 && at <= 1;
+          crossing(v, u) = changes ? cv::Vec2f(static_cast<float>(at), static_cast<float>(edge))
+                                   : cv::Vec2f(-1, -1);
+        }
+      }
+    }
+  }
+  return view;
+}
+
+TEST(GrayScan, SigmaIsWhatTheCoordinateAlongTheEpipolarLineMakes) {
+  Rig rig = small_rig();
+  // The baseline lies across the columns: rows say nothing of depth.
+  rig.projectors[0].device_from_world = look_at({760, 280, 0}, Vec3::Zero());
+  const auto median_sigma = [&](const Vec2& noise_px) {
+    std::vector<double> sigmas;
+    for (const SurfaceSample& sample : gray_scan(rig, 0, 0, decoded_plane(rig, noise_px)).samples)
+      sigmas.push_back(sample.sigma);
+    EXPECT_GT(sigmas.size(), 1000U);
+    std::nth_element(sigmas.begin(), sigmas.begin() + std::ssize(sigmas) / 2, sigmas.end());
+    return sigmas[sigmas.size() / 2];
+  };
+  const double exact = median_sigma({0, 0});
+  EXPECT_NEAR(median_sigma({0, 0.15}), exact, 0.02 * exact);
+  EXPECT_GT(median_sigma({0.15, 0}), 1.5 * exact);
 }
 
 TEST(MisfitWarning, PairsOfWhichManyCodesFitNoPointAreNamed) {
