@@ -254,7 +254,7 @@ void print_coverage(const CoverageCheck& coverage) {
   row("lit", coverage.lit, "by a projector");
   row("seen_and_lit", coverage.seen_and_lit, "by some camera and projector");
   row("usable", coverage.usable, "by some pair, with depth and lines far enough apart");
-  row("grid", coverage.grid, "where a camera sees usable lines of two projectors cross");
+  row("grid", coverage.grid, "where lines of two projectors cross and tell each other apart");
   row("skew_grid", coverage.skew_grid, "the same, of projectors whose lines have skew axes");
   row("two_views", coverage.two_views, "where two cameras see the same usable lines");
   row("ambiguous", coverage.ambiguous, "lit by lines of one colour that can be taken for others");

@@ -120,10 +120,11 @@ TEST(RigCheck, HorizontalLinesAtTheHeightOfTheCamerasAreFlagged) {
   const RigCheck check = check_rig(make_ring(one_height()));
   EXPECT_TRUE(has_severe(check, "no_depth"));
   EXPECT_TRUE(has_any(check, "no_grid"));
-  // What is left are vertical lines of two projectors that cross near the poles of the spheres.
+  // What is left are vertical lines of two projectors that cross near the poles of the spheres, and
+  // horizontal ones there, far above and below the devices.
   for (const AxesCheck& axes : check.axes) {
     if (axes.first.projector % 2 != axes.second.projector % 2) {
-      EXPECT_EQ(axes.crossing_share, 0);
+      EXPECT_LT(axes.crossing_share, 0.15);
     }
   }
   for (const PairCheck& pair : check.pairs) {
@@ -146,6 +147,33 @@ TEST(RigCheck, WhereNothingCrossesTwoCamerasDecideAndOneDoesNot) {
   const RigCheck one = check_rig(make_ring(options));
   EXPECT_EQ(one.coverage.two_views, 0);
   EXPECT_TRUE(has_severe(one, "no_grid"));
+}
+
+TEST(RigCheck, LinesOfLittleDepthThatTellOthersApartAreNotSevere) {
+  // A camera between two projectors, the one with horizontal lines a little above it: of their
+  // names 1.2 to 4.6 % were missing on a vase and a hand, and .15 % wrong at most.
+  RingOptions options = one_height();
+  options.cameras = 1;
+  options.projectors = 2;
+  Rig rig = make_ring(options);
+  const double distance = rig.cameras[0].center().norm();
+  const auto place = [&](Device& device, double azimuth_deg, double elevation_deg) {
+    const double a = azimuth_deg * kDegree, e = elevation_deg * kDegree;
+    device.device_from_world =
+        look_at(distance * Vec3(std::cos(a) * std::cos(e), std::sin(a) * std::cos(e), std::sin(e)),
+                Vec3::Zero());
+  };
+  place(rig.cameras[0], 0, 12);
+  place(rig.projectors[0], -28, 5);
+  place(rig.projectors[1], 26, 18);
+  ASSERT_EQ(rig.projectors[1].patterns.front().axis, Axis::kRow);
+  const RigCheck check = check_rig(rig);
+  EXPECT_EQ(check.pairs[1].sensitive_share, 0);
+  EXPECT_GT(check.axes.front().crossing_share, 0.9);
+  EXPECT_GT(check.coverage.grid, 0.4 * check.coverage.seen_and_lit);
+  EXPECT_FALSE(has_any(check, "no_grid"));
+  EXPECT_TRUE(has_any(check, "no_depth"));
+  EXPECT_FALSE(has_severe(check, "no_depth"));
 }
 
 TEST(RigCheck, MirrorSymmetricDiagonalLinesHaveCoplanarAxes) {

@@ -27,6 +27,9 @@ struct Observation {
   double px_per_mm = 0;
   double spacing_px = 0;
   double direction_rad = 0;  ///< of the lines in the image, modulo pi
+  double lines_per_mm = 0;   ///< of camera depth
+  double period_mm = 0;      ///< of camera depth, from a line to the next that looks alike
+  bool separable = false;    ///< its neighbours lie far enough apart in the image
   bool sensitive = false;
   bool usable = false;
 };
@@ -119,7 +122,10 @@ std::optional<Observation> observe(const Camera& camera, const Projector& projec
   observation.spacing_px = 1 / gradient->norm();
   observation.direction_rad = std::atan2(gradient->x(), -gradient->y());
   observation.sensitive = observation.sensitivity > options.min_sensitivity;
-  observation.usable = observation.sensitive && observation.spacing_px >= options.min_spacing_px;
+  observation.lines_per_mm = observation.px_per_mm / pattern.pitch_px;
+  observation.period_mm = pattern.period() / observation.lines_per_mm;
+  observation.separable = observation.spacing_px >= options.min_spacing_px;
+  observation.usable = observation.sensitive && observation.separable;
   return observation;
 }
 
@@ -128,6 +134,14 @@ double angle_between(const Observation& a, const Observation& b) {
   const double angle =
       std::abs(std::remainder(a.direction_rad - b.direction_rad, std::numbers::pi));
   return angle;
+}
+
+/// Whether lines that cross say of each other which of those that look alike they are: from one to
+/// the next, the other's place moves by half a line at least.
+bool tell_apart(const Observation& a, const Observation& b) {
+  constexpr double kNearerToAnother = 0.5;  // lines
+  return a.separable && b.separable && a.period_mm * b.lines_per_mm >= kNearerToAnother &&
+         b.period_mm * a.lines_per_mm >= kNearerToAnother;
 }
 
 SampleView view_sample(const Rig& rig, const std::vector<LineFamily>& families,
@@ -243,7 +257,7 @@ void add_image_figures(const std::vector<SampleView>& views, std::size_t first, 
       ++axes.shared;
       const bool wide = angle_between(*a, *b) >= options.min_crossing_rad;
       parallel += wide ? 0 : 1;
-      crossing += wide && a->usable && b->usable ? 1 : 0;
+      crossing += wide && tell_apart(*a, *b) ? 1 : 0;
     }
   }
   axes.crossing_share = share(crossing, axes.shared);
@@ -271,8 +285,8 @@ ViewFlags cross_families(const std::vector<Observation>& observed,
       const bool wide = angle_between(observed[i], observed[j]) >= options.min_crossing_rad;
       if (!wide) {
         flags.ambiguous |= pair.same_color;
-      } else if (observed[i].usable && observed[j].usable &&
-                 pair.first.projector != pair.second.projector) {
+      } else if (pair.first.projector != pair.second.projector &&
+                 tell_apart(observed[i], observed[j])) {
         flags.grid = true;
         flags.skew_grid |= pair.skewness >= options.min_skewness;
       }

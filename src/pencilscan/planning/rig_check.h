@@ -24,6 +24,12 @@ namespace pencilscan {
 /// both pencils, v_0 = h_0 can be chosen, and equation (6) of the paper keeps a null space of
 /// dimension one whatever is observed, as for a grid from a single projector.
 ///
+/// **Told apart.** The lines of a family that look alike are a period of its code apart. To take
+/// one for another moves a point by the depth of that period, and the lines of another family that
+/// cross there by so many of theirs. From half a line on, another line is nearer than its own, and
+/// the crossing says which of the alike is right. Lines that hardly move with depth can tell those
+/// of others apart all the same.
+///
 /// **Same-colour ambiguity**: two line sets that share a colour cross at a small angle in an image,
 /// where a curve cannot be assigned to one of them by its direction.
 struct RigCheckOptions {
@@ -61,9 +67,10 @@ struct AxesCheck {
   double angle_rad = 0;    ///< between the axes, 0..pi/2
   double distance_mm = 0;  ///< between the axes
   double skewness = 0;
-  bool same_color = false;    ///< some colour is in both
-  std::size_t shared = 0;     ///< (camera, sample) that show both
-  double crossing_share = 0;  ///< of `shared`: both usable and crossing at a wide angle
+  bool same_color = false;  ///< some colour is in both
+  std::size_t shared = 0;   ///< (camera, sample) that show both
+  double crossing_share =
+      0;  ///< of `shared`: crossing at a wide angle, each tells the other's apart
   double parallel_share = 0;  ///< of `shared`: crossing at less than min_crossing_rad
 };
 
@@ -73,10 +80,10 @@ struct CoverageCheck {
   double lit = 0;           ///< by >= 1 line family
   double seen_and_lit = 0;  ///< by some pair
   double usable = 0;        ///< by some pair with enough sensitivity and spacing
-  double grid = 0;          ///< some camera sees two usable families of two projectors cross
-  double skew_grid = 0;     ///< the same with axes that are not coplanar (equation (6))
-  double two_views = 0;     ///< two cameras see the same usable family
-  double ambiguous = 0;     ///< of (camera, sample) with light: some same-colour ambiguity
+  double grid = 0;  ///< some camera sees families of two projectors cross and tell each other apart
+  double skew_grid = 0;  ///< the same with axes that are not coplanar (equation (6))
+  double two_views = 0;  ///< two cameras see the same usable family
+  double ambiguous = 0;  ///< of (camera, sample) with light: some same-colour ambiguity
 };
 
 struct RigWarning {

@@ -19,7 +19,7 @@ constexpr double kEnoughView = 0.5;
 /// partial rig.
 constexpr double kEnoughUsable = 0.75;
 constexpr double kTooFewUsable = 0.5;
-/// Of the surface that is seen and lit, the share that two usable line sets should cross.
+/// Of the surface that is seen and lit, the share where two line sets should cross.
 constexpr double kEnoughGrid = 0.4;
 constexpr double kTooFewGrid = 0.1;
 /// Views with same-colour ambiguity that are tolerable, and that are not.
@@ -28,7 +28,8 @@ constexpr double kMuchAmbiguity = 0.3;
 /// Line spacings in the image, px: below the second, detection does not separate lines.
 constexpr double kWideSpacing = 5;
 constexpr double kNarrowSpacing = 3;
-/// Two line sets are partners in a grid when they cross on this share of what shows both.
+/// Two line sets are partners in a grid when they cross, and tell each other apart, on this share
+/// of what shows both.
 constexpr double kPartnerShare = 0.2;
 /// Fewer shared samples than this say nothing about a pair.
 constexpr double kFewSamples = 10;
@@ -126,11 +127,27 @@ class Collector {
     }
   }
 
+  /// A line set of another projector whose lines this one tells apart, or null.
+  [[nodiscard]] const LineFamily* partner_of(const LineFamily& family) const {
+    const auto is = [&](const LineFamily& other) {
+      return other.projector == family.projector && other.pattern == family.pattern;
+    };
+    for (const AxesCheck& axes : check_.axes) {
+      if (axes.first.projector == axes.second.projector || axes.crossing_share < kPartnerShare ||
+          static_cast<double>(axes.shared) < kFewSamples)
+        continue;
+      if (is(axes.first)) return &axes.second;
+      if (is(axes.second)) return &axes.first;
+    }
+    return nullptr;
+  }
+
   void warn_depth(const LineFamily& family, double sensitivity, double share) {
+    const LineFamily* partner = partner_of(family);
     const bool rows = pattern(family).axis == Axis::kRow;
     const bool none = sensitivity < kNoDepthPart * options_.min_sensitivity;
     warn(
-        none, none ? "no_depth" : "little_depth",
+        none && partner == nullptr, none ? "no_depth" : "little_depth",
         "the " + std::string(rows ? "horizontal" : "vertical") + " lines of " + name(family) +
             (none ? " give no depth" : " give little depth") + " (mean sensitivity " +
             formatted(sensitivity, "%.2f") + "; " + formatted(options_.min_sensitivity, "%.2f") +
@@ -138,7 +155,10 @@ class Collector {
             " of what cameras see of them): they run along the epipolar lines of the cameras; " +
             (rows ? "raise or lower this projector to about 30 degrees off the cameras' height, or "
                     "let it show vertical lines"
-                  : "move it sideways against the cameras, or let it show horizontal lines"));
+                  : "move it sideways against the cameras, or let it show horizontal lines") +
+            (partner == nullptr ? ""
+                                : "; that they cross those of " + name(*partner) +
+                                      " still tells which line is which"));
   }
 
   /// Share of the surface that is both seen and lit (partial rigs are judged by their part).
@@ -153,8 +173,9 @@ class Collector {
     const bool has_views = two_views >= kEnoughGrid;
     warn(grid < kTooFewGrid && !has_views, "no_grid",
          "only " + percent(grid) +
-             " of the surface that is seen and lit shows some camera two usable line sets of "
-             "different projectors that cross: crossings decide which line is which" +
+             " of the surface that is seen and lit shows some camera line sets of different "
+             "projectors that cross and tell each other apart: crossings decide which line is "
+             "which" +
              (has_views ? ", and where there are none, two cameras that see the same lines (" +
                               percent(two_views) + " of it) and the code"
                         : std::string()) +
