@@ -103,9 +103,10 @@ std::vector<PointVerdict> judge_points(const TruthScene& truth,
 
 bool are_of_gray_scan(std::span<const MeasuredPoint> points) {
   const auto is_whole = [](float value) { return value == std::floor(value); };
+  // `plane` is a float: what was a little below a half before may be rounded to it.
   const bool on_pixels = std::all_of(points.begin(), points.end(), [&](const MeasuredPoint& p) {
     return is_whole(p.u) && is_whole(p.v) && p.pattern == 0 && p.confidence == 1.0F &&
-           static_cast<long>(p.line) == std::max(std::lround(p.plane), 0L);
+           std::abs(std::max(p.plane, 0.F) - static_cast<float>(p.line)) <= 0.5F;
   });
   return on_pixels && std::any_of(points.begin(), points.end(),
                                   [&](const MeasuredPoint& p) { return !is_whole(p.plane); });

@@ -329,6 +329,16 @@ TEST(Evaluate, PointsWithLinesAreNoScan) {
   // Of another program, which counts in whole pixels and lines.
   std::vector<MeasuredPoint> points = scanned_sphere(rig, 1);
   EXPECT_TRUE(are_of_gray_scan(points));
+  // 754.4999999 is nearer to 754, and is 754.5 as a float; 754.5000001 is nearer to 755.
+  points[0].plane = points[1].plane = 754.5F;
+  points[0].line = 754;
+  points[1].line = 755;
+  points[2].plane = -0.7F;  // beside the panel
+  points[2].line = 0;
+  EXPECT_TRUE(are_of_gray_scan(points));
+  points[1].line = 756;
+  EXPECT_FALSE(are_of_gray_scan(points));
+  points[1].line = 755;
   for (MeasuredPoint& point : points) point.plane = point.line;
   EXPECT_FALSE(are_of_gray_scan(points));
   EXPECT_FALSE(are_of_gray_scan({}));
