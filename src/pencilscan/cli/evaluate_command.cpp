@@ -96,9 +96,8 @@ void run_evaluate(const EvaluateOptions& options) {
       warn_of(options.rig_path + ": " + *warning);
       figures["warnings"].push_back(options.rig_path + ": " + *warning);
     }
-    if (evaluation.truth_warning) {
-      warn_of(options.truth_path + ": " + *evaluation.truth_warning);
-    }
+    for (const std::string& warning : evaluation.warnings)
+      warn_of(options.truth_path + ": " + warning);
     if (evaluation.point_distance && !evaluation.labels) {
       std::cerr << "pencilscan: " << result.points_path.string()
                 << " is of a scan: it has no lines, and their figures are left out\n";

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <span>
 
 #include "pencilscan/geometry/ray_scene.h"
@@ -25,10 +26,16 @@ struct AlignmentOptions {
   std::size_t max_points = 20000;  ///< an even subset of the points is used
   int max_iterations = 60;
 };
+/// Another pose at which the points fit about as well.
+struct AlignmentRival {
+  double turn_rad = 0;   ///< from the pose found, 0..pi
+  double median_mm = 0;  ///< distance of the points to the truth there
+};
 struct AlignmentReport {
   Similarity truth_from_result;
   double median_mm = 0;  ///< distance of the aligned points to the truth
   int iterations = 0;
+  std::optional<AlignmentRival> rival;  ///< the best one, where there are any
 };
 
 /// Moves measured points onto the true surface: iterative closest points with the exact closest
@@ -36,9 +43,16 @@ struct AlignmentReport {
 /// translation t and growth l about the centroid c, the residual is n . (p + w x (p - c) + l (p -
 /// c) + t - q) (Chen and Medioni 1992; l only for a similarity), weighted by Tukey's biweight with
 /// a scale of kDeviationPerMedian times the median residual, so that wrong points count nothing.
-/// Starts from where the points are; where that ends far from the surface, also from the poses that
-/// match centroid, size and principal axes (four signs), a point-to-point step (Umeyama 1991)
-/// first. Points: at least 10.
+/// Starts: where the points are, and poses that match centroid and size, unturned, turned about z,
+/// by the principal axes, and in a thousand ways (about 25 degrees apart), a few point-to-point
+/// steps (Umeyama 1991) first. They are tried on a few points by a lattice of closest points; the
+/// best dozen on more points by the exact ones. The pose of the least mean distance wins, none
+/// counted farther than a twentieth of the points' root mean square extent; of poses within a tenth
+/// of it, the one that moves least.
+///
+/// A rival is a pose whose mean distance is at most twice the winner's, and from which the truth
+/// looks otherwise: what its shape differs by is less than what the points deviate by. Points: at
+/// least 10.
 [[nodiscard]] AlignmentReport align_to_surface(std::span<const Vec3> points, const RayScene& truth,
                                                AlignmentKind kind,
                                                const AlignmentOptions& options = {});

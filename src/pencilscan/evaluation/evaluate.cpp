@@ -100,11 +100,14 @@ Evaluation evaluate(const TriangleMesh& truth, const Rig& rig, const EvaluationI
   if (options.align != AlignmentKind::kNone) {
     if (options.progress) options.progress("aligning", 0);
     evaluation.alignment = align(truth, result, options.align);
+    if (auto warning = alignment_warning(*evaluation.alignment))
+      evaluation.warnings.push_back(*std::move(warning));
     mm_per_unit = evaluation.alignment->truth_from_result.scale;
     truth_in_rig = transformed(truth, evaluation.alignment->truth_from_result.inverse());
   }
   const TruthScene scene(truth_in_rig, rig);
-  evaluation.truth_warning = truth_warning(scene.scene(), positions_of(result));
+  if (auto warning = truth_warning(scene.scene(), positions_of(result)))
+    evaluation.warnings.push_back(*std::move(warning));
   if (result.points) {
     evaluate_points(scene, *result.points, mm_per_unit, options.progress, evaluation);
   }

@@ -34,7 +34,7 @@ struct Evaluation {
   std::optional<DistanceFigures> point_distance;
   std::optional<SigmaFigures> sigma;
   std::optional<SurfaceFigures> surface;
-  std::optional<std::string> truth_warning;  ///< why the mesh can hardly be the truth
+  std::vector<std::string> warnings;  ///< that the mesh can hardly be the truth, or is alike turned
 };
 
 /// Computes every figure of docs/figures.md. The rig is the one that the result was made with: with

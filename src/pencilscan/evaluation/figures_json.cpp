@@ -134,7 +134,7 @@ nlohmann::ordered_json figures_json(const Evaluation& evaluation, const Rig& rig
     put_breakdown(json, *evaluation.labels, *evaluation.recall, rig);
   }
   if (evaluation.alignment) put_alignment(json, *evaluation.alignment);
-  if (evaluation.truth_warning) json["warnings"] = Json::array({*evaluation.truth_warning});
+  if (!evaluation.warnings.empty()) json["warnings"] = evaluation.warnings;
   return json;
 }
 

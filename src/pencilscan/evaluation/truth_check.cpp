@@ -1,6 +1,7 @@
 #include "pencilscan/evaluation/truth_check.h"
 
 #include <algorithm>
+#include <numbers>
 #include <vector>
 
 #include "pencilscan/core/evenly_picked.h"
@@ -61,6 +62,17 @@ std::optional<std::string> truth_warning(const RayScene& truth, std::span<const 
                            "the mesh that was given to simulate; evaluate --align moves a result "
                            "onto it"
                          : ": " + advice);
+}
+
+std::optional<std::string> alignment_warning(const AlignmentReport& alignment) {
+  if (!alignment.rival) return std::nullopt;
+  const double degrees = alignment.rival->turn_rad * 180 / std::numbers::pi;
+  return "the object looks alike from several sides: turned by " + formatted(degrees, "%.0f") +
+         " degrees it lies about as well on the truth (median " +
+         formatted(alignment.rival->median_mm, "%.3g") + " instead of " +
+         formatted(alignment.median_mm, "%.3g") +
+         " mm), and figures of lines and coverage may be of the wrong pose; move the rig into the "
+         "truth's frame to be sure";
 }
 
 std::optional<std::string> unit_warning(const Rig& rig, AlignmentKind align) {

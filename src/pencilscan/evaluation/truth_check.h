@@ -17,6 +17,10 @@ namespace pencilscan {
 [[nodiscard]] std::optional<std::string> truth_warning(const RayScene& truth,
                                                        std::span<const Vec3> points);
 
+/// That the points fit at another pose about as well, so that the figures may be those of a wrong
+/// one.
+[[nodiscard]] std::optional<std::string> alignment_warning(const AlignmentReport& alignment);
+
 /// That the figures are not in mm: the rig's unit is unknown, and no similarity has brought the
 /// result to the truth's size.
 [[nodiscard]] std::optional<std::string> unit_warning(const Rig& rig, AlignmentKind align);
