@@ -201,8 +201,7 @@ BallFigures measure_ball(ArtefactPoints points, const Sphere& start, const Rig* 
                     2 * ball.trimmed.radius - *options.diameter_mm};
   }
   ball.worst = worst_points(all, from(ball.sphere));
-  ball.coverage = sphere_coverage(
-      all, {ball.trimmed.center, options.diameter_mm.value_or(2 * ball.trimmed.radius) / 2});
+  ball.coverage = sphere_coverage(all, ball.trimmed);
   ball.z = z_scores(ball.points, rig, [&](const Vec3& point, const std::optional<Vec3>& center) {
     return center ? error_along_ray(ball.trimmed, point, *center)
                   : std::optional(signed_distance(ball.trimmed, point));

@@ -55,7 +55,7 @@ struct BallFigures {
   ArtefactPoints points;              ///< those that were judged
   std::size_t left_out = 0;           ///< in the cone of a stem or a bar
   std::size_t removed = 0;            ///< 3 per mille
-  double coverage = 0;                ///< share of the ball within 1 % of its diameter of a point
+  double coverage = 0;                ///< share of `trimmed` within 1 % of its diameter of a point
   Sphere sphere;                      ///< least squares, free radius, all points
   Sphere trimmed;                     ///< the same of the points that remain
   TwoFigures form_mm;                 ///< PF

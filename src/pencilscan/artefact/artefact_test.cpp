@@ -122,6 +122,21 @@ TEST(ArtefactSphere, CoverageIsTheShareOfTheBallThatHasPoints) {
   EXPECT_NEAR(ball.coverage, 0.25 + 0.2 * std::sin(std::numbers::pi / 3) / 20, 0.005);
 }
 
+TEST(ArtefactSphere, ABallOfAnotherSizeIsCoveredAndItsSizeTold) {
+  std::vector<Vec3> points;
+  add_ball(points, {{0, 0, 0}, 1.09 * 35}, kMany, [](int) { return 0.0; });
+  ArtefactOptions options;
+  options.diameter_mm = 70;
+  const BallFigures ball = measure_sphere(as_points(points), nullptr, options);
+  EXPECT_GT(ball.coverage, 0.99);
+  EXPECT_THAT(artefact_warnings(ball, options),
+              ::testing::ElementsAre(HasSubstr("the ball is 76.3 mm across, 9 % more than "
+                                               "--diameter = 70 mm")));
+  options.diameter_mm = 1.09 * 70 / 0.99;  // as a rig may be off
+  EXPECT_THAT(artefact_warnings(measure_sphere(as_points(points), nullptr, options), options),
+              ::testing::IsEmpty());
+}
+
 TEST(ArtefactSphere, FiguresTurnScaleAndMoveWithThePoints) {
   std::vector<Vec3> points, moved;
   Random random(2);
@@ -273,7 +288,8 @@ TEST(ArtefactBallBar, SizesThatAreNotAsStatedAreNotSaidToBe) {
   BallBarFigures bar = measure_ball_bar(as_points(points), nullptr, options);
   bar.balls[1].trimmed.radius = 11.8;
   EXPECT_THAT(artefact_warnings(bar, options),
-              ::testing::ElementsAre(HasSubstr("30 and 23.6 mm across, and --diameter says 30")));
+              ::testing::ElementsAre(HasSubstr("ball 2 is 23.6 mm across, 21.3 % less"),
+                                     HasSubstr("30 and 23.6 mm across, and --diameter says 30")));
 }
 
 TEST(ArtefactWarnings, AnUnknownUnitIsToldOfEveryArtefact) {

@@ -35,6 +35,22 @@ bool has_stated_size(const BallFigures& ball, double diameter_mm) {
   return std::abs(2 * ball.trimmed.radius - diameter_mm) <= kSizeTolerance * diameter_mm;
 }
 
+/// Of a ball whose points do not lie near one of the stated size: its radius is off by more than
+/// 1 % of that diameter, by which a point counts as near (docs/figures.md).
+void warn_of_size(const BallFigures& ball, const std::string& what, const ArtefactOptions& options,
+                  std::vector<std::string>& warnings) {
+  constexpr double kNoticed = 0.02;
+  if (!options.diameter_mm || !ball.points.unit_known) return;
+  const double diameter = 2 * ball.trimmed.radius;
+  const double excess = diameter / *options.diameter_mm - 1;
+  if (std::abs(excess) <= kNoticed) return;
+  warnings.push_back(what + " is " + formatted(diameter, "%.4g") + " mm across, " +
+                     formatted(100 * std::abs(excess), "%.3g") + " % " +
+                     (excess > 0 ? "more" : "less") +
+                     " than --diameter = " + formatted(*options.diameter_mm, "%.6g") +
+                     " mm: if that is its diameter, the scale of the rig is off");
+}
+
 /// "199.6 and 201.3".
 std::string sizes_of(const std::vector<BallFigures>& balls) {
   std::string text;
@@ -61,8 +77,10 @@ std::string reason_of(const BallBarFigures& bar, const ArtefactOptions& options,
 
 }  // namespace
 
-std::vector<std::string> artefact_warnings(const BallFigures& ball, const ArtefactOptions&) {
+std::vector<std::string> artefact_warnings(const BallFigures& ball,
+                                           const ArtefactOptions& options) {
   std::vector<std::string> warnings = unit_warnings(ball.points);
+  warn_of_size(ball, "the ball", options, warnings);
   warn_of_coverage(ball.coverage, "the ball", warnings);
   return warnings;
 }
@@ -74,8 +92,11 @@ std::vector<std::string> artefact_warnings(const BallBarFigures& bar,
     warnings.push_back(std::to_string(bar.between) +
                        " points lie between the balls; if that is the bar, give --bar-diameter");
   }
-  for (std::size_t b = 0; b < bar.balls.size(); ++b)
-    warn_of_coverage(bar.balls[b].coverage, "ball " + std::to_string(b + 1), warnings);
+  for (std::size_t b = 0; b < bar.balls.size(); ++b) {
+    const std::string name = "ball " + std::to_string(b + 1);
+    warn_of_size(bar.balls[b], name, options, warnings);
+    warn_of_coverage(bar.balls[b].coverage, name, warnings);
+  }
   if (!options.length_mm || !bar.balls.front().points.unit_known) return warnings;
   const double factor = bar.distance_mm.trimmed / *options.length_mm;
   if (std::abs(factor - 1) <= kSizeTolerance) return warnings;
