@@ -52,24 +52,66 @@ std::optional<double> root_of_light(double p, double q, double w, double b) {
   return 0.5 * (low + high);
 }
 
-/// How much brighter an image's lit parts are than white's: the lamp's flicker.
-double flicker(const cv::Mat& image, const cv::Mat& other, const cv::Mat& white,
-               const cv::Mat& black, float least) {
-  // Of the light is in `image`: far enough below 1 that noise does not choose the bright ones.
-  constexpr float kWhole = 0.9F;
-  std::vector<double> ratios;
+/// What an image of a pattern and that of its inverse are divided by: the lamp's flicker.
+struct Flicker {
+  double pattern = 1;
+  double inverse = 1;
+};
+
+/// Values of one pixel, >= 0.
+struct Exposures {
+  double pattern, inverse, white, black;
+};
+
+/// |pattern - inverse| over the contrast: below, both show a good part of the light.
+constexpr double kMixed = 0.4;
+
+/// Pixels of a pattern and its inverse that are lit clearly and not at the end of their range:
+/// those that one image lights for the most part tell its flicker, the others gamma.
+struct PatternPixels {
+  std::vector<Exposures> mostly_pattern, mostly_inverse, mixed;
+};
+
+PatternPixels pattern_pixels(const cv::Mat& white, const cv::Mat& black, const cv::Mat& pattern,
+                             const cv::Mat& inverse, double least) {
+  PatternPixels pixels;
   for (int v = 0; v < white.rows; v += kEvery) {
     for (int u = 0; u < white.cols; u += kEvery) {
-      const float w = white.at<float>(v, u);
-      const float contrast = w - black.at<float>(v, u);
-      const float at = image.at<float>(v, u);
-      if (contrast < least || w > kFullLight || at - other.at<float>(v, u) < kWhole * contrast)
-        continue;
-      ratios.push_back(
-          static_cast<double>((at + other.at<float>(v, u)) / (w + black.at<float>(v, u))));
+      const auto at = [&](const cv::Mat& image) {
+        return std::max(0.0, static_cast<double>(image.at<float>(v, u)));
+      };
+      const Exposures x{at(pattern), at(inverse), at(white), at(black)};
+      const double contrast = x.white - x.black;
+      if (contrast < least || x.white > static_cast<double>(kFullLight)) continue;
+      const double share = (x.pattern - x.inverse) / contrast;
+      if (std::abs(share) <= kMixed)
+        pixels.mixed.push_back(x);
+      else
+        (share > 0 ? pixels.mostly_pattern : pixels.mostly_inverse).push_back(x);
     }
   }
+  return pixels;
+}
+
+/// How much brighter an image is than white says where it shows most of the light, if light is
+/// value^gamma: what the other image shows, which is divided by `of_other`, is taken off. All such
+/// pixels count. Those where the other image is darkest would be those that noise darkened: a gamma
+/// of 2.2 spreads the noise of the dark over a tenth of the range.
+double flicker(const std::vector<Exposures>& pixels, double gamma, double Exposures::*bright,
+               double Exposures::*other, double of_other) {
+  std::vector<double> ratios;
+  for (const Exposures& x : pixels) {
+    const double light =
+        std::pow(x.white, gamma) + std::pow(x.black, gamma) - std::pow(x.*other / of_other, gamma);
+    if (light > 0) ratios.push_back(x.*bright / std::pow(light, 1 / gamma));
+  }
   return ratios.size() < kLeastPixels ? 1 : upper_median(std::move(ratios));
+}
+
+Flicker flicker_of(const PatternPixels& pixels, double gamma, const Flicker& before) {
+  using X = Exposures;
+  return {flicker(pixels.mostly_pattern, gamma, &X::pattern, &X::inverse, before.inverse),
+          flicker(pixels.mostly_inverse, gamma, &X::inverse, &X::pattern, before.pattern)};
 }
 
 cv::Vec3f light_above(const cv::Mat& image, const cv::Mat& black, int v, int u) {
@@ -125,28 +167,34 @@ std::optional<MeasuredNumber> camera_gamma(
     std::span<const std::pair<cv::Mat, cv::Mat>> pattern_and_inverse) {
   constexpr float kLeastContrast = 0.12F;  // below, a fraction of a level in black tells too much
   const float least = std::max(least_contrast(white, black), kLeastContrast);
+  std::vector<PatternPixels> patterns;
+  for (const auto& [pattern, inverse] : pattern_and_inverse)
+    patterns.push_back(pattern_pixels(white, black, pattern, inverse, static_cast<double>(least)));
+  std::vector<Flicker> flickers(patterns.size());
   std::vector<double> roots, whites;
-  for (const auto& [pattern, inverse] : pattern_and_inverse) {
-    const double brighter_p = flicker(pattern, inverse, white, black, least);
-    const double brighter_q = flicker(inverse, pattern, white, black, least);
-    for (int v = 0; v < white.rows; v += kEvery) {
-      for (int u = 0; u < white.cols; u += kEvery) {
-        const double w = static_cast<double>(white.at<float>(v, u));
-        const double b = std::max(0.0, static_cast<double>(black.at<float>(v, u)));
-        const double p = static_cast<double>(pattern.at<float>(v, u)) / brighter_p;
-        const double q = static_cast<double>(inverse.at<float>(v, u)) / brighter_q;
-        constexpr double kMixed = 0.4;  // |p - q| over the contrast: both show a good part
-        if (w - b < static_cast<double>(least) || w > static_cast<double>(kFullLight) ||
-            std::abs(p - q) > kMixed * (w - b) || p <= b || q <= b)
-          continue;
-        if (const auto root = root_of_light(p, q, w, b)) {
+  // Gamma moves the flicker little, which moves gamma: 1 % of flicker is 7 % of gamma.
+  constexpr int kRounds = 3;
+  for (int round = 0; round < kRounds; ++round) {
+    if (round > 0) {
+      const double gamma = upper_median(roots);
+      for (std::size_t i = 0; i < patterns.size(); ++i)
+        flickers[i] = flicker_of(patterns[i], gamma, flickers[i]);
+    }
+    roots.clear();
+    whites.clear();
+    for (std::size_t i = 0; i < patterns.size(); ++i) {
+      for (const Exposures& x : patterns[i].mixed) {
+        const double p = x.pattern / flickers[i].pattern;
+        const double q = x.inverse / flickers[i].inverse;
+        if (p <= x.black || q <= x.black) continue;
+        if (const auto root = root_of_light(p, q, x.white, x.black)) {
           roots.push_back(*root);
-          whites.push_back(w);
+          whites.push_back(x.white);
         }
       }
     }
+    if (roots.size() < kLeastPixels) return std::nullopt;
   }
-  if (roots.size() < kLeastPixels) return std::nullopt;
   MeasuredNumber gamma = median_of(roots);
   // An error of black of a third of a level, d(f) / d(gamma) = -ln 2 / 2 at half light.
   const double of_black = 0.33 / 255 / (0.35 * upper_median(std::move(whites)));

@@ -21,7 +21,8 @@ struct MeasuredNumber {
 /// edge of the pattern passes through a pixel, both show part of the light, and light adds up:
 ///   pattern^gamma + inverse^gamma = white^gamma + black^gamma,
 /// whatever the surface, the projector and indirect light do. One root per such pixel, and their
-/// median; the lamp's flicker between images is taken out by the pixels that an image lights whole.
+/// median; the lamp's flicker between images is taken out by the pixels that one image lights for
+/// the most part, by the same sum.
 /// Images CV_32FC1, [0, 1]. Nothing with less than a few hundred such pixels.
 [[nodiscard]] std::optional<MeasuredNumber> camera_gamma(
     const cv::Mat& white, const cv::Mat& black,

@@ -20,8 +20,9 @@ constexpr int kSide = 160;
 /// Images of a pattern whose edges pass through many pixels, stored with a gamma, noise and 8 bit.
 struct GammaScene {
   double gamma = 1;
-  double noise = 0.004;
-  double flicker = 1;  ///< of the lamp in the inverse's image
+  double noise = 0.004;       ///< of stored values
+  double noise_of_light = 0;  ///< as sensors have it, before gamma
+  double flicker = 1;         ///< of the lamp in the inverse's image
 };
 
 struct GammaImages {
@@ -37,7 +38,8 @@ GammaImages gamma_images(const GammaScene& scene) {
     for (int v = 0; v < kSide; ++v) {
       for (int u = 0; u < kSide; ++u) {
         const double albedo = 0.5 + 0.3 * std::sin(0.05 * u) * std::cos(0.07 * v);
-        const double light = 0.02 + lamp * albedo * share(u, v);
+        const double light = std::max(
+            0.0, 0.02 + lamp * albedo * share(u, v) + random.normal(0, scene.noise_of_light));
         const double value = std::pow(light, 1 / scene.gamma) + random.normal(0, scene.noise);
         image.at<float>(v, u) = static_cast<float>(std::round(255 * value) / 255);
       }
@@ -63,6 +65,18 @@ TEST(CameraGamma, IsFoundWhereAPatternAndItsInverseShareAPixel) {
     ASSERT_TRUE(found);
     EXPECT_NEAR(found->value, scene.gamma, 0.02 * scene.gamma);  // 8 bit and noise of one level
     EXPECT_LT(found->sigma, 0.02);
+  }
+}
+
+/// A gamma spreads the noise of the dark over a tenth of the range: pixels that are dark by chance
+/// must not be taken for those that an image leaves unlit.
+TEST(CameraGamma, NoiseInTheDarkIsNoFlicker) {
+  for (const double lamp : {1.0, 1.03}) {
+    const GammaImages images =
+        gamma_images({.gamma = 2.2, .noise = 0, .noise_of_light = 0.008, .flicker = lamp});
+    const auto found = camera_gamma(images.white, images.black, images.patterns);
+    ASSERT_TRUE(found);
+    EXPECT_NEAR(found->value, 2.2, 2 * found->sigma) << lamp;
   }
 }
 
