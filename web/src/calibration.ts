@@ -85,7 +85,11 @@ function keyFigures(report: Json, unit: string): HTMLElement {
   add('RMS, held out', digNumber(report, 'held_out_rms_px'), px, 'of points that the adjustment did not see');
   const p95 = digNumber(report, 'volume', 'point_sigma_p95');
   add('Point in the volume', digNumber(report, 'volume', 'point_sigma_median'), (x) => `${format(x, 2)} ${unit}`,
-    `one standard deviation, median${p95 === undefined ? '' : `; 95 % below ${format(p95, 2)}`}`);
+    `one standard deviation, scale apart, median${p95 === undefined ? '' : `; 95 % below ${format(p95, 2)}`}`);
+  const best = digList(report, 'scale', 'best_distance', 'devices').map(textOf);
+  const bestSigma = digNumber(report, 'scale', 'best_distance', 'length_sigma_percent');
+  add('Lengths in the volume', digNumber(report, 'scale', 'length_sigma_percent'), (x) => `${format(x, 2)} %`,
+    `one standard deviation of the scale${bestSigma === undefined ? '' : `; ${format(bestSigma, 2)} % by the distance of ${best.join(' and ')}`}`);
   add('Surface points', digNumber(report, 'tracks'), (x) => format(x), 'seen by several devices');
   const dropped = digNumber(report, 'views_dropped');
   add('Views', digNumber(report, 'views'), (x) => format(x),

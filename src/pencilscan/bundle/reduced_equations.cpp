@@ -12,8 +12,8 @@ namespace pencilscan {
 namespace {
 
 /// How a corner moves, in the board's frame, by one standard deviation of each error of its shape.
-/// Printed boards are stretched by a part in a thousand along one side (paper, rollers) and
-/// bent by as much of their diagonal.
+/// Printed boards are stretched by a part in a thousand along one side (paper, rollers), half of
+/// which is size, and bent by as much of their diagonal.
 class BoardShape {
  public:
   explicit BoardShape(const std::vector<BoardView>& views) {
@@ -27,17 +27,19 @@ class BoardShape {
     half_diagonal_ = (high - low).norm() / 2;
   }
 
-  [[nodiscard]] Eigen::Matrix<double, 3, 5> moves(const Vec2& position_mm) const {
+  using Moves = Eigen::Matrix<double, 3, ReducedEquations::kBoardShapes>;
+  [[nodiscard]] Moves moves(const Vec2& position_mm) const {
     constexpr double kStretch = 1e-3;
     constexpr double kBend = 1e-3;  // of the diagonal, at the end of half of it
     const Vec2 x = position_mm - middle_;
     const double sag = 2 * kBend / half_diagonal_;
-    Eigen::Matrix<double, 3, 5> moves = Eigen::Matrix<double, 3, 5>::Zero();
+    Moves moves = Moves::Zero();
     moves.col(0) = kStretch / 2 * Vec3(x.x(), -x.y(), 0);
     moves.col(1) = kStretch / 2 * Vec3(x.y(), x.x(), 0);
     moves(2, 2) = sag * x.x() * x.x();
     moves(2, 3) = sag * x.x() * x.y();
     moves(2, 4) = sag * x.y() * x.y();
+    moves.col(5) = kStretch / 2 * Vec3(x.x(), x.y(), 0);
     return moves;
   }
 

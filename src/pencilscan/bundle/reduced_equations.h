@@ -19,6 +19,7 @@ class ReducedEquations {
  public:
   static constexpr Eigen::Index kPose = 6;
   static constexpr Eigen::Index kBlock = kPose + kIntrinsics;
+  static constexpr int kBoardShapes = 6;  ///< stretch, shear, bend in three ways, size
 
   ReducedEquations(const BundleProblem& problem, const BundleOptions& adjusted);
 
@@ -51,8 +52,7 @@ class ReducedEquations {
 
  private:
   using Block = Eigen::Matrix<double, 2, kBlock>;
-  static constexpr int kPatches = 3;      ///< of an image along each side
-  static constexpr int kBoardShapes = 5;  ///< stretch, shear, bend in three ways
+  static constexpr int kPatches = 3;  ///< of an image along each side
 
   enum class Counts { kExactly, kAsTrack, kAsCorner };  ///< exactly: a hub
 

@@ -1,6 +1,7 @@
 #include "pencilscan/bundle/uncertainty.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <numeric>
@@ -145,6 +146,26 @@ Covariance invert(const ReducedEquations& normal, const BundleProblem& problem, 
   return result;
 }
 
+using DeviceChange = Eigen::Matrix<double, kBlock, 1>;
+
+/// Turned by the first three numbers in its own frame, shifted by the next, the others added to
+/// its inner parameters.
+BundleDevice changed(BundleDevice device, const DeviceChange& change) {
+  const Vec3 turn = change.head<3>();
+  const Mat3 R =
+      (turn.norm() > 0 ? Eigen::AngleAxisd(turn.norm(), turn.normalized()).toRotationMatrix()
+                       : Mat3::Identity().eval()) *
+      rotation_of(device);
+  const Eigen::AngleAxisd axis(R);
+  for (Eigen::Index k = 0; k < 3; ++k) {
+    device.pose[static_cast<std::size_t>(k)] = axis.angle() * axis.axis()[k];
+    device.pose[static_cast<std::size_t>(3 + k)] += change[3 + k];
+  }
+  for (std::size_t i = 0; i < kIntrinsics; ++i)
+    device.inner[i] += change[kPose + static_cast<Eigen::Index>(i)];
+  return device;
+}
+
 /// The problem's devices moved by one draw of the covariance.
 std::vector<BundleDevice> drawn_devices(const BundleProblem& problem, const Covariance& covariance,
                                         Random& random) {
@@ -152,34 +173,20 @@ std::vector<BundleDevice> drawn_devices(const BundleProblem& problem, const Cova
   for (double& v : z) v = random.normal();
   const Eigen::VectorXd change = covariance.root * z;
   std::vector<BundleDevice> devices = problem.devices;
-  std::vector<Eigen::Matrix<double, kBlock, 1>> changes(devices.size());
-  for (auto& c : changes) c.setZero();
+  std::vector<DeviceChange> changes(devices.size(), DeviceChange::Zero());
   for (std::size_t i = 0; i < covariance.at.size(); ++i)
     changes[static_cast<std::size_t>(covariance.at[i] / kBlock)][covariance.at[i] % kBlock] =
         change[static_cast<Eigen::Index>(i)];
-  for (std::size_t d = 0; d < devices.size(); ++d) {
-    if (!devices[d].present) continue;
-    const Vec3 turn = changes[d].head<3>();
-    const Mat3 R =
-        (turn.norm() > 0 ? Eigen::AngleAxisd(turn.norm(), turn.normalized()).toRotationMatrix()
-                         : Mat3::Identity().eval()) *
-        rotation_of(devices[d]);
-    const Eigen::AngleAxisd axis(R);
-    for (Eigen::Index k = 0; k < 3; ++k) {
-      devices[d].pose[static_cast<std::size_t>(k)] = axis.angle() * axis.axis()[k];
-      devices[d].pose[static_cast<std::size_t>(3 + k)] += changes[d][3 + k];
-    }
-    for (std::size_t i = 0; i < kIntrinsics; ++i)
-      devices[d].inner[i] += changes[d][kPose + static_cast<Eigen::Index>(i)];
-  }
+  for (std::size_t d = 0; d < devices.size(); ++d)
+    if (devices[d].present) devices[d] = changed(devices[d], changes[d]);
   return devices;
 }
 
-/// Errors of points measured with drawn rigs.
-void measure_volume(const BundleProblem& problem, const Covariance& covariance, std::uint64_t seed,
-                    Uncertainty& result) {
+constexpr double kLeastAngle = 0.02;  ///< rad between the rays of a point of the volume
+
+/// Some points of the volume, seen without error by the rig as found.
+BundleProblem exact_points(const BundleProblem& problem) {
   constexpr std::size_t kPoints = 200;
-  constexpr int kDraws = 30;
   BundleProblem exact;
   exact.devices = problem.devices;
   std::vector<std::size_t> used;
@@ -194,18 +201,25 @@ void measure_volume(const BundleProblem& problem, const Covariance& covariance, 
     exact.tracks.push_back(track);
     exact.points.push_back(problem.points[t]);
   }
+  return exact;
+}
+
+/// Errors of points measured with drawn rigs.
+void measure_volume(const BundleProblem& exact, const Covariance& covariance, std::uint64_t seed,
+                    Uncertainty& result) {
+  constexpr int kDraws = 30;
   const std::size_t count = exact.tracks.size();
   std::vector<double> squares(count, 0);
   std::vector<int> draws(count, 0);
   Random random(seed);
   for (int draw = 0; draw < kDraws; ++draw) {
     BundleProblem moved = exact;
-    moved.devices = drawn_devices(problem, covariance, random);
+    moved.devices = drawn_devices(exact, covariance, random);
     std::vector<std::size_t> found;
     Eigen::Matrix3Xd a(3, count);
     Eigen::Matrix3Xd b(3, count);
     for (std::size_t i = 0; i < count; ++i) {
-      const auto point = triangulate(moved, moved.tracks[i], 0.02);
+      const auto point = triangulate(moved, moved.tracks[i], kLeastAngle);
       if (!point) continue;
       a.col(static_cast<Eigen::Index>(found.size())) = *point;
       b.col(static_cast<Eigen::Index>(found.size())) = exact.points[i];
@@ -227,19 +241,69 @@ void measure_volume(const BundleProblem& problem, const Covariance& covariance, 
   result.volume_p95 = lower_quantile(sigmas, 0.95);
 }
 
-/// Deviations of a device's centre along its axes. A turn by r and a shift of t by dt move the
-/// centre by -(t x r + dt) in the device's frame: both go into it, and how they go together.
-Vec3 center_deviation(const BundleDevice& device, std::size_t d, const Covariance& covariance) {
-  Eigen::Matrix<double, 3, ReducedEquations::kPose> by_pose;
-  by_pose << cross_matrix(-(rotation_of(device) * center_of(device))), Mat3::Identity();
-  Eigen::Matrix<double, 3, Eigen::Dynamic> by_free =
-      Eigen::Matrix<double, 3, Eigen::Dynamic>::Zero(3, covariance.matrix.rows());
-  for (std::size_t i = 0; i < covariance.at.size(); ++i) {
-    const auto kind = covariance.at[i] % kBlock;
-    if (static_cast<std::size_t>(covariance.at[i] / kBlock) == d && kind < kPose)
-      by_free.col(static_cast<Eigen::Index>(i)) = by_pose.col(kind);
+/// How a device's centre moves, in the device's frame, by its pose: a turn by r and a shift of t by
+/// dt move it by -(t x r + dt).
+Eigen::Matrix<double, 3, kPose> center_by_pose(const BundleDevice& device) {
+  Eigen::Matrix<double, 3, kPose> by_pose;
+  by_pose << cross_matrix(rotation_of(device) * center_of(device)), -Mat3::Identity();
+  return by_pose;
+}
+
+/// By how much the logarithm of the size of `exact`'s points changes where parameter `kind` of a
+/// device moves, and the points are measured anew.
+double size_by_parameter(const BundleProblem& exact, const Vec3& middle, double square_size,
+                         std::size_t d, Eigen::Index kind, double sigma) {
+  constexpr double kStep = 0.1;  // deviations: what the covariance holds for is linear
+  std::array<BundleProblem, 2> moved{exact, exact};
+  for (const int side : {0, 1}) {
+    DeviceChange change = DeviceChange::Zero();
+    change[kind] = (side == 0 ? -kStep : kStep) * sigma;
+    moved[static_cast<std::size_t>(side)].devices[d] = changed(exact.devices[d], change);
   }
-  return (by_free * covariance.matrix * by_free.transpose()).diagonal().cwiseMax(0).cwiseSqrt();
+  double sum = 0;
+  for (std::size_t i = 0; i < exact.tracks.size(); ++i) {
+    if (view_in(exact.tracks[i], d) == nullptr) continue;
+    const auto before = triangulate(moved[0], exact.tracks[i], kLeastAngle);
+    const auto after = triangulate(moved[1], exact.tracks[i], kLeastAngle);
+    if (before && after) sum += (exact.points[i] - middle).dot(*after - *before);
+  }
+  return sum / (2 * kStep * sigma * square_size);
+}
+
+Eigen::MatrixXd size_and_centers(const BundleProblem& exact, const Covariance& covariance) {
+  if (exact.points.empty()) return {};
+  Vec3 middle = Vec3::Zero();
+  for (const Vec3& x : exact.points) middle += x / static_cast<double>(exact.points.size());
+  double square_size = 0;
+  for (const Vec3& x : exact.points) square_size += (x - middle).squaredNorm();
+  if (!(square_size > 0)) return {};
+  const auto devices = static_cast<Eigen::Index>(exact.devices.size());
+  Eigen::MatrixXd by_free = Eigen::MatrixXd::Zero(1 + 3 * devices, covariance.matrix.rows());
+  for (std::size_t i = 0; i < covariance.at.size(); ++i) {
+    const auto column = static_cast<Eigen::Index>(i);
+    const Eigen::Index d = covariance.at[i] / kBlock;
+    const Eigen::Index kind = covariance.at[i] % kBlock;
+    const BundleDevice& device = exact.devices[static_cast<std::size_t>(d)];
+    const double sigma = std::sqrt(covariance.matrix(column, column));
+    if (sigma > 0)
+      by_free(0, column) =
+          size_by_parameter(exact, middle, square_size, static_cast<std::size_t>(d), kind, sigma);
+    if (kind < kPose)
+      by_free.block<3, 1>(1 + 3 * d, column) =
+          rotation_of(device).transpose() * center_by_pose(device).col(kind);
+  }
+  const Eigen::MatrixXd root = by_free * covariance.root;
+  return root * root.transpose();
+}
+
+/// Deviations of a device's centre along its axes: turn and shift both go into it, and how they go
+/// together.
+Vec3 center_deviation(const BundleDevice& device, std::size_t d,
+                      const Eigen::MatrixXd& of_size_and_centers) {
+  const Eigen::Index at = 1 + 3 * static_cast<Eigen::Index>(d);
+  const Mat3 in_world = of_size_and_centers.block<3, 3>(at, at);
+  const Mat3 R = rotation_of(device);
+  return (R * in_world * R.transpose()).diagonal().cwiseMax(0).cwiseSqrt();
 }
 
 }  // namespace
@@ -277,8 +341,11 @@ Uncertainty uncertainty(const BundleProblem& problem, const BundleOptions& adjus
     if (kind < 3) device.rotation[kind] = sigma;
     if (kind >= kPose) device.inner[static_cast<std::size_t>(kind - kPose)] = sigma;
   }
+  const BundleProblem exact = exact_points(problem);
+  result.size_and_centers = size_and_centers(exact, covariance);
   for (std::size_t d = 0; d < result.devices.size(); ++d) {
-    result.devices[d].position = center_deviation(problem.devices[d], d, covariance);
+    if (problem.devices[d].present && result.size_and_centers.size() > 0)
+      result.devices[d].position = center_deviation(problem.devices[d], d, result.size_and_centers);
     for (std::size_t i = 0; i < kIntrinsics; ++i) {
       double prior = problem.devices[d].prior_sigma[i];
       if (i == kFy) prior *= problem.devices[d].inner[kFx];
@@ -287,7 +354,7 @@ Uncertainty uncertainty(const BundleProblem& problem, const BundleOptions& adjus
           i != kFy && result.devices[d].inner[i] > 0 && result.devices[d].inner[i] > 0.6 * prior;
     }
   }
-  measure_volume(problem, covariance, seed, result);
+  measure_volume(exact, covariance, seed, result);
   return result;
 }
 

@@ -27,6 +27,11 @@ struct Uncertainty {
   double volume_median = 0;
   double volume_p95 = 0;
   double volume_radius = 0;  ///< of the points, 90th percentile of the distance to the middle
+  /// Covariance, in that gauge, of the logarithm of the volume's size (the root mean square
+  /// distance of its points from their mean), then of the devices' centres, three rows each
+  /// (world, rig units; 0 where not present). What is exact between centres tells from it how well
+  /// lengths are known. Empty without points.
+  Eigen::MatrixXd size_and_centers;
 };
 
 /// Covariance from the Jacobian at the solution, points eliminated (Schur complement), in the free

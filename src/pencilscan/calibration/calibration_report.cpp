@@ -6,6 +6,7 @@
 
 #include "pencilscan/bundle/bundle_device.h"
 #include "pencilscan/calibration/given_values.h"
+#include "pencilscan/calibration/scale_deviation.h"
 #include "pencilscan/color/color_json.h"
 #include "pencilscan/core/evenly_picked.h"
 
@@ -138,6 +139,26 @@ Json decoding_json(const CalibrationReport& report) {
   return decoding;
 }
 
+/// What gives the scale, how well lengths in the volume are known by it, and the two devices whose
+/// distance would give it best.
+Json scale_json(const CalibrationReport& report) {
+  Json json = Json::object();
+  const auto put = [&](Json& into, const ScaleDeviation& scale) {
+    for (const std::size_t d : scale.devices)
+      into["devices"].push_back(device_at(report.input.rig, d).name);
+    into["length_sigma_percent"] = 100 * scale.share;
+  };
+  if (const auto scale = scale_deviation(report.input, report.result, report.uncertainty)) {
+    json["from"] = scale->from == ScaleDeviation::From::kDistance ? "known_distance"
+                   : scale->from == ScaleDeviation::From::kBoard  ? "board"
+                                                                  : "given_poses";
+    put(json, *scale);
+  }
+  if (const auto best = best_distance(report.result, report.uncertainty))
+    put(json["best_distance"], *best);
+  return json;
+}
+
 Json loop_json(const CalibrationReport& report) {
   const LoopClosure& loop = report.loop;
   Json json{{"closed_ring", !loop.devices.empty()}};
@@ -176,6 +197,7 @@ nlohmann::ordered_json calibration_json(const CalibrationReport& report) {
   json["volume"] = {{"radius", report.uncertainty.volume_radius},
                     {"point_sigma_median", report.uncertainty.volume_median},
                     {"point_sigma_p95", report.uncertainty.volume_p95}};
+  json["scale"] = scale_json(report);
   json["loop"] = loop_json(report);
   json["color"] = color_json(report.input.rig, report.color);
   json["devices"] = Json::array();

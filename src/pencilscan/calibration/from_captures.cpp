@@ -7,6 +7,7 @@
 
 #include "pencilscan/boards/board.h"
 #include "pencilscan/calibration/mirrored.h"
+#include "pencilscan/calibration/scale_deviation.h"
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/name_list.h"
 #include "pencilscan/gray/gray_decode.h"
@@ -170,6 +171,8 @@ nlohmann::ordered_json calibration_figures(const CapturesCalibration& calibratio
   figures["views"] = result.views;
   figures["views_dropped"] = result.views_dropped;
   figures["point_sigma"] = calibration.uncertainty.volume_median;
+  if (const auto scale = scale_deviation(calibration.input, result, calibration.uncertainty))
+    figures["length_sigma_percent"] = 100 * scale->share;
   figures["unit"] = result.rig.unit_known ? "mm" : "unknown";
   return figures;
 }

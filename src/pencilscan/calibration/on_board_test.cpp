@@ -8,6 +8,7 @@
 #include "pencilscan/bundle/bundle_device.h"
 #include "pencilscan/bundle/priors.h"
 #include "pencilscan/calibration/board_start.h"
+#include "pencilscan/calibration/scale_deviation.h"
 #include "pencilscan/calibration/verdict.h"
 #include "pencilscan/core/random.h"
 #include "pencilscan/rig/sample_devices.h"
@@ -164,6 +165,12 @@ TEST_F(OnBoard, ABoardThatTheProjectorSeesTooTiesItToTheCamera) {
   EXPECT_NEAR(distance(result.rig) / distance(truth_), 1, 0.05);  // hangs on the focal lengths
   EXPECT_LT(std::abs(result.rig.projectors[0].K(0, 0) - 1300), 3 * sigma.devices[1].inner[kFx]);
   EXPECT_LT(sigma.volume_median, 0.7 * without.volume_median);
+  // A printed board's mean square is good to half a thousandth, and the scale never better.
+  const auto scale = scale_deviation(input_, result, sigma);
+  ASSERT_TRUE(scale);
+  EXPECT_EQ(scale->from, ScaleDeviation::From::kBoard);
+  EXPECT_GT(scale->share, 0.0005);
+  EXPECT_LT(scale->share, 0.02);
 }
 
 TEST_F(OnBoard, FivePosesGiveFocalLengthsAndScale) {

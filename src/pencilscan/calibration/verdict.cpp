@@ -6,6 +6,7 @@
 #include "pencilscan/bundle/bundle_device.h"
 #include "pencilscan/calibration/given_values.h"
 #include "pencilscan/calibration/pair_fit.h"
+#include "pencilscan/calibration/scale_deviation.h"
 #include "pencilscan/calibration/suspects.h"
 #include "pencilscan/core/formatted.h"
 #include "pencilscan/core/length_units.h"
@@ -225,7 +226,8 @@ class Judge {
     const std::string unit = result_.rig.unit_known ? " mm" : "";
     add(share > options_.usable_volume_sigma ? Grade::kUnusable : Grade::kDoubtful,
         "a measured point is off by " + formatted(uncertainty_.volume_median) + unit +
-            " (one standard deviation) from the rig's errors alone, in a volume of radius " +
+            " (one standard deviation) from the rig's errors alone, scale apart, in a volume of "
+            "radius " +
             formatted(uncertainty_.volume_radius, "%.3g") + unit + reason(),
         advice("add captures that fill the volume"));
   }
@@ -236,10 +238,46 @@ class Judge {
           "let a projector light the board while a camera sees all of it");
     if (!result_.rig.unit_known)
       add(Grade::kGood, "the scale is not known: the rig's unit is \"unknown\"",
-          "give --known-distance, or a --board");
+          "give --known-distance" + best_pair_text() + ", or a --board");
+    judge_scale_deviation();
     if (result_.board_times) judge_board_lengths(*result_.board_times);
     if (result_.given_times) judge_given_lengths(*result_.given_times);
     judge_given_places();
+  }
+
+  /// Which distance would fix the scale best, and to what.
+  [[nodiscard]] std::string best_pair_text() const {
+    const auto best = best_distance(result_, uncertainty_);
+    if (!best) return {};
+    return " of " + name(best->devices[0]) + " and " + name(best->devices[1]) +
+           ", with which lengths are known to " + percent(best->share);
+  }
+
+  [[nodiscard]] std::string given_length(const ScaleDeviation& scale) const {
+    switch (scale.from) {
+      case ScaleDeviation::From::kDistance:
+        return "the distance of " + name(scale.devices[0]) + " and " + name(scale.devices[1]);
+      case ScaleDeviation::From::kBoard:
+        return "the board";
+      case ScaleDeviation::From::kPoses:
+        return "the given poses";
+    }
+    return {};
+  }
+
+  void judge_scale_deviation() {
+    const auto scale = scale_deviation(input_, result_, uncertainty_);
+    if (!scale || scale->share <= options_.good_scale_sigma) return;
+    const auto best = best_distance(result_, uncertainty_);
+    const bool another_helps = best && best->share < scale->share;
+    const std::string captures = "add captures that fill the volume, or give K of the cameras";
+    std::string what_to_do =
+        another_helps ? "give --known-distance" + best_pair_text() : advice(captures);
+    if (another_helps && best->share > options_.good_scale_sigma) what_to_do += "; " + captures;
+    add(Grade::kDoubtful,
+        "the scale is known weakly: lengths in the volume to " + percent(scale->share) +
+            " (one standard deviation) by " + given_length(*scale) + reason(),
+        what_to_do);
   }
 
   /// Of what is `factor` times as long by `measured` as by `other`: what is too short is in the

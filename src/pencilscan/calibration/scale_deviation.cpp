@@ -1,0 +1,95 @@
+#include "pencilscan/calibration/scale_deviation.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "pencilscan/bundle/board_corners.h"
+#include "pencilscan/bundle/bundle_device.h"
+
+namespace pencilscan {
+namespace {
+
+/// Deviation of the logarithm of the volume's size over that of the size of these devices'
+/// centres, which a similarity takes from them: of centres c_i with mean c,
+///   d log(size) = sum (c_i - c) . dc_i / sum |c_i - c|^2.
+/// Of two that is their distance.
+double share_if_exact(const BundleProblem& problem, const Uncertainty& uncertainty,
+                      std::span<const std::size_t> devices) {
+  Vec3 middle = Vec3::Zero();
+  for (const std::size_t d : devices)
+    middle += center_of(problem.devices[d]) / static_cast<double>(devices.size());
+  double square_size = 0;
+  for (const std::size_t d : devices)
+    square_size += (center_of(problem.devices[d]) - middle).squaredNorm();
+  Eigen::VectorXd change = Eigen::VectorXd::Zero(uncertainty.size_and_centers.rows());
+  change[0] = 1;
+  for (const std::size_t d : devices)
+    change.segment<3>(1 + 3 * static_cast<Eigen::Index>(d)) =
+        -(center_of(problem.devices[d]) - middle) / square_size;
+  return std::sqrt(std::max(0.0, change.dot(uncertainty.size_and_centers * change)));
+}
+
+/// Deviation of the scale of n given poses: that of a coordinate, which 3 n - 7 surplus numbers
+/// show, over the poses' spread.
+double share_of_poses(const CalibrationInput& input, const BundleProblem& problem,
+                      std::span<const std::size_t> devices) {
+  Vec3 middle = Vec3::Zero();
+  for (const std::size_t d : devices)
+    middle += device_at(input.rig, d).center() / static_cast<double>(devices.size());
+  double misses = 0;
+  double spread = 0;
+  for (const std::size_t d : devices) {
+    const Vec3 given = device_at(input.rig, d).center();
+    misses += (center_of(problem.devices[d]) - given).squaredNorm();
+    spread += (given - middle).squaredNorm();
+  }
+  const double freedom = 3 * static_cast<double>(devices.size()) - 7;
+  return std::sqrt(misses / (freedom * spread));
+}
+
+}  // namespace
+
+std::optional<ScaleDeviation> scale_deviation(const CalibrationInput& input,
+                                              const CalibrationResult& result,
+                                              const Uncertainty& uncertainty) {
+  using From = ScaleDeviation::From;
+  const BundleProblem& problem = result.problem;
+  const Eigen::MatrixXd& covariance = uncertainty.size_and_centers;
+  if (!result.rig.unit_known || covariance.size() == 0) return std::nullopt;
+  const auto is_present = [&](std::size_t d) { return problem.devices[d].present; };
+  if (input.distance && is_present(input.distance->a) && is_present(input.distance->b)) {
+    const std::vector<std::size_t> devices{input.distance->a, input.distance->b};
+    return ScaleDeviation{From::kDistance, devices, share_if_exact(problem, uncertainty, devices)};
+  }
+  if (!problem.board_views.empty()) {
+    if (!boards_join_devices(problem.board_views)) return std::nullopt;
+    return ScaleDeviation{From::kBoard, {}, std::sqrt(std::max(0.0, covariance(0, 0)))};
+  }
+  std::vector<std::size_t> devices;
+  for (std::size_t d = 0; d < problem.devices.size(); ++d)
+    if (is_present(d) && input.known[d].pose) devices.push_back(d);
+  if (devices.size() < 3) return std::nullopt;
+  const double share = std::hypot(share_if_exact(problem, uncertainty, devices),
+                                  share_of_poses(input, problem, devices));
+  return ScaleDeviation{From::kPoses, devices, share};
+}
+
+std::optional<ScaleDeviation> best_distance(const CalibrationResult& result,
+                                            const Uncertainty& uncertainty) {
+  if (uncertainty.size_and_centers.size() == 0) return std::nullopt;
+  const BundleProblem& problem = result.problem;
+  std::optional<ScaleDeviation> best;
+  for (std::size_t b = 0; b < problem.devices.size(); ++b) {
+    for (std::size_t a = 0; a < b; ++a) {
+      if (!problem.devices[a].present || !problem.devices[b].present) continue;
+      const std::vector<std::size_t> pair{a, b};
+      const double share = share_if_exact(problem, uncertainty, pair);
+      // Devices in one place have no distance.
+      if (std::isfinite(share) && (!best || share < best->share))
+        best = ScaleDeviation{ScaleDeviation::From::kDistance, pair, share};
+    }
+  }
+  return best;
+}
+
+}  // namespace pencilscan
