@@ -269,7 +269,9 @@ class Judge {
     const auto scale = scale_deviation(input_, result_, uncertainty_);
     if (!scale || scale->share <= options_.good_scale_sigma) return;
     const auto best = best_distance(result_, uncertainty_);
-    const bool another_helps = best && best->share < scale->share;
+    // Deviations are stated to a fifth (docs/calibration.md, "Deviations").
+    constexpr double kClearly = 0.8;
+    const bool another_helps = best && best->share < kClearly * scale->share;
     const std::string captures = "add captures that fill the volume, or give K of the cameras";
     std::string what_to_do =
         another_helps ? "give --known-distance" + best_pair_text() : advice(captures);
