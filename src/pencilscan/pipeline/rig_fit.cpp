@@ -206,13 +206,17 @@ RigFit check_rig_on_frames(const Rig& stated, std::span<const FrameCurves> frame
   const double unit = footprint(stated);
   const Rig rig = with_registered_patterns(scaled(stated, 1 / unit));
   Explanation explained = explain(rig, frames, labels_of(rig, frames), options);
-  if (explained.is_doubtful()) {
+  const auto left = device_disagreements(explained.put_back, explained.named.tracks);
+  if (explained.is_doubtful() || device_that_is_off(left)) {
     // All frames together, and colours, may tell where a device stands.
     RigRefinementOptions refinement;
     refinement.refine.max_remaining = std::numeric_limits<double>::infinity();
     RigRefinement refined = refine_rig_on_frames(rig, frames, refinement);
     if (refined.report.refined) {
-      Explanation again = explain(rig, frames, std::move(refined.labelings), options);
+      MovedDevicesOptions from_found = options;
+      from_found.start = std::move(refined.found);
+      Explanation again = explanation_of(rig, frames, std::move(refined.labelings), from_found);
+      again.contradicted.clear();  // a refined rig has no such camera, or it is refused
       if (!again.is_doubtful()) explained = std::move(again);
     }
   }

@@ -218,6 +218,7 @@ RigRefinement refine_rig_on_frames(const Rig& stated, std::span<const FrameCurve
     if (is_settled) break;
   }
   RigRefinement result = std::move(best->refinement);
+  result.found = start.correction;
   if (result.report.refined && !best->objection.empty()) {
     result.report.refined = false;
     result.report.reason = "though most crossings meet, " + best->objection +

@@ -36,6 +36,7 @@ struct RigRefinement {
   Rig rig;                 ///< as given where report.refined is false
   RefineRigReport report;  ///< of the last round; "before" is the calibration as given
   std::vector<RefinementRound> rounds;
+  RigCorrection found;  ///< of cameras that stood far off, where they were found; empty: none
   std::vector<Labeling> labelings;  ///< per frame, with the corrected rig; empty where not refined
 };
 

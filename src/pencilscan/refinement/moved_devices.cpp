@@ -29,7 +29,9 @@ Vec6 vector_of(const PoseCorrection& c) {
 class Mover {
  public:
   Mover(const Rig& rig, std::span<const CrossingTrack> tracks, const MovedDevicesOptions& options)
-      : rig_(rig), options_(options), correction_(device_count(rig)) {
+      : rig_(rig), options_(options), start_(options.start) {
+    start_.resize(device_count(rig));
+    correction_ = start_;
     for (const CrossingTrack& track : evenly_picked(tracks, options.max_tracks)) {
       const TrackResidual residual(rig, track, options.refine.line_sigma_px);
       if (residual.evaluate(poses(residual, correction_), false)) tracks_.push_back(track);
@@ -54,7 +56,8 @@ class Mover {
     constexpr int kMaxIterations = 20;
     constexpr double kStepPx = 1e-4;
     Normal normal = normal_of(own, device, move.correction);
-    const double before = normal.cost;
+    const double before =
+        options_.start.empty() ? normal.cost : normal_of(own, device, PoseCorrection{}).cost;
     for (int k = 0; k < kMaxIterations; ++k) {
       const Vec6 step = solve_symmetric(normal.matrix, Vec6(-normal.gradient));
       PoseCorrection next = move.correction;
@@ -134,7 +137,7 @@ class Mover {
                                     std::pow(kMovedFarther * options_.refine.rotation_sigma_px, 2));
     precision.tail<3>().setConstant(
         1 / std::pow(kMovedFarther * options_.refine.translation_sigma_px * per_px, 2));
-    const Vec6 x = vector_of(at);
+    const Vec6 x = vector_of(at) - vector_of(start_[device]);
     Normal normal;
     normal.matrix = precision.asDiagonal();
     normal.gradient = precision.cwiseProduct(x);
@@ -172,6 +175,7 @@ class Mover {
 
   const Rig& rig_;
   const MovedDevicesOptions& options_;
+  RigCorrection start_;
   RigCorrection correction_;
   std::vector<CrossingTrack> tracks_;
   std::vector<TrackResidual> residuals_;

@@ -32,7 +32,10 @@ struct MovedDevicesOptions {
   /// degrees of freedom, which exceeds 40 once in two million.
   double smallest_gain = 40;
   std::size_t max_tracks = 6000;  ///< an even subset is used
-  RefineRigOptions refine;        ///< its deviations, loss and the fewest crossings
+  /// Where devices that stand far off were found, one per device, or empty: none. Their moves begin
+  /// there, since steps from where the rig has them may not lead so far.
+  RigCorrection start;
+  RefineRigOptions refine;  ///< its deviations, loss and the fewest crossings
 };
 
 struct MovedDevices {
