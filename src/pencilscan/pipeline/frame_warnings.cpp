@@ -126,7 +126,8 @@ Warning naming_warning(const std::string& doubt) {
   return {WarningCode::kNamesDoubtful,
           doubt +
               ": a device stands farther from where the rig has it than this frame can tell, "
-              "or shows or sees something else; rig check --frames looks at several frames"};
+              "shows or sees something else, or a dark pattern on the object cuts its lines into "
+              "pieces; rig check --frames looks at several frames"};
 }
 
 Warning rig_warning(const CrossingDisagreement& crossings, RigInFrame rig_in_frame) {

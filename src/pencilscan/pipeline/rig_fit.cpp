@@ -96,7 +96,8 @@ std::string verdict_text(const RigFit& fit) {
       if (!fit.doubt.empty()) {
         return fit.doubt +
                ": what has no name, or a wrong one, stands farther from where the rig has it than "
-               "crossings can tell, or its picture is another's; " +
+               "crossings can tell, its picture is another's, or a dark pattern on the object cuts "
+               "its lines into pieces; " +
                misses;
       }
       return misses +
