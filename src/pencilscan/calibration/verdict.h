@@ -34,10 +34,10 @@ struct VerdictOptions {
   double usable_focal_sigma = 0.05;
   double good_volume_sigma = 0.002;  ///< of a point, over the radius of what was measured
   double usable_volume_sigma = 0.03;
-  /// Of lengths in the volume. A scale that is off by a share moves points on the edge of the
-  /// volume by that share of its radius, so it is good_volume_sigma. Never unusable: a rig without
-  /// any scale measures shapes as well.
-  double good_scale_sigma = 0.002;
+  /// Of lengths in the volume: what a tape between lenses is good to (nobody sees their pupils,
+  /// which are centimetres deep). Beyond it, the rig's shape makes the scale worse than the tape
+  /// does. Never unusable: a rig without any scale measures shapes as well.
+  double good_scale_sigma = 0.025;
   double low_inlier_share = 0.7;  ///< of a pair
   double trend_px = 0.15;         ///< mean error in a part of the image
 };
