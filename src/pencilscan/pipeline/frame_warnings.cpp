@@ -269,7 +269,7 @@ std::optional<Warning> little_light_warning(const FrameResult& result) {
   if (!lacks_much(result.points.warnings) && !lacks_much(result.shape.surface.report.warnings))
     return std::nullopt;
   // A ball before two rings: of albedo .8 with the sensor presets medium and high 60, 36, 27 and
-  // 16; of albedo .02 to .05 where more than half of the surface is lost, 6 to 10.
+  // 16; of albedo .02 to .05 where more than half of the surface is lost, 5 to 7.
   constexpr double kFaint = 10;
   const double ratio = signal_to_noise(result.points);
   if (ratio == 0 || ratio > kFaint) return std::nullopt;
