@@ -44,18 +44,24 @@ cv::Mat flat_board(int cell) {
   return image;
 }
 
-TEST(Board, CornersAreFoundToATenthOfAPixelUnderPerspective) {
-  constexpr int kCell = 40;
-  const cv::Matx33d view(0.9, 0.2, 60, -0.1, 0.8, 90, 2e-4, 3e-4, 1);
+constexpr int kSeenCell = 40;
+const cv::Matx33d kView(0.9, 0.2, 60, -0.1, 0.8, 90, 2e-4, 3e-4, 1);
+
+/// The board in perspective, blurred; cells of kSeenCell are seen by kView.
+cv::Mat seen_board() {
   cv::Mat image;
-  cv::warpPerspective(flat_board(kCell), image, view, {640, 480}, cv::INTER_AREA);
+  cv::warpPerspective(flat_board(kSeenCell), image, kView, {640, 480}, cv::INTER_AREA);
   cv::GaussianBlur(image, image, {}, 0.8);
-  const std::vector<BoardCorner> corners = find_board(0.4 * image, kBoard);
+  return image;
+}
+
+TEST(Board, CornersAreFoundToATenthOfAPixelUnderPerspective) {
+  const std::vector<BoardCorner> corners = find_board(0.4 * seen_board(), kBoard);
   ASSERT_EQ(corners.size(), 63U);
   double sum = 0;
   for (std::size_t i = 0; i < corners.size(); ++i) {
-    const cv::Vec3d x = view * cv::Vec3d((static_cast<double>(i % 9) + 2) * kCell - 0.5,
-                                         (static_cast<double>(i / 9) + 2) * kCell - 0.5, 1);
+    const cv::Vec3d x = kView * cv::Vec3d((static_cast<double>(i % 9) + 2) * kSeenCell - 0.5,
+                                          (static_cast<double>(i / 9) + 2) * kSeenCell - 0.5, 1);
     const Vec2 truth(x[0] / x[2], x[1] / x[2]);
     // From either end: the board is the same upside down.
     sum += std::min((corners[i].pixel - truth).norm(), (corners[62 - i].pixel - truth).norm());
@@ -66,11 +72,7 @@ TEST(Board, CornersAreFoundToATenthOfAPixelUnderPerspective) {
 
 /// OpenCV finds a part of it, or every other row.
 TEST(Board, ALargerBoardThanStatedIsNone) {
-  constexpr int kCell = 40;
-  const cv::Matx33d view(0.9, 0.2, 60, -0.1, 0.8, 90, 2e-4, 3e-4, 1);
-  cv::Mat image;
-  cv::warpPerspective(flat_board(kCell), image, view, {640, 480}, cv::INTER_AREA);
-  cv::GaussianBlur(image, image, {}, 0.8);
+  cv::Mat image = seen_board();
   cv::Mat noise(image.size(), CV_32F);
   cv::RNG(1).fill(noise, cv::RNG::NORMAL, 0, 0.02);
   image = 0.4 * image + noise;

@@ -76,24 +76,17 @@ Similarity similarity_of(const GivenCenters& centers) {
   return {scale, {S.block<3, 3>(0, 0) / scale, S.block<3, 1>(0, 3)}};
 }
 
-/// By how much, as a logarithm, two measured scales may differ that are both right. A tape between
-/// lenses is good to some 2.5 %: nobody sees their pupils, which are centimetres deep.
-constexpr double kMeasured = 0.05;
+/// By how much, as a logarithm, two measured scales may differ that are both right.
+constexpr double kMeasured = 2 * kTapeDeviation;
 
-/// The same of a measured scale and given poses.
-/// Poses that were measured alike err by as much. Rough ones miss the solution: the scale of n
-/// poses has the deviation of a coordinate, which 3 n - 7 surplus numbers show, over the poses'
-/// spread.
+/// The same of a measured scale and given poses. Poses that were measured alike err by as much;
+/// rough ones miss the solution.
 double scale_tolerance(const GivenCenters& centers, const Similarity& given_from_found) {
   constexpr double kDeviations = 3;
   const auto& [scale, motion] = given_from_found;
   const Eigen::Matrix3Xd moved =
       (scale * motion.rotation * centers.found).colwise() + motion.translation;
-  const Vec3 middle = centers.given.rowwise().mean();
-  const double misses = (moved - centers.given).norm();
-  const double spread = (centers.given.colwise() - middle).norm();
-  const double freedom = 3 * static_cast<double>(centers.given.cols()) - 7;
-  return kMeasured + kDeviations * misses / (std::sqrt(freedom) * spread);
+  return kMeasured + kDeviations * pose_scale_deviation(moved, centers.given);
 }
 
 /// What the known distance makes of the solution's lengths; nothing without one.
@@ -153,6 +146,14 @@ void move_solution(double scale, const RigidTransform& new_from_old, BundleProbl
     const RigidTransform old = transform_from(pose);
     pose = pose_from({new_from_old.rotation * old.rotation, moved(old.translation)});
   }
+}
+
+double pose_scale_deviation(const Eigen::Matrix3Xd& found, const Eigen::Matrix3Xd& given) {
+  const Vec3 middle = given.rowwise().mean();
+  const double misses = (found - given).norm();
+  const double spread = (given.colwise() - middle).norm();
+  const double freedom = 3 * static_cast<double>(given.cols()) - 7;
+  return misses / (std::sqrt(freedom) * spread);
 }
 
 FixedFrame fix_frame(const CalibrationInput& input, BundleProblem& problem) {

@@ -4,6 +4,16 @@
 
 namespace pencilscan {
 
+/// Deviation of a distance that a tape measures between lenses, as a share: nobody sees their
+/// pupils, which are centimetres deep.
+inline constexpr double kTapeDeviation = 0.025;
+
+/// Deviation of the scale of n given poses, as a share: that of a coordinate, which 3 n - 7 surplus
+/// numbers show, over the poses' spread. Centres of devices, as found in the given frame and as
+/// given; n >= 3.
+[[nodiscard]] double pose_scale_deviation(const Eigen::Matrix3Xd& found,
+                                          const Eigen::Matrix3Xd& given);
+
 /// Moves the solution by a similarity: x_new = scale * rotation * x + translation.
 void move_solution(double scale, const RigidTransform& new_from_old, BundleProblem& problem);
 

@@ -5,6 +5,7 @@
 
 #include "pencilscan/bundle/board_corners.h"
 #include "pencilscan/bundle/bundle_device.h"
+#include "pencilscan/calibration/rig_frame.h"
 
 namespace pencilscan {
 namespace {
@@ -29,24 +30,6 @@ double share_if_exact(const BundleProblem& problem, const Uncertainty& uncertain
   return std::sqrt(std::max(0.0, change.dot(uncertainty.size_and_centers * change)));
 }
 
-/// Deviation of the scale of n given poses: that of a coordinate, which 3 n - 7 surplus numbers
-/// show, over the poses' spread.
-double share_of_poses(const CalibrationInput& input, const BundleProblem& problem,
-                      std::span<const std::size_t> devices) {
-  Vec3 middle = Vec3::Zero();
-  for (const std::size_t d : devices)
-    middle += device_at(input.rig, d).center() / static_cast<double>(devices.size());
-  double misses = 0;
-  double spread = 0;
-  for (const std::size_t d : devices) {
-    const Vec3 given = device_at(input.rig, d).center();
-    misses += (center_of(problem.devices[d]) - given).squaredNorm();
-    spread += (given - middle).squaredNorm();
-  }
-  const double freedom = 3 * static_cast<double>(devices.size()) - 7;
-  return std::sqrt(misses / (freedom * spread));
-}
-
 }  // namespace
 
 std::optional<ScaleDeviation> scale_deviation(const CalibrationInput& input,
@@ -69,8 +52,15 @@ std::optional<ScaleDeviation> scale_deviation(const CalibrationInput& input,
   for (std::size_t d = 0; d < problem.devices.size(); ++d)
     if (is_present(d) && input.known[d].pose) devices.push_back(d);
   if (devices.size() < 3) return std::nullopt;
-  const double share = std::hypot(share_if_exact(problem, uncertainty, devices),
-                                  share_of_poses(input, problem, devices));
+  Eigen::Matrix3Xd found(3, devices.size());
+  Eigen::Matrix3Xd given(3, devices.size());
+  for (std::size_t i = 0; i < devices.size(); ++i) {
+    const auto column = static_cast<Eigen::Index>(i);
+    found.col(column) = center_of(problem.devices[devices[i]]);
+    given.col(column) = device_at(input.rig, devices[i]).center();
+  }
+  const double share =
+      std::hypot(share_if_exact(problem, uncertainty, devices), pose_scale_deviation(found, given));
   return ScaleDeviation{From::kPoses, devices, share};
 }
 

@@ -5,6 +5,7 @@
 
 #include "pencilscan/bundle/uncertainty.h"
 #include "pencilscan/calibration/calibrate.h"
+#include "pencilscan/calibration/rig_frame.h"
 
 namespace pencilscan {
 
@@ -34,10 +35,9 @@ struct VerdictOptions {
   double usable_focal_sigma = 0.05;
   double good_volume_sigma = 0.002;  ///< of a point, over the radius of what was measured
   double usable_volume_sigma = 0.03;
-  /// Of lengths in the volume: what a tape between lenses is good to (nobody sees their pupils,
-  /// which are centimetres deep). Beyond it, the rig's shape makes the scale worse than the tape
-  /// does. Never unusable: a rig without any scale measures shapes as well.
-  double good_scale_sigma = 0.025;
+  /// Of lengths in the volume. Beyond it, the rig's shape makes the scale worse than a tape does.
+  /// Never unusable: a rig without any scale measures shapes as well.
+  double good_scale_sigma = kTapeDeviation;
   double low_inlier_share = 0.7;  ///< of a pair
   double trend_px = 0.15;         ///< mean error in a part of the image
 };

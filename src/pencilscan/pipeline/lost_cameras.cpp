@@ -15,6 +15,7 @@
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/joint/joint.h"
 #include "pencilscan/pipeline/naming_doubt.h"
+#include "pencilscan/pipeline/seen_depths.h"
 #include "pencilscan/points/settle.h"
 #include "pencilscan/points/triangulate.h"
 #include "pencilscan/rig/object_space.h"
@@ -145,10 +146,7 @@ std::vector<PlaceOfLine> places_of_lines(const Rig& rig, std::span<const FrameCu
       const auto family = static_cast<std::size_t>(family_of(families, ref));
       const LinePattern& lines = rig.projectors[p.projector].patterns[p.pattern];
       const Vec3 x = position_of(p);
-      // A surface that one device sees and another one lights faces about the middle of them.
-      const Vec3 facing = (rig.cameras[p.camera].center() - x).normalized() +
-                          (rig.projectors[p.projector].center() - x).normalized();
-      if (facing.normalized().dot((center - x).normalized()) < kLeastCosine) continue;
+      if (about_facing(rig, p).dot((center - x).normalized()) < kLeastCosine) continue;
       const int color =
           families[family].color_of_symbol(lines)[static_cast<std::size_t>(lines.symbol(p.line))];
       places.push_back({x, family, layer + family, bit_of(color)});
@@ -367,9 +365,7 @@ std::string contradiction_text(const std::string& camera) {
 std::vector<FoundCamera> find_lost_cameras(const Rig& rig, std::span<const FrameCurves> frames,
                                            std::span<const Labeling> labelings,
                                            const CameraSearchOptions& options) {
-  NamingDoubt doubt(rig);
-  for (std::size_t f = 0; f < frames.size(); ++f)
-    doubt.add(frames[f].families, frames[f].graphs, labelings[f]);
+  const NamingDoubt doubt = naming_doubt(rig, frames, labelings);
   if (const std::vector<std::size_t> lost = doubt.cameras(); !lost.empty())
     return found_by_others(rig, frames, lost, options);
   // Of two that contradict each other either may be wrong: only the wrong one is found elsewhere.

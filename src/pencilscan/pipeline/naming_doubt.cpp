@@ -117,4 +117,12 @@ std::string NamingDoubt::text() const {
   return text;
 }
 
+NamingDoubt naming_doubt(const Rig& rig, std::span<const FrameCurves> frames,
+                         std::span<const Labeling> labelings) {
+  NamingDoubt doubt(rig);
+  for (std::size_t f = 0; f < frames.size(); ++f)
+    doubt.add(frames[f].families, frames[f].graphs, labelings[f]);
+  return doubt;
+}
+
 }  // namespace pencilscan

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "pencilscan/pipeline/line_naming.h"
+#include "pencilscan/pipeline/rig_refinement.h"
 #include "pencilscan/refinement/shown_colors.h"
 
 namespace pencilscan {
@@ -46,5 +47,9 @@ class NamingDoubt {
   std::vector<TellingPoints> devices_;  ///< cameras, then projectors: in the colours of each
   ShownColorCount colors_;
 };
+
+/// What the names of several frames say, a labeling per frame. The rig must outlive it.
+[[nodiscard]] NamingDoubt naming_doubt(const Rig& rig, std::span<const FrameCurves> frames,
+                                       std::span<const Labeling> labelings);
 
 }  // namespace pencilscan

@@ -21,8 +21,6 @@ using nlohmann::ordered_json;
 
 /// Labels of frames, and what their crossings and names say.
 struct NamedCrossings {
-  explicit NamedCrossings(const Rig& rig) : doubt(rig) {}
-
   std::vector<CrossingTrack> tracks;
   double labelled_share = 0;
   NamingDoubt doubt;
@@ -43,13 +41,12 @@ std::vector<Labeling> labels_of(const Rig& rig, std::span<const FrameCurves> fra
 
 NamedCrossings named_crossings(const Rig& rig, std::span<const FrameCurves> frames,
                                std::span<const Labeling> labelings) {
-  NamedCrossings result(rig);
+  NamedCrossings result{{}, 0, naming_doubt(rig, frames, labelings)};
   std::size_t points = 0;
   std::size_t labelled = 0;
   for (std::size_t f = 0; f < frames.size(); ++f) {
     auto tracks = crossing_tracks(rig, frames[f].graphs, labelings[f]);
     std::move(tracks.begin(), tracks.end(), std::back_inserter(result.tracks));
-    result.doubt.add(frames[f].families, frames[f].graphs, labelings[f]);
     labelled += labelled_points(labelings[f]);
     for (const GridGraph& graph : frames[f].graphs) points += curve_points(graph);
   }
@@ -120,12 +117,6 @@ std::string verdict_text(const RigFit& fit) {
   return {};
 }
 
-Rig with_moved(const Rig& rig, std::span<const DeviceMove> moved) {
-  RigCorrection correction(device_count(rig));
-  for (const DeviceMove& move : moved) correction[move.device] = move.correction;
-  return corrected_rig(rig, correction);
-}
-
 bool are_alike(std::span<const DeviceMove> a, std::span<const DeviceMove> b, double shift_px) {
   return std::is_permutation(
       a.begin(), a.end(), b.begin(), b.end(), [&](const DeviceMove& x, const DeviceMove& y) {
@@ -139,6 +130,7 @@ struct Explanation {
   NamedCrossings named;
   MovedDevices found;
   Rig put_back;
+  std::vector<CrossingDisagreement> left;  ///< per device, with the rig put back
   std::string contradicted;  ///< a camera that measures what the others do not; empty: none
 
   [[nodiscard]] bool is_doubtful() const {
@@ -148,12 +140,12 @@ struct Explanation {
 
 Explanation explanation_of(const Rig& rig, std::span<const FrameCurves> frames,
                            std::vector<Labeling> labelings, const MovedDevicesOptions& options) {
-  Explanation result{std::move(labelings), NamedCrossings(rig), {}, {}, {}};
-  result.named = named_crossings(rig, frames, result.labelings);
-  result.found = find_moved_devices(rig, result.named.tracks, options);
-  result.put_back = with_moved(rig, result.found.moved);
-  result.contradicted = contradicted_camera(result.put_back, frames, result.labelings);
-  return result;
+  NamedCrossings named = named_crossings(rig, frames, labelings);
+  MovedDevices found = find_moved_devices(rig, named.tracks, options);
+  Rig put_back = corrected_rig(rig, correction_of(found.moved, device_count(rig)));
+  auto left = device_disagreements(put_back, named.tracks);
+  return {std::move(labelings), std::move(named), std::move(found),
+          std::move(put_back),  std::move(left),  {}};
 }
 
 /// Looks what moved by the first names, then names lines with that put back, and so on, as long as
@@ -162,9 +154,14 @@ Explanation explanation_of(const Rig& rig, std::span<const FrameCurves> frames,
 Explanation explain(const Rig& rig, std::span<const FrameCurves> frames,
                     std::vector<Labeling> first_labels, const MovedDevicesOptions& options) {
   constexpr int kMostRounds = 4;
-  Explanation best = explanation_of(rig, frames, std::move(first_labels), options);
+  const auto explanation = [&](std::vector<Labeling> labelings) {
+    Explanation result = explanation_of(rig, frames, std::move(labelings), options);
+    result.contradicted = contradicted_camera(result.put_back, frames, result.labelings);
+    return result;
+  };
+  Explanation best = explanation(std::move(first_labels));
   for (int round = 1; round < kMostRounds && !best.found.moved.empty(); ++round) {
-    Explanation next = explanation_of(rig, frames, labels_of(best.put_back, frames), options);
+    Explanation next = explanation(labels_of(best.put_back, frames));
     const bool stays = are_alike(next.found.moved, best.found.moved, options.smallest_px);
     if (next.named.labelled_share < best.named.labelled_share ||
         next.found.moved.size() > best.found.moved.size() ||
@@ -207,9 +204,9 @@ RigFit check_rig_on_frames(const Rig& stated, std::span<const FrameCurves> frame
   const double unit = footprint(stated);
   const Rig rig = with_registered_patterns(scaled(stated, 1 / unit));
   Explanation explained = explain(rig, frames, labels_of(rig, frames), options);
-  const auto left = device_disagreements(explained.put_back, explained.named.tracks);
-  if (explained.is_doubtful() || device_that_is_off(left)) {
-    // All frames together, and colours, may tell where a device stands.
+  if (explained.is_doubtful() || device_that_is_off(explained.left)) {
+    // All frames together, and colours, may tell where a device stands. A refined rig has no camera
+    // that the others contradict, or it is refused.
     RigRefinementOptions refinement;
     refinement.refine.max_remaining = std::numeric_limits<double>::infinity();
     RigRefinement refined = refine_rig_on_frames(rig, frames, refinement);
@@ -217,7 +214,6 @@ RigFit check_rig_on_frames(const Rig& stated, std::span<const FrameCurves> frame
       MovedDevicesOptions from_found = options;
       from_found.start = std::move(refined.found);
       Explanation again = explanation_of(rig, frames, std::move(refined.labelings), from_found);
-      again.contradicted.clear();  // a refined rig has no such camera, or it is refused
       if (!again.is_doubtful()) explained = std::move(again);
     }
   }
@@ -230,9 +226,8 @@ RigFit check_rig_on_frames(const Rig& stated, std::span<const FrameCurves> frame
   fit.before = crossing_disagreement(rig, named.tracks);
   fit.after = crossing_disagreement(explained.put_back, named.tracks);
   fit.doubt = named.doubt.text();
-  const auto per_device_after = device_disagreements(explained.put_back, named.tracks);
-  if (const auto d = device_that_is_off(per_device_after); d && fit.doubt.empty()) {
-    fit.doubt = misses_text(device_at(rig, *d), per_device_after[*d]) +
+  if (const auto d = device_that_is_off(explained.left); d && fit.doubt.empty()) {
+    fit.doubt = misses_text(device_at(rig, *d), explained.left[*d]) +
                 ", and putting devices back does not help";
   }
   if (fit.doubt.empty() && !explained.contradicted.empty())

@@ -62,11 +62,8 @@ void put_back_few(const Rig& calibrated, std::span<const CrossingTrack> tracks, 
   const MovedDevices found = find_moved_devices(calibrated, tracks);
   const std::size_t devices = device_count(calibrated);
   if (found.moved.empty() || kFewOf * found.moved.size() > devices) return;
-  attempt.correction.assign(devices, PoseCorrection{});
-  for (const DeviceMove& move : found.moved) {
-    attempt.correction[move.device] = move.correction;
-    attempt.moved.push_back(move.device);
-  }
+  attempt.correction = correction_of(found.moved, devices);
+  for (const DeviceMove& move : found.moved) attempt.moved.push_back(move.device);
 }
 
 /// Labels and refines in turn, from a first tolerance down to the last one.
@@ -114,9 +111,7 @@ std::string objection(std::span<const FrameCurves> frames, const Attempt& attemp
                       bool is_for_rig) {
   const Rig& rig = attempt.refinement.rig;
   const std::vector<Labeling>& labelings = attempt.refinement.labelings;
-  NamingDoubt doubt(rig);
-  for (std::size_t f = 0; f < frames.size(); ++f)
-    doubt.add(frames[f].families, frames[f].graphs, labelings[f]);
+  const NamingDoubt doubt = naming_doubt(rig, frames, labelings);
   if (const std::string denied = doubt.denied(); !denied.empty())
     return "the colours of " + denied + " speak against its lines' names";
   if (const std::string camera = contradicted_camera(rig, frames, labelings); !camera.empty())

@@ -67,10 +67,9 @@ struct AxesCheck {
   double angle_rad = 0;    ///< between the axes, 0..pi/2
   double distance_mm = 0;  ///< between the axes
   double skewness = 0;
-  bool same_color = false;  ///< some colour is in both
-  std::size_t shared = 0;   ///< (camera, sample) that show both
-  double crossing_share =
-      0;  ///< of `shared`: crossing at a wide angle, each tells the other's apart
+  bool same_color = false;    ///< some colour is in both
+  std::size_t shared = 0;     ///< (camera, sample) that show both
+  double crossing_share = 0;  ///< of `shared`: wide crossings where each tells the other's apart
   double parallel_share = 0;  ///< of `shared`: crossing at less than min_crossing_rad
 };
 

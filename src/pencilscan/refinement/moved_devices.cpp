@@ -217,4 +217,10 @@ MovedDevices find_moved_devices(const Rig& rig, std::span<const CrossingTrack> t
   }
 }
 
+RigCorrection correction_of(std::span<const DeviceMove> moves, std::size_t devices) {
+  RigCorrection correction(devices);
+  for (const DeviceMove& move : moves) correction[move.device] = move.correction;
+  return correction;
+}
+
 }  // namespace pencilscan

@@ -50,4 +50,7 @@ struct MovedDevices {
 [[nodiscard]] MovedDevices find_moved_devices(const Rig& rig, std::span<const CrossingTrack> tracks,
                                               const MovedDevicesOptions& options = {});
 
+/// The rig's correction in which these devices are put back; `devices`: of the rig.
+[[nodiscard]] RigCorrection correction_of(std::span<const DeviceMove> moves, std::size_t devices);
+
 }  // namespace pencilscan
