@@ -24,8 +24,25 @@ constexpr double kMostWidth = (kLanes - 2) / (2 * kNodeReach);
 
 /// What the nodes of rows of one view say of a vertex, eight at once.
 struct Prediction {
-  std::array<float, kLanes> height;  ///< along the vertex normal
-  std::array<float, kLanes> weight;  ///< 0: nothing
+  std::array<float, kLanes> height;    ///< along the vertex normal
+  std::array<float, kLanes> bell;      ///< over the distance in the image; 0: nothing
+  std::array<float, kLanes> variance;  ///< of the height, > 0
+  std::array<float, kLanes> bend2;     ///< height of the cubic bend that its normal shows, squared
+  std::array<float, kLanes> weight;    ///< 0: nothing
+};
+
+/// Where a view's nodes stand around a pixel: sums of their bells, of those times the ways to them,
+/// and times the ways squared; nodes.
+struct Stand {
+  float bells = 0;
+  float right = 0;
+  float down = 0;
+  float apart2 = 0;
+
+  /// 0: on all sides alike; 1: all at one place beside the pixel.
+  [[nodiscard]] float one_sided() const {
+    return apart2 > 0 ? (right * right + down * down) / (bells * apart2) : 0;
+  }
 };
 
 /// What the arithmetic of a row needs, of the vertex and of its pixel.
@@ -46,11 +63,12 @@ struct NodeRow {
   const float *w, *wx, *wy, *wxx, *wxy, *wyy, *sigma;
 };
 
-/// Heights of the nodes' quadrics over a place which is `right` and `down` nodes beyond them, along
-/// the place's normal, and the inverses of their variances times a bell of the distance. Returns
-/// the sum of the bells.
+/// Heights of the nodes' surfaces over a place which is `right` and `down` nodes beyond them, along
+/// the place's normal. A node's surface is the paraboloid over its tangent plane that has the
+/// curvature of its quadric of inverse depth there: carried on towards an outline, that quadric
+/// itself turns away less than a ball does.
 PENCILSCAN_CLONES void predict_row(const NodeRow& row, const Place& at, float right, float down,
-                                   Prediction& prediction, float& bells) {
+                                   Prediction& prediction, Stand& stand) {
   constexpr auto kLeastCosine2 = static_cast<float>(kGrazing * kGrazing);
   constexpr auto kRelief2 = static_cast<float>(kRelief * kRelief);
   Lanes w, wx, wy, wxx, wxy, wyy, sigma;
@@ -67,30 +85,73 @@ PENCILSCAN_CLONES void predict_row(const NodeRow& row, const Place& at, float ri
   const Lanes dx = nodes * at.stride;
   const float dy = down * at.stride;
   IntLanes there = (w > 0) & (apart2 <= at.reach2);
-  // w = omega . (x, y, 1) over normalised pixels: the normal towards the camera is -omega.
-  const Lanes x = (wx + wxx * dx + wxy * dy) * at.focal[0];
-  const Lanes y = (wy + wxy * dx + wyy * dy) * at.focal[1];
-  w += wx * dx + wy * dy + 0.5F * (wxx * dx * dx + wyy * dy * dy) + wxy * dx * dy;
-  const Lanes z = w - x * at.ray[0] - y * at.ray[1];
+  // At the node: omega . (x, y, 1) = w over normalised pixels, and -omega is normal to the surface.
+  const Lanes x0 = at.ray[0] - dx / at.focal[0];
+  const float y0 = at.ray[1] - dy / at.focal[1];
+  const Lanes gx = wx * at.focal[0];
+  const Lanes gy = wy * at.focal[1];
+  const Lanes gz = w - x0 * gx - y0 * gy;
+  const Lanes inverse2 = 1 / (gx * gx + gy * gy + gz * gz);
+  // The way from the node to the place, and its part along the tangent plane.
+  const Lanes depth = 1 / w;
+  const Lanes beyond = at.depth - depth;
+  const Lanes from_x = at.ray[0] * beyond + depth * dx / at.focal[0];
+  const Lanes from_y = at.ray[1] * beyond + depth * dy / at.focal[1];
+  const Lanes off = gx * from_x + gy * from_y + gz * beyond;
+  const Lanes lift = off * inverse2;
+  const Lanes along_z = beyond - lift * gz;
+  const Lanes qx = from_x - lift * gx - x0 * along_z;
+  const Lanes qy = from_y - lift * gy - y0 * along_z;
+  const Lanes hx = w * at.focal[0] * (wxx * at.focal[0] * qx + wxy * at.focal[1] * qy);
+  const Lanes hy = w * at.focal[1] * (wxy * at.focal[0] * qx + wyy * at.focal[1] * qy);
+  const Lanes hz = -(x0 * hx + y0 * hy);
+  const Lanes turn = (gx * hx + gy * hy + gz * hz) * inverse2;
+  const Lanes x = gx + hx - turn * gx;
+  const Lanes y = gy + hy - turn * gy;
+  const Lanes z = gz + hz - turn * gz;
   const Lanes length2 = x * x + y * y + z * z;
   // Cosine to the place's normal times the length.
   const Lanes along = -(x * at.normal[0] + y * at.normal[1] + z * at.normal[2]);
-  there &= (w > 0) & (along > 0) & (along * along >= 0.25F * length2);
-  // The ray meets the surface at 1 / w: omega . ray = w.
-  const Lanes height = (w * at.depth - 1) / along;
+  there &= (along > 0) & (along * along >= 0.25F * length2);
+  const Lanes height = (off + 0.5F * (hx * qx + hy * qy)) / along;
+  const Lanes toward = x * at.ray[0] + y * at.ray[1] + z;
   there &= (height < at.farthest) & (height > -at.farthest);
-  Lanes cosine2 = w * w / (at.ray2 * length2);
+  Lanes cosine2 = toward * toward / (at.ray2 * length2);
   cosine2 = cosine2 > kLeastCosine2 ? cosine2 : cosine2 - cosine2 + kLeastCosine2;
   Lanes bell;
   exponential(-apart2 * at.inverse_width2, bell);
   // A window covers more of a slanted surface: its relief counts more.
-  const Lanes weight = bell / (sigma * sigma * cosine2 + kRelief2 / cosine2);
+  const Lanes variance = sigma * sigma * cosine2 + kRelief2 / cosine2;
+  // A cubic bend that the paraboloid lacks is a third of its own slope times the way.
+  const Lanes way2 = from_x * from_x + from_y * from_y + beyond * beyond - off * lift;
+  const Lanes bend2 = way2 * (length2 / (along * along) - 1) / 9;
   const Lanes none{};
-  store(there ? height : none, prediction.height.data());
-  store(there ? weight : none, prediction.weight.data());
   const Lanes counted = there ? bell : none;
-  bells = 0;
-  for (int k = 0; k < kLanes; ++k) bells += counted[k];
+  store(there ? height : none, prediction.height.data());
+  store(counted, prediction.bell.data());
+  store(there ? variance : none + 1, prediction.variance.data());
+  store(there ? bend2 : none, prediction.bend2.data());
+  const Lanes to_right = counted * nodes;
+  const Lanes to_all = counted * apart2;
+  stand = {};
+  for (int k = 0; k < kLanes; ++k) {
+    stand.bells += counted[k];
+    stand.right += to_right[k];
+    stand.apart2 += to_all[k];
+  }
+  stand.down = stand.bells * down;
+}
+
+/// Weights of a view's predictions. Cubic bends of nodes on opposite sides cancel, those of nodes
+/// on one side do not.
+PENCILSCAN_CLONES void weigh(Prediction* predictions, std::size_t count, float one_sided) {
+  for (std::size_t i = 0; i < count; ++i) {
+    Lanes bell, variance, bend2;
+    load(predictions[i].bell.data(), bell);
+    load(predictions[i].variance.data(), variance);
+    load(predictions[i].bend2.data(), bend2);
+    store(bell / (variance + one_sided * bend2), predictions[i].weight.data());
+  }
 }
 
 /// Weighted mean, reweighted against predictions of another surface or of slipped nodes.
@@ -159,20 +220,25 @@ class NodeView {
     const int column = static_cast<int>(std::ceil(at[0] - reach_));
     const int first = std::max(0, static_cast<int>(std::ceil(at[1] - reach_)));
     const int last = std::min(rows_ - 1, static_cast<int>(std::floor(at[1] + reach_)));
-    float bells = 0;
+    const std::size_t before = predictions.size();
+    Stand stand;
     for (int row = first; row <= last; ++row) {
       const std::size_t k = index(row, column);
       const NodeRow nodes{&planes_[0][k], &planes_[1][k], &planes_[2][k], &planes_[3][k],
                           &planes_[4][k], &planes_[5][k], &planes_[6][k]};
       Prediction prediction;
-      float of_row = 0;
+      Stand of_row;
       predict_row(nodes, place, static_cast<float>(at[0] - column), static_cast<float>(at[1] - row),
                   prediction, of_row);
-      if (!(of_row > 0)) continue;
+      if (!(of_row.bells > 0)) continue;
       predictions.push_back(prediction);
-      bells += of_row;
+      stand.bells += of_row.bells;
+      stand.right += of_row.right;
+      stand.down += of_row.down;
+      stand.apart2 += of_row.apart2;
     }
-    return bells;
+    weigh(predictions.data() + before, predictions.size() - before, stand.one_sided());
+    return stand.bells;
   }
 
  private:
