@@ -23,8 +23,9 @@ namespace {
 
 using Eigen::Vector2f;
 
-constexpr int kPlaceCellPx = 8;  ///< px, of what is found by place
-constexpr int kNearCellPx = 3;   ///< px, of what is looked for within a pixel or two
+constexpr int kPlaceCellPx = 8;         ///< px, of what is found by place
+constexpr int kNearCellPx = 3;          ///< px, of what is looked for within a pixel or two
+constexpr float kSameDirection = 0.9F;  ///< cosine between a curve and a predicted line
 
 struct KnownPoint {
   Vector2f position;
@@ -44,6 +45,11 @@ struct NamedPlace {
   LineName name;
 };
 
+struct ShownPoint {
+  const CurvePoint* point;
+  int family;
+};
+
 /// Guided matching in one camera.
 class CameraMatching {
  public:
@@ -59,6 +65,8 @@ class CameraMatching {
   void confirm_tentative();
   /// Gives undecided stretches of curves the predicted line they lie on.
   void adopt_curves();
+  /// Names lines that lie on curves of other projectors, where the light is that of all.
+  void name_shared();
   /// Fits what is still missing to what the known curves leave of the presence images.
   void find_missing();
   /// Where colours denied a dense surface in the last pass.
@@ -70,6 +78,7 @@ class CameraMatching {
 
  private:
   void accept(std::vector<LabeledRun> news);
+  void append(std::vector<Curve> found);
   void grow_surface();
   [[nodiscard]] bool is_known(const PredictedPoint& p) const;
   template <class Visit>
@@ -81,6 +90,10 @@ class CameraMatching {
   [[nodiscard]] bool is_near(float across_px, const PredictedPoint& p) const {
     return across_px < options_.max_offset_px &&
            across_px < options_.max_offset_lines * p.spacing_px;
+  }
+  [[nodiscard]] float support_reach(float spacing_px) const {
+    return std::max(static_cast<float>(options_.support_px),
+                    static_cast<float>(options_.support_lines) * spacing_px);
   }
   [[nodiscard]] float color_margin(const Curve& curve, int begin, int end,
                                    const LineName& name) const;
@@ -94,6 +107,13 @@ class CameraMatching {
         curve, begin, end,
         CurveLabel{name.pattern, name.line, static_cast<double>(name.line), options_.confidence}};
   }
+  [[nodiscard]] std::optional<float> amplitude_around(const Vector2f& place, const LineName& name,
+                                                      float spacing_px) const;
+  [[nodiscard]] std::vector<LineName> others_at(const CurvePoint& point, int family,
+                                                const LineName& name) const;
+  [[nodiscard]] const CurvePoint* shown_at(const PredictedPoint& p, int family,
+                                           const Places<ShownPoint>& shown) const;
+  [[nodiscard]] bool is_lit_too(const CurvePoint& point, int family, const PredictedPoint& p) const;
   [[nodiscard]] Curve guess_of(const LineChain& chain) const;
 
   const Rig& rig_;
@@ -233,7 +253,6 @@ void CameraMatching::predict() {
 template <class Visit>
 void CameraMatching::aligned_predictions(const CurvePoint& point, Visit visit) const {
   constexpr float kAlong = 1.5F;  // px
-  constexpr float kSameDirection = 0.9F;
   constexpr float kWidest = 1.2F;
   const float across = 2 * static_cast<float>(options_.max_offset_px);  // what line_at() looks at
   missing_places_.around(point.position, std::hypot(across, kAlong), [&](const PredictedPoint& p) {
@@ -393,8 +412,7 @@ bool CameraMatching::fits(const CurvePoint& point, const LineName& name, int fam
   float spacing = 0;
   if (line_at(point, family, &spacing) != name) return false;
   std::vector<float> around;
-  const float reach = std::max(static_cast<float>(options_.support_px),
-                               static_cast<float>(options_.support_lines) * spacing);
+  const float reach = support_reach(spacing);
   known_.around(point.position, reach, [&](const KnownPoint& k) {
     if (k.pattern == name.pattern && std::abs(k.line - name.line) <= 1 &&
         (k.position - point.position).squaredNorm() < reach * reach)
@@ -402,6 +420,128 @@ bool CameraMatching::fits(const CurvePoint& point, const LineName& name, int fam
   });
   if (static_cast<int>(around.size()) < options_.min_support) return false;
   return point.amplitude > options_.min_amplitude * upper_median(std::move(around));
+}
+
+/// Amplitude of the two lines to either side of a named one, around a place; nothing where too few
+/// are known.
+std::optional<float> CameraMatching::amplitude_around(const Vector2f& place, const LineName& name,
+                                                      float spacing_px) const {
+  std::vector<float> around;
+  constexpr int kLines = 2;
+  const float reach = kLines * support_reach(spacing_px);
+  known_.around(place, reach, [&](const KnownPoint& k) {
+    const int lines = std::abs(k.line - name.line);
+    if (k.pattern == name.pattern && lines > 0 && lines <= kLines &&
+        (k.position - place).squaredNorm() < reach * reach)
+      around.push_back(k.amplitude);
+  });
+  if (static_cast<int>(around.size()) < options_.min_support) return std::nullopt;
+  return upper_median(std::move(around));
+}
+
+/// Lines of other patterns of the family at a point of a curve, named or predicted.
+std::vector<LineName> CameraMatching::others_at(const CurvePoint& point, int family,
+                                                const LineName& name) const {
+  std::vector<LineName> others;
+  const auto add = [&](const LineName& other) {
+    if (other.pattern != name.pattern && family_of(families_, other.pattern) == family &&
+        std::find(others.begin(), others.end(), other) == others.end())
+      others.push_back(other);
+  };
+  const auto reach = static_cast<float>(options_.max_offset_px);
+  known_names_.around(point.position, reach, [&](const NamedPlace& k) {
+    if ((k.position - point.position).squaredNorm() < reach * reach) add(k.name);
+  });
+  aligned_predictions(point, [&](const PredictedPoint& p, float across) {
+    if (is_near(across, p)) add({p.pattern, p.line});
+  });
+  return others;
+}
+
+/// The nearest point of a curve of the family on a predicted line; nullptr: none.
+const CurvePoint* CameraMatching::shown_at(const PredictedPoint& p, int family,
+                                           const Places<ShownPoint>& shown) const {
+  const auto reach = static_cast<float>(options_.max_offset_px);
+  float best = reach * reach;
+  const CurvePoint* nearest = nullptr;
+  shown.around(p.position, reach, [&](const ShownPoint& s) {
+    const float apart2 = (s.point->position - p.position).squaredNorm();
+    if (s.family != family || apart2 >= best || !is_near(std::sqrt(apart2), p) ||
+        s.point->sigma_px > options_.max_sigma_px ||
+        std::abs(s.point->normal.dot(p.normal)) < kSameDirection)
+      return;
+    best = apart2;
+    nearest = s.point;
+  });
+  return nearest;
+}
+
+/// True where a point of a curve, which lines of other patterns explain as well, is as bright as if
+/// a predicted line lay there too.
+bool CameraMatching::is_lit_too(const CurvePoint& point, int family,
+                                const PredictedPoint& p) const {
+  // Share of its light that must be there. A half would weigh both answers alike; but nine in ten
+  // predicted lines are there, and lines differ from those beside them by a third: 1/2 - ln 9 /
+  // 3^2.
+  constexpr float kLeastOwn = 0.25F;
+  const LineName name{p.pattern, p.line};
+  const auto own = amplitude_around(point.position, name, p.spacing_px);
+  if (!own) return false;
+  const std::vector<LineName> others = others_at(point, family, name);
+  float rest = point.amplitude;
+  for (const LineName& other : others) {
+    const auto of_other = amplitude_around(point.position, other, p.spacing_px);
+    if (!of_other) return false;
+    rest -= *of_other;
+  }
+  return !others.empty() && rest > kLeastOwn * *own;
+}
+
+/// Lines of two projectors with like colours that meet within a pixel or so make one curve, which
+/// has one name or none. What the lines beside it tell is whether the light of both is in it.
+void CameraMatching::name_shared() {
+  Places<ShownPoint> shown(camera_.width, camera_.height, kNearCellPx);
+  for (const Curve& curve : graph_.curves) {
+    for (const CurvePoint& p : curve.points) shown.add(p.position, {&p, curve.family});
+  }
+  std::erase_if(missing_, [&](const PredictedPoint& p) { return is_known(p); });
+  std::vector<LabeledRun> labeled;
+  std::vector<Curve> found;
+  for (const LineChain& chain : chain_points(missing_)) {
+    const LineName name{chain.front().pattern, chain.front().line};
+    const int family = family_of(families_, name.pattern);
+    std::vector<CurvePoint> points(chain.size());
+    std::vector<char> is_lit(chain.size(), 0);
+    for (std::size_t i = 0; i < chain.size(); ++i) {
+      const CurvePoint* point = shown_at(chain[i], family, shown);
+      if (point == nullptr || !is_lit_too(*point, family, chain[i])) continue;
+      is_lit[i] = 1;
+      points[i] = *point;
+      points[i].sigma_px =
+          std::hypot(point->sigma_px, (point->position - chain[i].position).norm());
+    }
+    for_each_stretch(is_lit, [&](int begin, int end) {
+      if (is_lit[static_cast<std::size_t>(begin)] == 0 || end - begin < options_.min_points) return;
+      const int index = static_cast<int>(graph_.curves.size() + found.size());
+      labeled.push_back(run_of(index, 0, end - begin, name));
+      Curve& curve = found.emplace_back();
+      curve.family = family;
+      curve.points.assign(points.begin() + begin, points.begin() + end);
+    });
+  }
+  append(std::move(found));
+  accept(std::move(labeled));
+}
+
+/// Curves that no image showed by themselves.
+void CameraMatching::append(std::vector<Curve> found) {
+  for (Curve& curve : found) {
+    const auto family = static_cast<std::size_t>(curve.family);
+    curve.code.assign(curve.points.size() * families_[family].colors.size(), 0.F);
+    graph_.curves.push_back(std::move(curve));
+    graph_.component_of_curve.push_back(-1);
+    if (!graph_.identities.empty()) graph_.identities.emplace_back();
+  }
 }
 
 /// A curve where a line is predicted, as wide as it would be there.
@@ -448,14 +588,9 @@ void CameraMatching::find_missing() {
       if (any) found.push_back(std::move(curve));
     }
   }
-  for (Curve& curve : found) {
-    const auto family = static_cast<std::size_t>(curve.family);
-    subtract_curve(curve, unexplained_[family]);
-    curve.code.assign(curve.points.size() * families_[family].colors.size(), 0.F);
-    graph_.curves.push_back(std::move(curve));
-    graph_.component_of_curve.push_back(-1);
-    if (!graph_.identities.empty()) graph_.identities.emplace_back();
-  }
+  for (const Curve& curve : found)
+    subtract_curve(curve, unexplained_[static_cast<std::size_t>(curve.family)]);
+  append(std::move(found));
   accept(std::move(labeled));
 }
 
@@ -479,6 +614,7 @@ std::vector<LocalSurface> match_guided(const Rig& rig, const std::vector<ColorFa
       look.confirm_tentative();
       look.adopt_curves();
       look.find_missing();
+      if (!dense.empty()) look.name_shared();
     }
     if (!look.denied().empty())
       drop_beside_denied(graphs[g], look.denied(), labeling.runs[camera],

@@ -275,6 +275,41 @@ TEST_F(LabeledScene, TentativeLabelIsConfirmedWhereTheSurfaceAgreesOnly) {
   EXPECT_EQ(label_of(bad), -1);
 }
 
+TEST_F(LabeledScene, ACurveThatTwoProjectorsLightHasTheNamesOfBoth) {
+  // A third projector stands where the first does, so its lines lie on the first one's.
+  rig.projectors.push_back(rig.projectors[0]);
+  rig.projectors[2].name = "proj2";
+  families = color_families(rig);
+  const std::size_t middle = middle_curve(0);
+  const std::size_t single = middle + 3;
+  const std::size_t count = graph_.curves.size();
+  const std::vector<MeasuredPoint> dense = points();
+  for (std::size_t k = 0; k < count; ++k) {
+    if (graph_.curves[k].family != 0 || k == middle || k == single) continue;
+    const int line = true_lines[0][k];
+    const int length = static_cast<int>(graph_.curves[k].points.size());
+    labeling_.runs[0].push_back({static_cast<int>(graph_.curves.size()), 0, length,
+                                 CurveLabel{{2, 0}, line, 1.0 * line, 1}});
+    graph_.curves.push_back(graph_.curves[k]);
+    graph_.component_of_curve.push_back(-1);
+    if (!graph_.identities.empty()) graph_.identities.emplace_back();
+  }
+  for (CurvePoint& p : graph_.curves[middle].points) p.amplitude *= 2;
+  const auto named = [&](std::size_t curve) {
+    int points = 0;
+    for (const LabeledRun& run : labeling_.runs[0]) {
+      if (run.label.pattern == PatternRef{2, 0} && run.label.line == true_lines[0][curve])
+        points += run.end - run.begin;
+    }
+    return static_cast<double>(points) / static_cast<double>(graph_.curves[curve].points.size());
+  };
+  match_guided(rig, families, std::vector<std::vector<cv::Mat>>(1), {&graph_, 1}, labeling_, {},
+               dense);
+  EXPECT_GT(named(middle), 0.8);
+  EXPECT_EQ(named(single), 0) << "no brighter than the lines of one projector beside it";
+  EXPECT_EQ(label_of(middle), true_lines[0][middle]);
+}
+
 TEST_F(LabeledScene, MissedLineIsFoundInTheImageWhereItIsAndNotWhereItIsDark) {
   std::vector<cv::Mat> presence;
   for (int f = 0; f < 2; ++f) {
