@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "pencilscan/pipeline/pose_search.h"
 #include "pencilscan/pipeline/rig_refinement.h"
 #include "pencilscan/pipeline/view_agreement.h"
 #include "pencilscan/refinement/correction.h"
@@ -21,11 +22,6 @@ struct FoundCamera {
   std::size_t camera = 0;
   PoseCorrection correction;
   double share = 0;  ///< of the places on lines that it should see, those that it does see
-};
-
-struct CameraSearchOptions {
-  double reach = 0.125;          ///< of the picture's longer side: how far it may be turned
-  double most_roll_degrees = 5;  ///< about the optical axis
 };
 
 /// What each camera's points, by the labels of all frames, say of those of the others.
@@ -45,6 +41,6 @@ struct CameraSearchOptions {
 [[nodiscard]] std::vector<FoundCamera> find_lost_cameras(const Rig& rig,
                                                          std::span<const FrameCurves> frames,
                                                          std::span<const Labeling> labelings,
-                                                         const CameraSearchOptions& options = {});
+                                                         const PoseSearchOptions& options = {});
 
 }  // namespace pencilscan
