@@ -23,6 +23,13 @@ RigidTransform corrected_pose(const Device& device, const PoseCorrection& correc
           turn * device.device_from_world.translation + correction.translation_mm};
 }
 
+PoseCorrection correction_to(const RigidTransform& pose, const Device& device) {
+  const Mat3 turn = pose.rotation * device.device_from_world.rotation.transpose();
+  const Eigen::AngleAxisd about(turn);
+  return {device.focal_px() * about.angle() * about.axis(),
+          pose.translation - turn * device.device_from_world.translation};
+}
+
 Rig corrected_rig(Rig rig, const RigCorrection& correction) {
   if (correction.empty()) return rig;
   PENCILSCAN_CHECK(correction.size() == device_count(rig));

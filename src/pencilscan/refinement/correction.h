@@ -19,6 +19,9 @@ using RigCorrection = std::vector<PoseCorrection>;
 
 /// The calibrated pose with its correction.
 [[nodiscard]] RigidTransform corrected_pose(const Device& device, const PoseCorrection& correction);
+/// The correction that gives a device this pose: the inverse of corrected_pose(), turned by less
+/// than half a circle.
+[[nodiscard]] PoseCorrection correction_to(const RigidTransform& pose, const Device& device);
 /// The rig with all poses corrected; correction is empty or has one entry per device.
 [[nodiscard]] Rig corrected_rig(Rig rig, const RigCorrection& correction);
 

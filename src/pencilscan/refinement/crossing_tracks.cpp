@@ -51,40 +51,6 @@ std::optional<SheetDepth> sheet_depth(const Rig& rig, int camera, const LineOfPr
   return SheetDepth{*depth, 1 / slope};
 }
 
-/// The label of the curve at a fractional point index, when both points around it have it.
-const CurveLabel* label_at(std::span<const LabeledRun> runs, int curve, float at) {
-  const int index = static_cast<int>(at);
-  const auto after = std::upper_bound(
-      runs.begin(), runs.end(), std::pair(curve, index),
-      [](const auto& key, const LabeledRun& r) { return key < std::pair(r.curve, r.begin); });
-  if (after == runs.begin()) return nullptr;
-  const LabeledRun& run = *(after - 1);
-  if (run.curve != curve || index >= run.end) return nullptr;
-  if (index + 1 < run.end) return &run.label;
-  // On the border of two runs they have to agree.
-  if (after == runs.end() || after->curve != curve || after->begin != run.end) return nullptr;
-  const bool agree =
-      after->label.pattern == run.label.pattern && after->label.line == run.label.line;
-  return agree ? &run.label : nullptr;
-}
-
-Eigen::Matrix2d whitening_of(const GridGraph& graph, const Crossing& x,
-                             const TrackOptions& options) {
-  const auto& curve_a = graph.curves[static_cast<std::size_t>(x.curve_a)];
-  const auto& curve_b = graph.curves[static_cast<std::size_t>(x.curve_b)];
-  const double same = curve_a.family == curve_b.family ? options.same_family_sigma_px : 0;
-  Eigen::Matrix2d whitening;
-  const auto row = [&](const Curve& curve, float at) -> Eigen::RowVector2d {
-    const CurvePoint& p = curve.points[static_cast<std::size_t>(at)];
-    const double sigma = std::hypot(options.position_factor * static_cast<double>(p.sigma_px),
-                                    options.min_sigma_px, same);
-    return p.normal.cast<double>().transpose() / sigma;
-  };
-  whitening.row(0) = row(curve_a, x.at_a);
-  whitening.row(1) = row(curve_b, x.at_b);
-  return whitening;
-}
-
 /// Labelled crossings of one camera with their points.
 std::vector<Sighting> sightings_of(const Rig& rig, const GridGraph& graph,
                                    std::span<const LabeledRun> runs, const Sphere& volume,
@@ -98,7 +64,7 @@ std::vector<Sighting> sightings_of(const Rig& rig, const GridGraph& graph,
     Sighting sighting{{label_a->pattern, label_a->line}, {label_b->pattern, label_b->line}, {}, {}};
     if (sighting.b < sighting.a) std::swap(sighting.a, sighting.b);
     const Vec2 pixel = x.position.cast<double>();
-    sighting.view = {graph.camera, pixel, whitening_of(graph, x, options)};
+    sighting.view = {graph.camera, pixel, crossing_whitening(graph, x, options)};
     const auto a = sheet_depth(rig, graph.camera, line_of(rig, sighting.a), pixel);
     const auto b = sheet_depth(rig, graph.camera, line_of(rig, sighting.b), pixel);
     if (!a || !b) continue;
@@ -220,6 +186,39 @@ std::optional<Vec2> shift_of(const std::vector<Miss>& misses, int camera, double
 }
 
 }  // namespace
+
+const CurveLabel* label_at(std::span<const LabeledRun> runs, int curve, float at) {
+  const int index = static_cast<int>(at);
+  const auto after = std::upper_bound(
+      runs.begin(), runs.end(), std::pair(curve, index),
+      [](const auto& key, const LabeledRun& r) { return key < std::pair(r.curve, r.begin); });
+  if (after == runs.begin()) return nullptr;
+  const LabeledRun& run = *(after - 1);
+  if (run.curve != curve || index >= run.end) return nullptr;
+  if (index + 1 < run.end) return &run.label;
+  // On the border of two runs they have to agree.
+  if (after == runs.end() || after->curve != curve || after->begin != run.end) return nullptr;
+  const bool agree =
+      after->label.pattern == run.label.pattern && after->label.line == run.label.line;
+  return agree ? &run.label : nullptr;
+}
+
+Eigen::Matrix2d crossing_whitening(const GridGraph& graph, const Crossing& x,
+                                   const TrackOptions& options) {
+  const auto& curve_a = graph.curves[static_cast<std::size_t>(x.curve_a)];
+  const auto& curve_b = graph.curves[static_cast<std::size_t>(x.curve_b)];
+  const double same = curve_a.family == curve_b.family ? options.same_family_sigma_px : 0;
+  Eigen::Matrix2d whitening;
+  const auto row = [&](const Curve& curve, float at) -> Eigen::RowVector2d {
+    const CurvePoint& p = curve.points[static_cast<std::size_t>(at)];
+    const double sigma = std::hypot(options.position_factor * static_cast<double>(p.sigma_px),
+                                    options.min_sigma_px, same);
+    return p.normal.cast<double>().transpose() / sigma;
+  };
+  whitening.row(0) = row(curve_a, x.at_a);
+  whitening.row(1) = row(curve_b, x.at_b);
+  return whitening;
+}
 
 std::vector<CrossingTrack> crossing_tracks(const Rig& rig, std::span<const GridGraph> graphs,
                                            const Labeling& labeling, const TrackOptions& options) {

@@ -45,6 +45,14 @@ struct TrackOptions {
       2;  ///< crossings whose point is less certain for 1 px of error are left out
 };
 
+/// The label of the curve at a fractional point index, when both points around it have it; null:
+/// they have none, or two. `runs`: of its camera.
+[[nodiscard]] const CurveLabel* label_at(std::span<const LabeledRun> runs, int curve, float at);
+
+/// CrossingSighting::whitening of a crossing.
+[[nodiscard]] Eigen::Matrix2d crossing_whitening(const GridGraph& graph, const Crossing& x,
+                                                 const TrackOptions& options);
+
 /// The crossings of labelled curves of one frame, those of the same two lines seen by several
 /// cameras joined. Ordered by lines, then camera: independent of the number of threads.
 [[nodiscard]] std::vector<CrossingTrack> crossing_tracks(const Rig& rig,

@@ -60,6 +60,16 @@ TEST(PoseJacobian, IsTheDerivativeOfTheCorrectedPose) {
   }
 }
 
+TEST(CorrectionTo, IsTheInverseOfTheCorrectedPose) {
+  const Device device = sample::small_rig(480, 360, 110).projectors[0];
+  for (const PoseCorrection& by :
+       {PoseCorrection{}, PoseCorrection{Vec3(120, -80, 300), Vec3(4, -30, 2)}}) {
+    const PoseCorrection found = correction_to(corrected_pose(device, by), device);
+    EXPECT_LT((found.rotation_px - by.rotation_px).norm(), 1e-9);
+    EXPECT_LT((found.translation_mm - by.translation_mm).norm(), 1e-9);
+  }
+}
+
 TEST(TrackResidual, GradientIsThatOfTheResidualWithItsPointSolvedFor) {
   const RingScene scene(true);
   const std::vector<CrossingTrack> tracks = scene.tracks(20, 0.3, 5);
