@@ -1,8 +1,9 @@
 #!/usr/bin/python3
 """One device knocked out of its place: what `rig check --frames` says, and what `--refine-rig` makes of it.
 
-Rendered scenes whose rig has one device elsewhere: turned in any direction and shifted, so that its picture of the
-volume moves by so many pixels, more than its lines are apart too. The seed draws device and way.
+Rendered scenes whose rig has one device elsewhere: a camera turned in any direction and shifted, so that its picture of
+the volume moves by so many pixels, more than its lines are apart too; a projector turned across its lines, and up to as
+far along them, and shifted, then rolled. The seed draws device and way.
 """
 
 import json
@@ -16,6 +17,7 @@ import heldout
 
 SCENES = ["bust", "dragon_p10", "bust_four"]
 AMOUNTS = [0, 5, 10, 20, 40, 80]  # px
+ROLLS = {"cameras": [""], "projectors": [0, 5]}  # degrees about the optical axis; "": as the turn has it
 COLUMNS = ["device", "verdict", "names_it", "others_named", "left_px", "refused", "label_error", "line_recall"]
 
 
@@ -34,31 +36,38 @@ def way(a, b, probe):
     return math.sqrt(np.mean(np.sum(apart**2, 1)))
 
 
-def knocked(rig, kind, amount, seed):
-    """One device turned and shifted: `amount` px together, a third of it by its shift."""
+def knocked(rig, kind, amount, roll_deg, seed):
+    """One device turned and shifted: `amount` px together, a third of it by its shift; then rolled."""
     random = np.random.default_rng([seed, amount, kind == "cameras"])
     result = json.loads(json.dumps(rig))
     d = result[kind][random.integers(len(rig[kind]))]
     before, probe = json.loads(json.dumps(d)), probe_of(rig)
     R, t = np.asarray(d["R"]), np.asarray(d["t"])
     turn, shift = random.normal(size=3), random.normal(size=3)
+    roll = 0.0
+    if roll_deg != "":
+        across = 1 if d["pattern"]["orientation"] == "vertical" else 0
+        turn = np.array([random.uniform(-1, 1)] * 2 + [0])
+        turn[across] = random.choice([-1, 1])
+        roll = math.radians(roll_deg) * random.choice([-1, 1])
 
-    def moved(a, b):
-        return {**d, "R": (common._rotation(a * turn) @ R).tolist(),
-                "t": (common._rotation(a * turn) @ t + b * shift).tolist()}
+    def moved(a, b, roll=0.0):
+        Q = common._rotation(np.array([0, 0, roll])) @ common._rotation(a * turn)
+        return {**d, "R": (Q @ R).tolist(), "t": (Q @ t + b * shift).tolist()}
 
-    small = 1e-4 * rig["volume"]["radius"]
-    b = small / way(moved(0, small), before, probe) * amount / 3
-    a = 1e-5 / way(moved(1e-5, 0), before, probe) * amount
+    a = b = 0.0
     if amount > 0:
+        small = 1e-4 * rig["volume"]["radius"]
+        b = small / way(moved(0, small), before, probe) * amount / 3
+        a = 1e-5 / way(moved(1e-5, 0), before, probe) * amount
         a *= amount / way(moved(a, b), before, probe)
-        d.update(moved(a, b))
+        d.update(moved(a, b, roll))
     return result, d["name"]
 
 
-def measured(program, scene, work, kind, amount, seed):
+def measured(program, scene, work, kind, amount, roll, seed):
     true_rig = json.loads((scene / "rig.json").read_text())
-    rig, name = knocked(true_rig, kind, amount, seed)
+    rig, name = knocked(true_rig, kind, amount, roll, seed)
     shutil.rmtree(work, ignore_errors=True)
     rig_path = common.write_rig(work / "rig.json", rig)
     row = {"device": name}
@@ -86,17 +95,18 @@ def measured(program, scene, work, kind, amount, seed):
 def main():
     args = common.arguments("knocked", __doc__, seed=(1, 1))
     program = common.Program(args)
-    rows = common.Rows(args.out / "results.csv", ["scene", "kind", "amount"], COLUMNS, args.resume)
+    rows = common.Rows(args.out / "results.csv", ["scene", "kind", "amount", "roll"], COLUMNS, args.resume)
     scenes = heldout.SMALL if args.small else {name: heldout.SPLITS["held"][name] for name in SCENES}
     for name, scene in scenes.items():
         folder = heldout.rendered(program, args.out / "scenes" / name, scene, args.seed)
-        for kind in ("cameras", "projectors"):
+        for kind, rolls in ROLLS.items():
             for amount in AMOUNTS[4:5] if args.small else AMOUNTS:
-                if rows.has(scene=name, kind=kind, amount=amount):
-                    continue
-                common.progress(f"knocked: {name}, {kind}, {amount} px")
-                rows.add(scene=name, kind=kind, amount=amount,
-                         **measured(program, folder, args.out / "work", kind, amount, args.seed))
+                for roll in rolls[-1:] if args.small or amount == 0 else rolls:
+                    key = {"scene": name, "kind": kind, "amount": amount, "roll": roll}
+                    if rows.has(**key):
+                        continue
+                    common.progress(f"knocked: {name}, {kind}, {amount} px, roll {roll or 0}")
+                    rows.add(**key, **measured(program, folder, args.out / "work", kind, amount, roll, args.seed))
 
 
 if __name__ == "__main__":

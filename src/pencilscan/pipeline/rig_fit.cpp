@@ -12,6 +12,7 @@
 #include "pencilscan/pipeline/frame_warnings.h"
 #include "pencilscan/pipeline/line_naming.h"
 #include "pencilscan/pipeline/lost_cameras.h"
+#include "pencilscan/pipeline/lost_projectors.h"
 #include "pencilscan/pipeline/naming_doubt.h"
 
 namespace pencilscan {
@@ -132,9 +133,10 @@ struct Explanation {
   Rig put_back;
   std::vector<CrossingDisagreement> left;  ///< per device, with the rig put back
   std::string contradicted;  ///< a camera that measures what the others do not; empty: none
+  std::string misplaced;     ///< misplaced_text() of a projector; empty: none
 
   [[nodiscard]] bool is_doubtful() const {
-    return !contradicted.empty() || !named.doubt.text().empty();
+    return !contradicted.empty() || !misplaced.empty() || !named.doubt.text().empty();
   }
 };
 
@@ -144,8 +146,13 @@ Explanation explanation_of(const Rig& rig, std::span<const FrameCurves> frames,
   MovedDevices found = find_moved_devices(rig, named.tracks, options);
   Rig put_back = corrected_rig(rig, correction_of(found.moved, device_count(rig)));
   auto left = device_disagreements(put_back, named.tracks);
-  return {std::move(labelings), std::move(named), std::move(found),
-          std::move(put_back),  std::move(left),  {}};
+  return {std::move(labelings),
+          std::move(named),
+          std::move(found),
+          std::move(put_back),
+          std::move(left),
+          {},
+          {}};
 }
 
 /// Looks what moved by the first names, then names lines with that put back, and so on, as long as
@@ -204,9 +211,14 @@ RigFit check_rig_on_frames(const Rig& stated, std::span<const FrameCurves> frame
   const double unit = footprint(stated);
   const Rig rig = with_registered_patterns(scaled(stated, 1 / unit));
   Explanation explained = explain(rig, frames, labels_of(rig, frames), options);
+  if (!explained.is_doubtful()) {
+    const auto found = misplaced_projector(explained.put_back, frames, explained.labelings);
+    if (found) explained.misplaced = misplaced_text(rig, *found);
+  }
   if (explained.is_doubtful() || device_that_is_off(explained.left)) {
-    // All frames together, and colours, may tell where a device stands. A refined rig has no camera
-    // that the others contradict, or it is refused.
+    // All frames together, colours, and where lines cross may tell where a device stands. A refined
+    // rig has no camera that the others contradict and no projector whose lines they cross
+    // elsewhere, or it is refused.
     RigRefinementOptions refinement;
     refinement.refine.max_remaining = std::numeric_limits<double>::infinity();
     RigRefinement refined = refine_rig_on_frames(rig, frames, refinement);
@@ -232,6 +244,7 @@ RigFit check_rig_on_frames(const Rig& stated, std::span<const FrameCurves> frame
   }
   if (fit.doubt.empty() && !explained.contradicted.empty())
     fit.doubt = contradiction_text(explained.contradicted);
+  if (fit.doubt.empty()) fit.doubt = explained.misplaced;
   const auto per_device = device_disagreements(rig, named.tracks);
   for (std::size_t d = 0; d < device_count(rig); ++d) {
     fit.devices.push_back({device_at(rig, d).name, d >= rig.cameras.size(), per_device[d],

@@ -10,6 +10,7 @@
 #include "pencilscan/joint/joint.h"
 #include "pencilscan/pipeline/frame_warnings.h"
 #include "pencilscan/pipeline/lost_cameras.h"
+#include "pencilscan/pipeline/lost_projectors.h"
 #include "pencilscan/pipeline/naming_doubt.h"
 #include "pencilscan/pipeline/view_agreement.h"
 #include "pencilscan/refinement/moved_devices.h"
@@ -45,6 +46,7 @@ struct Attempt {
   std::vector<std::size_t> moved;     ///< RefineRigOptions::moved
   bool agrees = false;
   std::string objection;  ///< what speaks against the names though crossings may meet
+  std::optional<FoundProjector> misplaced;  ///< by the last names; it is the objection
   std::size_t points = 0;
 };
 
@@ -151,21 +153,57 @@ bool turn_by_colors(const Rig& calibrated, std::span<const FrameCurves> frames, 
   return turned;
 }
 
-/// Where refinement begins: cameras that stand far off where they are found.
+/// Where refinement begins: devices that stand far off where they are found.
 struct Start {
   RigCorrection correction;  ///< empty: as calibrated
   std::vector<std::size_t> moved;
+  std::vector<std::size_t> projectors;  ///< of those
 };
 
-Start start_of(const Rig& calibrated, std::span<const FrameCurves> frames) {
+void begin_at(std::size_t device, const PoseCorrection& correction, const Rig& calibrated,
+              Start& start) {
+  start.correction.resize(device_count(calibrated));
+  start.correction[device] = correction;
+  start.moved.push_back(device);
+}
+
+Start start_at_cameras(const Rig& calibrated, std::span<const FrameCurves> frames) {
   Start start;
   for (const FoundCamera& found :
-       find_lost_cameras(calibrated, frames, label(calibrated, frames, JointOptions{}))) {
-    start.correction.resize(device_count(calibrated));
-    start.correction[found.camera] = found.correction;
-    start.moved.push_back(found.camera);
-  }
+       find_lost_cameras(calibrated, frames, label(calibrated, frames, JointOptions{})))
+    begin_at(found.camera, found.correction, calibrated, start);
   return start;
+}
+
+Start start_at(std::size_t projector, const RigidTransform& pose, const Rig& calibrated) {
+  Start start;
+  begin_at(calibrated.cameras.size() + projector,
+           correction_to(pose, calibrated.projectors[projector]), calibrated, start);
+  start.projectors.push_back(projector);
+  return start;
+}
+
+/// With the projector that the names of a refused rig find elsewhere; nothing: none, or names of
+/// other lines fit as well.
+std::optional<Start> start_at_misplaced(const Rig& calibrated, const Attempt& refused) {
+  const std::optional<FoundProjector>& found = refused.misplaced;
+  if (!found || found->is_ambiguous) return std::nullopt;
+  const Projector& projector = refused.refinement.rig.projectors[found->projector];
+  return start_at(found->projector, corrected_pose(projector, found->correction), calibrated);
+}
+
+/// With the projector that stands elsewhere by labels without it, of several the one that explains
+/// most; nothing: none does, or names of other lines fit as well.
+std::optional<Start> start_at_projector(const Rig& calibrated,
+                                        std::span<const FrameCurves> frames) {
+  std::optional<FoundProjector> most;
+  for (const FoundProjector& found : find_projectors(calibrated, frames)) {
+    if (found.is_elsewhere() && !found.is_ambiguous && (!most || found.gain > most->gain))
+      most = found;
+  }
+  if (!most) return std::nullopt;
+  const Projector& projector = calibrated.projectors[most->projector];
+  return start_at(most->projector, corrected_pose(projector, most->correction), calibrated);
 }
 
 Attempt attempt(const Rig& calibrated, std::span<const FrameCurves> frames, double tolerance,
@@ -186,6 +224,10 @@ Attempt attempt(const Rig& calibrated, std::span<const FrameCurves> frames, doub
   return result;
 }
 
+bool is_accepted(const Attempt& attempt) {
+  return attempt.refinement.report.refined && attempt.objection.empty();
+}
+
 bool is_better(const Attempt& a, const Attempt& b) {
   if (a.agrees != b.agrees) return a.agrees;
   return a.points > b.points;
@@ -198,13 +240,9 @@ bool end_alike(const Attempt& a, const Attempt& b) {
   return a.agrees && b.agrees && more - fewer < kSame * more;
 }
 
-}  // namespace
-
-RigRefinement refine_rig_on_frames(const Rig& stated, std::span<const FrameCurves> frames,
-                                   const RigRefinementOptions& options) {
-  const double unit = footprint(stated);
-  const Rig calibrated = with_registered_patterns(scaled(stated, 1 / unit));
-  const Start start = options.is_for_rig ? start_of(calibrated, frames) : Start{};
+/// The best of all first tolerances.
+Attempt best_attempt(const Rig& calibrated, std::span<const FrameCurves> frames, const Start& start,
+                     const RigRefinementOptions& options) {
   std::optional<Attempt> best;
   for (const double tolerance : options.first_tolerances_px) {
     Attempt next = attempt(calibrated, frames, tolerance, start, options);
@@ -212,17 +250,44 @@ RigRefinement refine_rig_on_frames(const Rig& stated, std::span<const FrameCurve
     if (!best || is_better(next, *best)) best = std::move(next);
     if (is_settled) break;
   }
-  RigRefinement result = std::move(best->refinement);
+  if (options.is_for_rig && is_accepted(*best)) {
+    const RigRefinement& refined = best->refinement;
+    best->misplaced = misplaced_projector(refined.rig, frames, refined.labelings, start.projectors);
+    if (best->misplaced) best->objection = misplaced_text(refined.rig, *best->misplaced);
+  }
+  return *std::move(best);
+}
+
+}  // namespace
+
+RigRefinement refine_rig_on_frames(const Rig& stated, std::span<const FrameCurves> frames,
+                                   const RigRefinementOptions& options) {
+  const double unit = footprint(stated);
+  const Rig calibrated = with_registered_patterns(scaled(stated, 1 / unit));
+  Start start = options.is_for_rig ? start_at_cameras(calibrated, frames) : Start{};
+  Attempt best = best_attempt(calibrated, frames, start, options);
+  // Lines of a projector that was knocked have wrong names in all cameras.
+  for (const bool by_names : {true, false}) {
+    if (!options.is_for_rig || is_accepted(best)) break;
+    std::optional<Start> other =
+        by_names ? start_at_misplaced(calibrated, best) : start_at_projector(calibrated, frames);
+    if (!other) continue;
+    Attempt next = best_attempt(calibrated, frames, *other, options);
+    if (!next.agrees || !is_accepted(next)) continue;
+    best = std::move(next);
+    start = *std::move(other);
+  }
+  RigRefinement result = std::move(best.refinement);
   result.found = start.correction;
-  if (result.report.refined && !best->objection.empty()) {
+  if (result.report.refined && !best.objection.empty()) {
     result.report.refined = false;
-    result.report.reason = "though most crossings meet, " + best->objection +
+    result.report.reason = "though most crossings meet, " + best.objection +
                            ": it stands too far from where the rig has it; calibrate anew";
   }
   if (result.report.refined) {
     RefineRigOptions refine = options.refine;
-    refine.moved = best->moved;
-    RefineRigResult last = refine_rig(calibrated, best->tracks, best->correction, refine);
+    refine.moved = best.moved;
+    RefineRigResult last = refine_rig(calibrated, best.tracks, best.correction, refine);
     result.report = std::move(last.report);
     if (result.report.refined) result.rig = corrected_rig(calibrated, last.correction);
   }

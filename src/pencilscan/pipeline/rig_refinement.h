@@ -19,8 +19,10 @@ struct RigRefinementOptions {
   TrackOptions tracks;
   RefineRigOptions refine;
   /// The rig is wanted, not only names for the lines of one frame. Then cameras that stand far off
-  /// are looked for first (lost_cameras.h), and a rig is refused in which one device's crossings
-  /// still miss each other by far more than noise (frame_warnings.h).
+  /// are looked for first (lost_cameras.h). A rig is refused in which one device's crossings still
+  /// miss each other by far more than noise (frame_warnings.h), or a projector's lines cross those
+  /// of others elsewhere. Of a refused one a projector that stands far off is looked for
+  /// (lost_projectors.h).
   bool is_for_rig = true;
 };
 
@@ -36,7 +38,7 @@ struct RigRefinement {
   Rig rig;                 ///< as given where report.refined is false
   RefineRigReport report;  ///< of the last round; "before" is the calibration as given
   std::vector<RefinementRound> rounds;
-  RigCorrection found;  ///< of cameras that stood far off, where they were found; empty: none
+  RigCorrection found;  ///< of devices that stood far off, where they were found; empty: none
   std::vector<Labeling> labelings;  ///< per frame, with the corrected rig; empty where not refined
 };
 
