@@ -43,13 +43,13 @@ def knocked(rig, kind, amount, roll_deg, seed):
     d = result[kind][random.integers(len(rig[kind]))]
     before, probe = json.loads(json.dumps(d)), probe_of(rig)
     R, t = np.asarray(d["R"]), np.asarray(d["t"])
-    turn, shift = random.normal(size=3), random.normal(size=3)
-    roll = 0.0
+    normal, shift = random.normal(size=3), random.normal(size=3)
+    turn, roll = normal, 0.0
     if roll_deg != "":
         across = 1 if d["pattern"]["orientation"] == "vertical" else 0
         turn = np.array([random.uniform(-1, 1)] * 2 + [0])
-        turn[across] = random.choice([-1, 1])
-        roll = math.radians(roll_deg) * random.choice([-1, 1])
+        turn[across] = math.copysign(1, normal[across])
+        roll = math.radians(roll_deg) * (1 if np.random.default_rng([seed, amount, 7]).integers(2) else -1)
 
     def moved(a, b, roll=0.0):
         Q = common._rotation(np.array([0, 0, roll])) @ common._rotation(a * turn)
