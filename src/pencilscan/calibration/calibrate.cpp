@@ -137,8 +137,9 @@ class Calibration {
   bool let_contradicted_go() {
     triangulate_all(result_.problem, kLeastAngle);
     const Uncertainty sigma = uncertainty(result_.problem, result_.adjustment);
-    const std::vector<char> agrees =
+    std::vector<char> agrees =
         given_agrees(input_, options_.tolerance, kContradictsDeviations, result_.problem, sigma);
+    if (is_contradicted_together(agrees, sigma)) agrees.assign(agrees.size(), 0);
     for (std::size_t d = 0; d < agrees.size(); ++d) {
       if (!input_.known[d].K) continue;
       const bool is_camera = d < input_.rig.cameras.size();
@@ -149,16 +150,47 @@ class Calibration {
         set_priors({}, {}, is_camera, given, device);
         continue;
       }
-      const BundleDevice found = device;
-      device.inner = bundle_device(given).inner;
-      set_priors(input_.known[d], options_.tolerance, is_camera, given, device);
-      // What a tolerance of 0 holds stays as it was given.
-      for (std::size_t i = 0; i < kIntrinsics; ++i)
-        if (device.prior_sigma[i] > 0) device.inner[i] = found.inner[i];
+      device = within_tolerance(d);
     }
     stage(kAll, options_.stage_tracks, 50);
     triangulate_all(result_.problem, kLeastAngle);
     return true;
+  }
+
+  /// A device as found, with the priors of its given values; what a tolerance of 0 holds is as it
+  /// was given.
+  [[nodiscard]] BundleDevice within_tolerance(std::size_t d) const {
+    const Device& given = device_at(input_.rig, d);
+    BundleDevice device = result_.problem.devices[d];
+    const BundleDevice found = device;
+    device.inner = bundle_device(given).inner;
+    set_priors(input_.known[d], options_.tolerance, d < input_.rig.cameras.size(), given, device);
+    for (std::size_t i = 0; i < kIntrinsics; ++i)
+      if (device.prior_sigma[i] > 0) device.inner[i] = found.inner[i];
+    return device;
+  }
+
+  /// Whether given values that are held exactly are wrong together, though each alone agrees: a
+  /// common error of a ring hides in what the data know of each. By the likelihood ratio, in which
+  /// correspondences count as much as they tell: twice what the cost falls by without so many
+  /// constraints is, by chance, a sum of as many squares (Wilks 1938).
+  [[nodiscard]] bool is_contradicted_together(const std::vector<char>& agrees,
+                                              const Uncertainty& sigma) const {
+    BundleProblem free = result_.problem;
+    BundleProblem held = free;
+    double constraints = 0;
+    for (std::size_t d = 0; d < agrees.size(); ++d) {
+      if (agrees[d] == 0 || !input_.known[d].K || !free.devices[d].present) continue;
+      held.devices[d] = within_tolerance(d);
+      for (std::size_t i = 0; i < kIntrinsics; ++i)
+        if ((kAll >> i & 1U) != 0 && held.devices[d].prior_sigma[i] == 0) ++constraints;
+    }
+    if (constraints == 0) return false;
+    BundleOptions bundle = result_.adjustment;
+    bundle.track_weight = sigma.track_weight;
+    const double saved = adjust(held, bundle).cost - adjust(free, bundle).cost;
+    return normal_deviation(2 * saved / sigma.variance_factor, constraints) >
+           kContradictsDeviations;
   }
 
   void stage(unsigned free_inner, std::size_t tracks, int iterations, double track_weight = 1) {

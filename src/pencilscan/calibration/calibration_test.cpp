@@ -100,6 +100,22 @@ TEST(Calibrate, FocalLengthsThatAreFivePercentOffAreOnlyAStart) {
   }
 }
 
+/// Each agrees with what the data know of it alone.
+TEST(Calibrate, FocalLengthsThatAreStatedExactlyAndWrongAlikeAreOnlyAStart) {
+  const Rig truth = ring(3, 3);
+  for (const double wrong : {0.0, 0.01}) {
+    CalibrationInput input = input_of(truth, tracks_of(truth, {.count = 1000}), true);
+    for (Camera& camera : input.rig.cameras) {
+      camera.K(0, 0) *= 1 + wrong;
+      camera.K(1, 1) *= 1 + wrong;
+    }
+    const auto result = calibrate(input, {.hypotheses = 2, .tolerance = {0, 0}});
+    ASSERT_TRUE(result.solved);
+    for (std::size_t d = 0; d < 3; ++d)
+      EXPECT_EQ(result.given[d] == GivenUse::kContradicted, wrong > 0) << d;
+  }
+}
+
 TEST(Calibrate, FourPoorGuessesEndInTheSamePlace) {
   const Rig truth = ring(3, 3);
   std::vector<Rig> found;

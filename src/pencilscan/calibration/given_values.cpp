@@ -7,16 +7,11 @@
 #include "pencilscan/bundle/bundle_device.h"
 
 namespace pencilscan {
-namespace {
-
-/// A sum of `count` squares of unit normals as one normal deviation (Wilson and Hilferty 1931).
 double normal_deviation(double sum, double count) {
   if (count == 0) return 0;
   const double variance = 2 / (9 * count);
   return (std::cbrt(sum / count) - (1 - variance)) / std::sqrt(variance);
 }
-
-}  // namespace
 
 std::array<double, 4> moved_deviations(const Device& given, const GivenTolerance& tolerance,
                                        const BundleDevice& found) {

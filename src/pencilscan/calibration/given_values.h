@@ -8,6 +8,9 @@
 
 namespace pencilscan {
 
+/// A sum of `count` squares of unit normals as one normal deviation (Wilson and Hilferty 1931).
+[[nodiscard]] double normal_deviation(double sum, double count);
+
 /// How far fx, fy, cx, cy are from given ones, in deviations of the tolerance; infinite for values
 /// that were to be exact and moved.
 [[nodiscard]] std::array<double, 4> moved_deviations(const Device& given,
