@@ -17,6 +17,7 @@
 namespace pencilscan {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::Not;
 using namespace sample;
@@ -181,6 +182,42 @@ TEST(Verdict, FoldersSwappedInOneCaptureAreNamedWithIt) {
   tracks.insert(tracks.end(), second.begin(), second.end());
   EXPECT_THAT(findings_of(truth, tracks),
               HasSubstr("the folders proj1/cam1 and proj1/cam2 (--captures number 2) are swapped"));
+}
+
+/// Three captures; in the last one cam1 is turned by so many pixels about the axis of its frame.
+std::vector<Track> tracks_with_a_turn(const Rig& truth, const Vec3& axis, double px) {
+  Rig turned = truth;
+  const double angle = px / truth.cameras[1].K(0, 0);
+  RigidTransform& pose = turned.cameras[1].device_from_world;
+  const Mat3 R = Eigen::AngleAxisd(angle, axis).toRotationMatrix();
+  pose = {R * pose.rotation, R * pose.translation};
+  std::vector<Track> all;
+  for (std::size_t capture = 0; capture < 3; ++capture) {
+    const std::uint64_t seed = 10 + 2 * capture;
+    for (Track& track : tracks_of(capture == 2 ? turned : truth,
+                                  {.count = 300, .seed = seed, .noise_seed = seed + 1})) {
+      track.capture = capture;
+      all.push_back(std::move(track));
+    }
+  }
+  return all;
+}
+
+/// A turn to the side goes along the epipolar lines: no pair of a camera and a projector tells.
+TEST(Verdict, ACameraThatMovedBetweenCapturesIsNamed) {
+  const Rig truth = ring(3, 3);
+  for (const auto& [axis, px] : {std::pair(Vec3(Vec3::UnitY()), 10.0), {Vec3::UnitX(), 2}})
+    EXPECT_THAT(findings_of(truth, tracks_with_a_turn(truth, axis, px)),
+                AllOf(HasSubstr("camera cam1 has moved, or was zoomed, between captures: in "
+                                "--captures number 3"),
+                      Not(HasSubstr("camera cam0")), Not(HasSubstr("projector proj"))))
+        << axis.transpose() << ", " << px << " px";
+}
+
+TEST(Verdict, NothingMovedWhereNothingDid) {
+  const Rig truth = ring(3, 3);
+  EXPECT_THAT(findings_of(truth, tracks_with_a_turn(truth, Vec3::UnitY(), 0)),
+              Not(HasSubstr("has moved")));
 }
 
 /// These draw cam2 to a wrong place, from where right pairs contradict.

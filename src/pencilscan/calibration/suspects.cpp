@@ -7,6 +7,7 @@
 #include <set>
 
 #include "pencilscan/bundle/bundle_device.h"
+#include "pencilscan/core/formatted.h"
 #include "pencilscan/core/name_list.h"
 
 namespace pencilscan {
@@ -50,7 +51,7 @@ struct Contradicting {
 
 /// Folders that were exchanged, in one capture, or in all where none is given.
 void find_swaps(const CalibrationInput& input, const Matches& matches, const PairFit& fit,
-                std::optional<std::size_t> capture, Contradicting& bad,
+                std::optional<std::size_t> capture, Contradicting& bad, Captures& swapped,
                 std::vector<Finding>& findings) {
   const auto fits = [&](const DevicePair& pair, const DevicePair& place) {
     return fit.share(matches.at(pair), place.first, place.second, nullptr,
@@ -67,8 +68,13 @@ void find_swaps(const CalibrationInput& input, const Matches& matches, const Pai
                               (capture ? " (" + number_of(*capture) + ")" : "") +
                               " are swapped: each fits the rig in the other's place",
                           "exchange the two folders and calibrate again"});
-      bad.take_out(all[i], capture);
-      bad.take_out(all[j], capture);
+      for (const DevicePair& pair : {all[i], all[j]}) {
+        bad.take_out(pair, capture);
+        if (capture)
+          swapped[pair].push_back(*capture);
+        else
+          swapped[pair].clear();
+      }
     }
   }
 }
@@ -115,6 +121,41 @@ Finding name_mover(const CalibrationInput& input, const Matches& matches, const 
           (when.empty() ? "" : ". Where nothing was touched, the object moved between pictures")};
 }
 
+/// One finding per device that moved between captures.
+std::vector<Finding> name_moved(const CalibrationInput& input,
+                                const std::vector<CaptureMove>& moves) {
+  std::map<std::size_t, std::vector<CaptureMove>> by_device;
+  for (const CaptureMove& move : moves) by_device[move.device].push_back(move);
+  std::vector<Finding> findings;
+  for (const auto& [device, when] : by_device) {
+    double most = 0;
+    std::vector<std::string> numbers;
+    for (const CaptureMove& move : when) {
+      most = std::max(most, move.shift_px);
+      numbers.push_back(std::to_string(move.capture + 1));
+    }
+    findings.push_back(
+        {Grade::kDoubtful,
+         std::string(device < input.rig.cameras.size() ? "camera " : "projector ") +
+             device_at(input.rig, device).name +
+             " has moved, or was zoomed, between captures: in --captures number " +
+             name_list(numbers) + " its picture lies " + (when.size() > 1 ? "up to " : "") +
+             formatted(most) + " px off where the rig has it",
+         "fix the device, and take the captures again: the rig may not have it where it stands "
+         "now. Where nothing was touched, the object moved between pictures"});
+  }
+  return findings;
+}
+
+/// What devices that moved do not explain.
+void take_out_moved(const std::vector<CaptureMove>& moves, Contradicting& bad) {
+  const Captures captures = bad.captures;
+  for (const auto& [pair, numbers] : captures)
+    for (const std::size_t capture : numbers)
+      if (has_moved(moves, pair.first, capture) || has_moved(moves, pair.second, capture))
+        bad.take_out(pair, capture);
+}
+
 }  // namespace
 
 PairFit tolerant_fit(const CalibrationResult& result) {
@@ -146,9 +187,16 @@ Contradictions find_contradictions(const CalibrationInput& input, const Calibrat
     }
   }
   Contradictions found;
-  find_swaps(input, matches, fit, std::nullopt, bad, found.findings);
+  Captures wrong;  // whatever stood where
+  find_swaps(input, matches, fit, std::nullopt, bad, wrong, found.findings);
   for (const std::size_t capture : numbers_of_bad)
-    find_swaps(input, matches, fit, capture, bad, found.findings);
+    find_swaps(input, matches, fit, capture, bad, wrong, found.findings);
+  for (const DevicePair& pair : bad.pairs)
+    if (!bad.captures.contains(pair)) wrong[pair].clear();
+  found.moves = moved_between_captures(result, without_pairs(input.tracks, wrong));
+  for (Finding& finding : name_moved(input, found.moves.clear))
+    found.findings.push_back(std::move(finding));
+  take_out_moved(found.moves.clear, bad);
   // Pairs without sense in themselves (their fundamental matrix fits few) are named elsewhere.
   for (const PairGeometry& geometry : result.pairs)
     if (geometry.inlier_share() < 0.35) bad.pairs.erase({geometry.camera, geometry.projector});

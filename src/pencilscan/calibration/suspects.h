@@ -3,6 +3,7 @@
 #include <map>
 #include <vector>
 
+#include "pencilscan/calibration/capture_moves.h"
 #include "pencilscan/calibration/pair_fit.h"
 #include "pencilscan/calibration/pair_matches.h"
 #include "pencilscan/calibration/verdict.h"
@@ -12,16 +13,18 @@ namespace pencilscan {
 /// What contradicts a rig.
 struct Contradictions {
   std::vector<Finding> findings;
-  /// Pairs that neither swapped folders explain nor their own images (some fit no pair of devices
-  /// at all), with the captures in which they contradict; none: in all.
+  /// Pairs that neither swapped folders nor moved devices explain, nor their own images (some fit
+  /// no pair of devices at all), with the captures in which they contradict; none: in all.
   std::map<DevicePair, std::vector<std::size_t>> unexplained;
+  CaptureMoves moves;
 };
 
 /// To ask whether correspondences agree with a rig: to 8 times its errors, 2 px at least.
 [[nodiscard]] PairFit tolerant_fit(const CalibrationResult& result);
 
 /// Pairs whose correspondences contradict the rig, explained: swapped folders, a device that moved
-/// between captures or between projectors, or a scene that moved.
+/// between projectors, or a scene that moved; and devices that moved between captures, whether
+/// pairs contradict or the adjustment dropped what they saw.
 [[nodiscard]] Contradictions find_contradictions(const CalibrationInput& input,
                                                  const CalibrationResult& result);
 
