@@ -319,5 +319,19 @@ TEST(ImageOrder, WrongOrdersAreNamed) {
               testing::HasSubstr("two before"));
 }
 
+/// Light on the white image alone makes all that is unlit look lit.
+TEST(ImageOrder, AFlashOnTheWhiteImageIsNoWrongOrder) {
+  const GrayImageSource images = images_of({});
+  const GrayImageSource flashed = [&](std::size_t i) {
+    cv::Mat image;  // nine tenths of it are unlit
+    cv::copyMakeBorder(images(i), image, kSize, kSize, kSize, kSize, cv::BORDER_CONSTANT, 0.01);
+    if (i == 0) image = cv::min(image + 0.3, 1.0);
+    return image;
+  };
+  const DecodedView view =
+      decode_gray_stack(make_gray_stack(kPanelWidth, kPanelHeight, true, flashed));
+  EXPECT_EQ(explain_wrong_order(kPanelWidth, kPanelHeight, true, flashed, view), "");
+}
+
 }  // namespace
 }  // namespace pencilscan

@@ -25,6 +25,19 @@ bool leaves_panel(const DecodedView& view) {
   return static_cast<double>(off) > kMuch * static_cast<double>(lit);
 }
 
+/// Whether white - black bounds what the bits differ by, as light adds up. Where a pattern is taken
+/// for white it does not in its dark half, which then is taken for unlit.
+bool white_is_brightest(const GrayStack& stack) {
+  constexpr double kMost = 0.25;  // of all light: between none and half
+  const cv::Mat contrast = stack.white - stack.black;
+  cv::Mat most = cv::Mat::zeros(contrast.size(), CV_32FC1);
+  for (const auto& bits : stack.difference)
+    for (const cv::Mat& bit : bits) most = cv::max(most, cv::abs(bit));
+  const cv::Mat is_brighter = 2 * contrast < most;
+  return cv::sum(most).val[0] * kMost >
+         cv::mean(most, is_brighter).val[0] * cv::countNonZero(is_brighter);
+}
+
 /// The file that holds image i of the sequence, in a capture of some wrong order.
 struct WrongOrder {
   const char* words;
@@ -89,6 +102,7 @@ std::string explain_wrong_order(int panel_width, int panel_height, bool inverses
     const GrayStack stack =
         make_gray_stack(panel_width, panel_height, inverses,
                         [&](std::size_t i) { return image(order.file(i, count, columns, step)); });
+    if (!white_is_brightest(stack)) continue;
     const DecodedView view = decode_gray_stack(stack, options);
     const double share = sensible_share(view);
     // Unlit pixels count against an order that takes black for white.
