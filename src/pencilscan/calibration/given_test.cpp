@@ -200,6 +200,7 @@ class GivenRing : public testing::Test {
   [[nodiscard]] std::string findings() const {
     Uncertainty sigma;
     sigma.devices.resize(device_count(truth_));
+    sigma.devices.back().inner[kFx] = focal_sigma_ * truth_.projectors.back().K(0, 0);
     std::string all;
     for (const Finding& finding : judge(input_, found_, sigma, {}).findings)
       if (finding.grade == Grade::kDoubtful) all += finding.what + "\n";
@@ -207,6 +208,7 @@ class GivenRing : public testing::Test {
   }
 
   static constexpr std::size_t kCameras = 4;
+  double focal_sigma_ = 0;  ///< of the last projector, over its focal length
   Rig truth_ = sample::ring(kCameras, kCameras);
   CalibrationInput input_;
   CalibrationResult found_;
@@ -216,6 +218,17 @@ TEST_F(GivenRing, OneKMayBeOffByTwoTolerances) {
   overstate(1, 2.4);
   EXPECT_FALSE(is_any_pulled(input_, {}, found_.problem));
   EXPECT_THAT(findings(), Not(HasSubstr("given K")));
+}
+
+/// Cameras whose K is given to 0.5 % cannot give a projector's better.
+TEST_F(GivenRing, TheToleranceOfGivenKIsNoWeaknessOfTheData) {
+  focal_sigma_ = std::hypot(GivenTolerance{}.focal, 0.001);
+  EXPECT_THAT(findings(), Not(HasSubstr("known weakly")));
+  focal_sigma_ = std::hypot(GivenTolerance{}.focal, 0.006);
+  EXPECT_THAT(findings(), HasSubstr("known weakly"));
+  found_.given.assign(found_.given.size(), GivenUse::kNone);
+  focal_sigma_ = 0.0051;
+  EXPECT_THAT(findings(), HasSubstr("known weakly"));
 }
 
 /// Each alone would pass, and a ring with all focal lengths wrong alike fits its data.

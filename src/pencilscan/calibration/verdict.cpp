@@ -177,7 +177,7 @@ class Judge {
                 " px, is implausible for an image " + std::to_string(placed.width) + " px wide",
             "give a rough K for it in the devices file");
     }
-    if (worst > options_.good_focal_sigma) {
+    if (worst > good_focal_sigma()) {
       add(worst > options_.usable_focal_sigma ? Grade::kUnusable : Grade::kDoubtful,
           "focal lengths are known weakly: that of " + name(worst_device) + " to " +
               percent(worst) + " (one standard deviation)" + reason(),
@@ -190,6 +190,15 @@ class Judge {
               ": held near what is plausible or was given",
           "add captures with the object moved and turned, or give K");
     }
+  }
+
+  /// The tolerance of given K and what the data add to it are independent, and each may be as large
+  /// as what is good: a projector is never known better than the cameras that measure it.
+  [[nodiscard]] double good_focal_sigma() const {
+    const double good = options_.good_focal_sigma;
+    const bool is_tolerated =
+        std::count(result_.given.begin(), result_.given.end(), GivenUse::kTolerance) > 0;
+    return std::hypot(good, is_tolerated ? std::min(good, result_.tolerance.focal) : 0);
   }
 
   /// Aspect and decentring far from what lenses have: something else is wrong.

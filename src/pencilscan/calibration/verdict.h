@@ -31,7 +31,8 @@ struct VerdictOptions {
   double mostly_planar_share = 0.7;  ///< is told as the reason where a rig is known weakly
   double good_rms_px = 0.4;          ///< of all views
   double usable_rms_px = 1.5;
-  double good_focal_sigma = 0.005;  ///< over the focal length
+  /// Over the focal length, beside the tolerance of given K, which counts up to as much.
+  double good_focal_sigma = 0.005;
   double usable_focal_sigma = 0.05;
   double good_volume_sigma = 0.002;  ///< of a point, over the radius of what was measured
   double usable_volume_sigma = 0.03;
