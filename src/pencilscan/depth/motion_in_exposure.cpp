@@ -102,6 +102,11 @@ double window_overlap(const DepthMap& map, int half, int stride) {
 
 ExposureMotion motion_in_exposure(const Rig& rig, const DepthStageOptions& options,
                                   const DepthResult& result) {
+  // Lines of another family that show through widen those of a family, in some directions only.
+  const std::vector<ColorFamily> families = color_families(rig);
+  if (std::any_of(families.begin(), families.end(),
+                  [](const ColorFamily& family) { return family.mixes(); }))
+    return {};
   // Windows are 11 px wide, nodes a few: of many nodes, this number in even rows and columns tell
   // as much of one rigid motion as the frame needs (docs/sequences.md), at a fixed cost.
   constexpr double kEnoughWindows = 6000;

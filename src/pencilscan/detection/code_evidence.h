@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "pencilscan/detection/curve.h"
+#include "pencilscan/pattern/color_likeness.h"
 #include "pencilscan/view/color_family.h"
 
 namespace pencilscan {
@@ -13,8 +14,7 @@ inline constexpr int kPointsPerMeasurement = 9;
 
 struct CodeEvidenceOptions {
   int half_arc = kPointsPerMeasurement / 2;  ///< points on either side that share a measurement
-  double relative_noise =
-      0.12;                  ///< model error of a colour amplitude, share of the line's amplitude
+  double relative_noise = kColorError;
   double max_log_ratio = 4;  ///< evidence of one point is limited to this
 };
 

@@ -85,6 +85,38 @@ TEST(ColorFamily, PresenceSeparatesThePapersColourPairs) {
   EXPECT_LT(families[0].leakage, 1e-12);
 }
 
+TEST(ColorFamily, ColoursThatACameraTakesForEachOtherAreOfOneFamily) {
+  const auto families_with = [](const std::vector<PatternColor>& colors) {
+    Rig rig = two_color_rig(10, 10);
+    Projector third = rig.projectors[0];
+    third.name = "third";
+    third.patterns[0].colors = colors;
+    rig.projectors.push_back(third);
+    return color_families(rig);
+  };
+  using Light = Rgb;
+  const std::vector<std::vector<PatternColor>> alike = {
+      {PatternColor(Light{0, 0, 0.4}), PatternColor(Light{0, 0.4, 0.4})},        // darker
+      {PatternColor(Light{0, 0, 1}), PatternColor(Light{0, 0.98, 1})},           // a driver's
+      {PatternColor(Light{0, 0.9, 0.9}), PatternColor(Light{0.03, 0.05, 0.9})},  // in any order
+  };
+  for (const auto& colors : alike) {
+    const auto families = families_with(colors);
+    ASSERT_EQ(families.size(), 2U);
+    EXPECT_EQ(families[0].patterns.size(), 2U);
+    EXPECT_FALSE(families[0].mixes());
+  }
+  // Each colour of a pattern is one of the family's, whatever their order.
+  LinePattern pattern;
+  pattern.colors = alike.back();
+  const std::vector<int> colors = families_with(alike.back())[0].color_of_symbol(pattern);
+  EXPECT_EQ(colors, (std::vector<int>{1, 0}));
+  // Half of the colours in common is no family, but a mixture.
+  const auto half = families_with({"blue", "green"});
+  ASSERT_EQ(half.size(), 3U);
+  EXPECT_TRUE(half[0].mixes());
+}
+
 TEST(DetectCurves, SubPixelErrorIsSmallAndAsLargeAsSigmaSays) {
   std::vector<TestLine> lines;
   for (int i = 0; i < 8; ++i) lines.push_back({20.0 + 14.3 * i, 0, 1.45, 4, 1e9, {0, 0, 1}});

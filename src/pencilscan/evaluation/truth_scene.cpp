@@ -10,6 +10,7 @@
 #include "pencilscan/core/disjoint_sets.h"
 #include "pencilscan/geometry/mesh_sides.h"
 #include "pencilscan/geometry/used_vertices.h"
+#include "pencilscan/pattern/color_likeness.h"
 
 namespace pencilscan {
 namespace {
@@ -85,7 +86,8 @@ bool same_color_family(const Rig& rig, PatternChannel a, PatternChannel b) {
   const auto& colors_a = pattern_of(rig, a).colors;
   const auto& colors_b = pattern_of(rig, b).colors;
   return std::set<PatternColor>(colors_a.begin(), colors_a.end()) ==
-         std::set<PatternColor>(colors_b.begin(), colors_b.end());
+             std::set<PatternColor>(colors_b.begin(), colors_b.end()) ||
+         paired_colors(colors_a, colors_b).has_value();
 }
 
 TruthScene::TruthScene(const TriangleMesh& mesh, const Rig& rig)

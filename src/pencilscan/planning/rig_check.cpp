@@ -8,6 +8,7 @@
 
 #include "pencilscan/core/median.h"
 #include "pencilscan/core/parallel.h"
+#include "pencilscan/pattern/color_likeness.h"
 
 namespace pencilscan {
 namespace {
@@ -216,7 +217,8 @@ Vec3 axis_direction(const Projector& projector, Axis axis) {
 
 bool share_a_color(const LinePattern& a, const LinePattern& b) {
   return std::any_of(a.colors.begin(), a.colors.end(), [&](const PatternColor& color) {
-    return std::find(b.colors.begin(), b.colors.end(), color) != b.colors.end();
+    return std::any_of(b.colors.begin(), b.colors.end(),
+                       [&](const PatternColor& other) { return look_alike(color, other); });
   });
 }
 

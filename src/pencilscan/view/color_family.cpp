@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "pencilscan/pattern/color_likeness.h"
+
 namespace pencilscan {
 namespace {
 
@@ -40,10 +42,7 @@ void set_presence(std::vector<ColorFamily>& families) {
 
 std::vector<int> ColorFamily::color_of_symbol(const LinePattern& pattern) const {
   std::vector<int> index;
-  for (const PatternColor& color : pattern.colors) {
-    index.push_back(
-        static_cast<int>(std::find(colors.begin(), colors.end(), color) - colors.begin()));
-  }
+  for (const PatternColor& color : pattern.colors) index.push_back(likeliest_color(color, colors));
   return index;
 }
 
@@ -53,8 +52,9 @@ std::vector<ColorFamily> color_families(const Rig& rig) {
     for (std::size_t k = 0; k < rig.projectors[p].patterns.size(); ++k) {
       std::vector<PatternColor> colors = rig.projectors[p].patterns[k].colors;
       std::sort(colors.begin(), colors.end());
-      auto family = std::find_if(families.begin(), families.end(),
-                                 [&](const ColorFamily& f) { return f.colors == colors; });
+      auto family = std::find_if(families.begin(), families.end(), [&](const ColorFamily& f) {
+        return f.colors == colors || paired_colors(colors, f.colors).has_value();
+      });
       if (family == families.end()) {
         family = families.insert(family, ColorFamily());
         family->colors = colors;

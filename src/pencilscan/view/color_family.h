@@ -7,15 +7,19 @@
 
 namespace pencilscan {
 
-/// All patterns drawn with one set of colours. One family = one ridge image: `presence` weighs
-/// unmixed projector red, green, blue so that each of its colours gives 1 and those of the other
-/// families give 0 (blue/cyan against red/yellow: the blue channel).
+/// All patterns drawn with one set of colours, or with colours that a camera takes for these
+/// (color_likeness.h): `colors` are those of its first pattern. One family = one ridge image:
+/// `presence` weighs unmixed projector red, green, blue so that each of its colours gives 1 and
+/// those of the other families give 0 (blue/cyan against red/yellow: the blue channel).
 struct ColorFamily {
   std::vector<PatternColor> colors;
   std::vector<PatternRef> patterns;
   Vec3 presence = Vec3::Zero();
   double leakage = 0;  ///< largest |presence . colour of another family|; 0: separable
 
+  /// The other families' light is in its picture, and none of the lines there explain it: more of
+  /// it than colours are known to.
+  [[nodiscard]] bool mixes() const { return leakage > 0.1; }
   /// Index in `colors` of each symbol of a pattern's alphabet.
   [[nodiscard]] std::vector<int> color_of_symbol(const LinePattern& pattern) const;
 };
