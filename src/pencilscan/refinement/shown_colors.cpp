@@ -58,6 +58,7 @@ ShownColorCount::ShownColorCount(const Rig& rig) : rig_(&rig), seen_(rig.cameras
       counts_.push_back({ref, chance_of(pattern(ref)), 0, 0, std::vector<double>(shifts, 0), {}});
     }
   }
+  for (std::vector<Seen>& in_camera : seen_) in_camera.resize(counts_.size());
 }
 
 const LinePattern& ShownColorCount::pattern(PatternRef ref) const {
@@ -78,11 +79,11 @@ void ShownColorCount::add(const std::vector<ColorFamily>& families,
       const LinePattern& lines = pattern(count->ref);
       const std::vector<int> color_of = family.color_of_symbol(lines);
       const int reach = reach_of(lines);
-      const double chance = count->chance;
-      Seen& in_camera = seen_[static_cast<std::size_t>(graph.camera)];
+      Seen& in_camera = seen_[static_cast<std::size_t>(graph.camera)]
+                             [static_cast<std::size_t>(count - counts_.begin())];
       ++count->runs;
       count->seen.resize(family.colors.size(), 0);
-      if (chance < 1) ++in_camera.runs;
+      ++in_camera.runs;
       for (int i = run.begin; i < run.end; ++i) {
         const SeenColor seen =
             seen_color(curve.code.data() + static_cast<std::ptrdiff_t>(i) * colors, colors);
@@ -93,12 +94,9 @@ void ShownColorCount::add(const std::vector<ColorFamily>& families,
           const int id = (run.label.line + shift + lines.period() * kFarthest) % lines.period();
           if (color_of[static_cast<std::size_t>(lines.symbol(id))] != seen.color) continue;
           count->agree[static_cast<std::size_t>(shift + reach)] += seen.weight;
-          if (shift == 0 && chance < 1) in_camera.agree += seen.weight;
+          if (shift == 0) in_camera.agree += seen.weight;
         }
-        if (chance < 1) {
-          in_camera.weight += seen.weight;
-          in_camera.chance += chance * seen.weight;
-        }
+        in_camera.weight += seen.weight;
       }
     }
   }
@@ -133,13 +131,23 @@ std::vector<ShownColors> ShownColorCount::shown() const {
 }
 
 std::vector<ShownColors> ShownColorCount::seen() const {
+  const std::vector<ShownColors> of_patterns = shown();
   std::vector<ShownColors> result;
-  for (const Seen& camera : seen_) {
-    ShownColors& shown = result.emplace_back();
-    shown.runs = camera.runs;
-    if (!(camera.weight > 0)) continue;
-    shown.chance = camera.chance / camera.weight;
-    shown.share = shown.shifted_share = camera.agree / camera.weight;
+  for (const std::vector<Seen>& in_camera : seen_) {
+    ShownColors& seen = result.emplace_back();
+    double weight = 0;
+    double chance = 0;
+    double agree = 0;
+    for (std::size_t k = 0; k < counts_.size(); ++k) {
+      if (!(counts_[k].chance < 1) || of_patterns[k].all_look_alike()) continue;
+      seen.runs += in_camera[k].runs;
+      weight += in_camera[k].weight;
+      chance += counts_[k].chance * in_camera[k].weight;
+      agree += in_camera[k].agree;
+    }
+    if (!(weight > 0)) continue;
+    seen.chance = chance / weight;
+    seen.share = seen.shifted_share = agree / weight;
   }
   return result;
 }

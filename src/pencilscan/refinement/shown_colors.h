@@ -53,7 +53,7 @@ class ShownColorCount {
            const Labeling& labeling);
   /// By pattern, in the order of projectors and patterns.
   [[nodiscard]] std::vector<ShownColors> shown() const;
-  /// By camera.
+  /// By camera, over the patterns whose lines do not all look alike.
   [[nodiscard]] std::vector<ShownColors> seen() const;
   /// Names of the projectors and cameras that these deny; empty: none.
   [[nodiscard]] std::string denied() const;
@@ -71,17 +71,16 @@ class ShownColorCount {
   };
   [[nodiscard]] const LinePattern& pattern(PatternRef ref) const;
 
-  /// Of a camera; `chance` is a sum of weights, as `agree` is.
+  /// Of a camera and a pattern.
   struct Seen {
     std::size_t runs = 0;
     double weight = 0;
     double agree = 0;
-    double chance = 0;
   };
 
   const Rig* rig_;
   std::vector<Count> counts_;
-  std::vector<Seen> seen_;
+  std::vector<std::vector<Seen>> seen_;  ///< by camera, then as counts_
 };
 
 }  // namespace pencilscan
