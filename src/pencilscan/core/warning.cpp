@@ -46,6 +46,8 @@ const char* to_string(WarningCode code) {
       return "few-names";
     case WarningCode::kMotion:
       return "motion";
+    case WarningCode::kVolumeCuts:
+      return "volume-cuts";
   }
   return "";
 }

@@ -29,6 +29,7 @@ enum class WarningCode {
   kMissingLines,    ///< of a projector; figures "share", "usual_share": of its lines, the others'
   kFewNames,        ///< figure "share": of the curve points that got their line
   kMotion,          ///< within the exposure; figures "way_mm", "way_sigma_mm"
+  kVolumeCuts,      ///< figure "share": of the named points, those where a line leaves the volume
 };
 
 /// The word for files: "saturated", "rig-is-off" and so on.

@@ -19,7 +19,7 @@ struct Known {
 };
 
 /// What to do about warnings, by their code (core/warning.h).
-constexpr std::array<Known, 17> kKnown = {{
+constexpr std::array<Known, 18> kKnown = {{
     {"saturated",
      "Close the aperture or shorten the exposure until the brightest lines stay below "
      "full scale, and capture again."},
@@ -55,6 +55,9 @@ constexpr std::array<Known, 17> kKnown = {{
      "depth from being found between the curves."},
     {"not-closed", "Look at the mesh for gaps; more overlap between the cameras closes them."},
     {"little-measured", "More cameras and projectors around the object measure more of it."},
+    {"volume-cuts",
+     "Look at where the measured surface ends: if the object goes on there, state a larger volume "
+     "in the rig; if that is what it stands on, state its floor."},
     {"missing-lines",
      "Look whether the projector shines, and whether its picture is the one that the rig states "
      "(pencilscan pattern writes it)."},

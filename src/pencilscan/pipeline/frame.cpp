@@ -38,7 +38,9 @@ std::string why_nothing(const PointResult& result) {
 }
 
 /// What is done once no line's name changes any more.
-void end_points(const Frame& frame, PointResult& result) {
+void end_points(const Rig& rig, const Frame& frame, PointResult& result) {
+  if (auto warning = volume_warning(rig, lines_cut_by_volume(rig, result.graphs, result.labeling)))
+    result.warnings.push_back(std::move(*warning));
   if (auto warning = few_names_warning(result)) result.warnings.push_back(std::move(*warning));
   restore_light(frame, result);
 }
@@ -83,7 +85,7 @@ FrameResult measure_frame(const Rig& rig, const Frame& frame, PointResult lines,
       rig, std::move(lines), looks_again ? before_surface(options.points) : options.points, clock);
   if (result.points.points.empty()) throw NothingFound(why_nothing(result.points));
   if (!options.meshes) {
-    end_points(frame, result.points);
+    end_points(rig, frame, result.points);
     return result;
   }
   const Frame right = without(frame, result.points.left_out);
@@ -92,7 +94,7 @@ FrameResult measure_frame(const Rig& rig, const Frame& frame, PointResult lines,
   result = match_on_surface(rig, std::move(result), options.points, clock);
   clock("confirmation",
         [&] { result = finish_shape(rig, std::move(result), options.shape.fusion); });
-  end_points(frame, result.points);
+  end_points(rig, frame, result.points);
   if (auto warning = little_light_warning(result))
     result.points.warnings.push_back(std::move(*warning));
   return count_motion(rig, std::move(result));

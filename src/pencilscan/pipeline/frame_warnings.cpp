@@ -21,7 +21,7 @@ std::vector<Warning> detection_warnings(const Rig& rig, const Frame& frame,
                                         std::span<const CameraDetection> detections) {
   std::vector<Warning> warnings = frame.notes;
   for (const ColorFamily& family : families) {
-    if (family.leakage <= 0.1) continue;
+    if (!family.mixes()) continue;
     std::string names;
     for (const PatternColor& color : family.colors) add_name(names, color.text(), "/");
     warnings.push_back({WarningCode::kColorsMix, "the colours " + names +
@@ -225,6 +225,21 @@ std::vector<Warning> missing_lines_warnings(const Rig& rig,
          {{"share", own}, {"usual_share", usual}}});
   }
   return warnings;
+}
+
+std::optional<Warning> volume_warning(const Rig& rig, const CutLines& lines) {
+  // As of a room around the volume (joint/piece_labels.cpp): rims of an object that fills it stay
+  // below. A bunny and a ball with half and more of them outside: .30 each.
+  constexpr double kMany = 0.1;
+  if (lines.share() <= kMany) return std::nullopt;
+  return Warning{WarningCode::kVolumeCuts,
+                 "what was measured goes on beyond the volume, whose edge cuts " +
+                     formatted(100 * lines.share(), "%.0f") +
+                     " % of the named lines: if that is the object, " +
+                     (rig.volume ? "state a larger volume" : "state a volume that holds it") +
+                     "; if it is what the object stands on, state \"floor\"",
+                 {},
+                 {{"share", lines.share()}}};
 }
 
 std::optional<Warning> few_names_warning(const PointResult& result) {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "pencilscan/core/warning.h"
+#include "pencilscan/pipeline/cut_lines.h"
 #include "pencilscan/pipeline/frame.h"
 #include "pencilscan/pipeline/view_agreement.h"
 
@@ -47,6 +48,9 @@ namespace pencilscan {
 /// others have theirs.
 [[nodiscard]] std::vector<Warning> missing_lines_warnings(const Rig& rig,
                                                           std::span<const ExpectedLines> expected);
+
+/// That the volume cuts what was measured.
+[[nodiscard]] std::optional<Warning> volume_warning(const Rig& rig, const CutLines& lines);
 
 /// That hardly any of the lines in the pictures could be named.
 [[nodiscard]] std::optional<Warning> few_names_warning(const PointResult& result);

@@ -201,6 +201,20 @@ TEST_F(Laws, AGammaThatIsNotStatedIsNamed) {
   EXPECT_NEAR(gamma_named(sample::labelled_points(with_gamma(*rig_), *frame_)), 1, 0.15);
 }
 
+TEST_F(Laws, AVolumeThatCutsTheObjectIsNamed) {
+  const auto cut = [](const Rig& rig, const Frame& frame) {
+    for (const Warning& warning : sample::labelled_points(rig, frame).warnings)
+      if (warning.code == WarningCode::kVolumeCuts) return warning.figures.front().second;
+    return 0.0;
+  };
+  EXPECT_EQ(cut(*rig_, *frame_), 0);
+  Rig narrow = *rig_;
+  narrow.volume = Sphere{{0, 60, 0}, 90};  // of the ball of 95 mm the better half
+  EXPECT_GT(cut(narrow, *frame_), 0.2);
+  narrow.volume = Sphere{{95, 0, 0}, 50};  // what stands out of the ball's front
+  EXPECT_GT(cut(narrow, *frame_), 0.2);
+}
+
 /// Where crossings are few in each camera, all cameras' tell the gamma.
 TEST_F(Laws, AGammaIsNamedByFewCrossingsOfManyCameras) {
   constexpr std::size_t kOfEach = 150;  // two in eight say something
