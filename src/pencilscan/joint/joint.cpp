@@ -8,6 +8,7 @@
 #include "pencilscan/grid/local_ids.h"
 #include "pencilscan/joint/anchors.h"
 #include "pencilscan/joint/darkness.h"
+#include "pencilscan/joint/ghosts_before_room.h"
 #include "pencilscan/joint/min_sum.h"
 #include "pencilscan/joint/next_lines.h"
 #include "pencilscan/joint/other_views.h"
@@ -234,11 +235,11 @@ void write_decisions(const LabelledPieces& pieces, const std::vector<Decision>& 
     };
     const float margin = decisions[p].margin;
     const float confidence = lacks ? uncrossed_confidence_of(margin) : confidence_of(margin);
-    if (pieces.labels[p].empty()) {
+    const bool is_sure = decisions[p].label >= 0 && confidence >= least;
+    if (pieces.labels[p].empty() || (pieces.meets_volume[p] == 0 && !is_sure)) {
       leave(UndecidedReason::kOutsideVolume);
       continue;
     }
-    const bool is_sure = confidence >= least;
     if (decisions[p].label >= 0) {
       const PieceLabel& label = pieces.labels[p][static_cast<std::size_t>(decisions[p].label)];
       (is_sure ? runs : tentative)
@@ -302,6 +303,7 @@ Labeling solve_joint(const Rig& rig, const std::vector<ColorFamily>& families,
     });
     beliefs = std::move(next);
   }
+  const ObjectSpace space(rig);
   parallel_for(graphs.size(), [&](std::size_t g) {
     if (lacks_crossings(pieces[g].graph)) {
       ask_stretches(rig, graphs[g], pieces[g], beside[g], options, energies[g], decisions[g]);
@@ -309,6 +311,7 @@ Labeling solve_joint(const Rig& rig, const std::vector<ColorFamily>& families,
     } else {
       leave_unanchored(pieces[g], beside[g], options, decisions[g]);
     }
+    leave_ghosts_before_room(rig.camera(graphs[g].camera), pieces[g], space, options, decisions[g]);
   });
   Labeling labeling;
   labeling.runs.resize(rig.cameras.size());

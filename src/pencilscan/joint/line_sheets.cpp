@@ -108,7 +108,8 @@ void LineSheets::candidates(const Eigen::Vector2f& normalized, float w_low, floa
 float LineSheets::along(const Eigen::Vector3f& ray, float w) const {
   if (!bent_) {
     const Eigen::Vector4f x(ray.x(), ray.y(), ray.z(), w);
-    return along_.dot(x) / along_scale_.dot(x);
+    const float depth = along_scale_.dot(x);
+    return depth > 0 ? along_.dot(x) / depth : -1.F;  // behind the projector there is no light
   }
   const auto pixel = bent_->project((ray / w).cast<double>());
   return pixel ? static_cast<float>((*pixel)[along_axis_]) : -1.F;

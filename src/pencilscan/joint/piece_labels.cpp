@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "pencilscan/detection/code_evidence.h"
+#include "pencilscan/grid/line_candidates.h"
 #include "pencilscan/joint/floor_cost.h"
 #include "pencilscan/joint/next_lines.h"
 #include "pencilscan/rig/object_space.h"
@@ -219,18 +220,52 @@ std::vector<char> meets_volume(const Camera& camera, const Sphere& volume, const
   return meets;
 }
 
-/// Where lines may lie: the volume, and where a good part of the curves misses it, so that there is
-/// a room around the object, what is near it, too. A floor's line that had no label of its own
-/// would take that of a place in the air above it.
-Sphere reach_of_labels(const Sphere& volume, const std::vector<char>& meets_volume) {
-  // Of the pieces; rims of an object that fills the volume stay below.
+/// True where a good part of the curves misses the volume, or lies at the picture's border, where
+/// an object that is in the picture ends and a room goes on: there is a room around the object.
+bool shows_room(const Camera& camera, const GridGraph& graph, const LabelledPieces& pieces) {
+  // Of the pieces; rims of an object that fills the volume stay below. In a picture full of lines
+  // 1 - (1 - 2 / 20)^2 = 19 % of them lie at the border.
   constexpr double kRoom = 0.1;
-  constexpr double kSurround = 2;  // radii; what lies farther rarely meets other lines by chance
-  const auto outside = std::count(meets_volume.begin(), meets_volume.end(), 0);
-  const bool is_room =
-      static_cast<double>(outside) > kRoom * static_cast<double>(meets_volume.size());
-  return {volume.center, is_room ? kSurround * volume.radius : volume.radius};
+  constexpr double kBorder = 0.05;  // of the picture's width and height
+  std::size_t outside = 0;
+  for (std::size_t p = 0; p < pieces.meets_volume.size(); ++p) {
+    const Vec2 pixel = middle_pixel(graph, pieces.graph.pieces[p]);
+    const Vec2 share(pixel.x() / camera.width - 0.5, pixel.y() / camera.height - 0.5);
+    const bool is_at_border = share.cwiseAbs().maxCoeff() > 0.5 - kBorder;
+    outside += pieces.meets_volume[p] == 0 || is_at_border ? 1 : 0;
+  }
+  return static_cast<double>(outside) > kRoom * static_cast<double>(pieces.meets_volume.size());
 }
+
+/// Where along a camera's rays lines may lie: in the volume, and where the camera shows a room,
+/// from a radius before the volume to any depth behind it. A wall's line that had no label of its
+/// own would take that of a place in the air before it. Panels end, so that a ray meets few more
+/// lines from there to infinity.
+class LabelReach {
+ public:
+  LabelReach(const Camera& camera, const Sphere& volume, bool is_room)
+      : camera_(camera), volume_(volume), is_room_(is_room) {
+    constexpr double kBefore = 2;      // radii from the centre
+    constexpr double kFarthest = 1e3;  // of the centre's depth; lines there are those of infinity
+    const double distance = (camera.device_from_world * volume.center).z();
+    const double before = is_room ? kBefore * volume.radius : volume.radius;
+    const double far = is_room ? kFarthest * distance : distance + volume.radius;
+    all_ = {std::max(distance / kFarthest, distance - before), far};
+  }
+
+  /// Of the ray of a pixel; nothing where no line may lie on it.
+  [[nodiscard]] std::optional<DepthRange> along(const Vec2& pixel) const {
+    return is_room_ ? all_ : depth_range(camera_, volume_, pixel);
+  }
+  /// Of all rays.
+  [[nodiscard]] double inverse_depth_range() const { return 1 / all_.near - 1 / all_.far; }
+
+ private:
+  const Camera& camera_;
+  const Sphere& volume_;
+  bool is_room_;
+  DepthRange all_;
+};
 
 }  // namespace
 
@@ -320,11 +355,9 @@ LabelledPieces possible_labels(const Rig& rig, const std::vector<ColorFamily>& f
       visible[f].emplace_back(rig, camera, families[f], ref, costs[k]);
     }
   }
-  const std::vector<char> is_inside = meets_volume(camera, volume, graph, result.graph);
-  const Sphere reach = reach_of_labels(volume, is_inside);
-  const double distance = (camera.device_from_world * volume.center).z();
-  result.inverse_depth_range = static_cast<float>(
-      1 / std::max(1e-3 * distance, distance - reach.radius) - 1 / (distance + reach.radius));
+  result.meets_volume = meets_volume(camera, volume, graph, result.graph);
+  const LabelReach reach(camera, volume, shows_room(camera, graph, result));
+  result.inverse_depth_range = static_cast<float>(reach.inverse_depth_range());
   for (const Projector& projector : rig.projectors) {
     const Vec3 light = camera.device_from_world * projector.center();
     result.lights.push_back(light.cast<float>());
@@ -334,11 +367,11 @@ LabelledPieces possible_labels(const Rig& rig, const std::vector<ColorFamily>& f
   std::vector<PieceLabel> labels;
   result.labels.resize(result.graph.pieces.size());
   for (std::size_t p = 0; p < result.graph.pieces.size(); ++p) {
-    if (is_inside[p] == 0) continue;
     const CurvePiece& piece = result.graph.pieces[p];
     labels.clear();
     const Curve& curve = graph.curves[static_cast<std::size_t>(piece.curve)];
-    const auto range = depth_range(camera, reach, middle_pixel(graph, piece));
+    const auto range = reach.along(middle_pixel(graph, piece));
+    if (!range) continue;
     const auto w_low = static_cast<float>(1 / range->far);
     const auto w_high = static_cast<float>(1 / range->near);
     const ColorFamily& family = families[static_cast<std::size_t>(curve.family)];

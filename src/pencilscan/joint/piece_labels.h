@@ -48,7 +48,8 @@ struct LabelledPieces {
   /// Of each label: its cost with what crossings and the curve's other pieces say, each of them
   /// free to choose.
   std::vector<std::vector<float>> scores;
-  float inverse_depth_range = 1;        ///< of the volume
+  std::vector<char> meets_volume;       ///< per piece, whether the ray through its middle does
+  float inverse_depth_range = 1;        ///< of where labels are sought
   std::vector<Eigen::Vector3f> lights;  ///< per projector: its centre in the camera's frame
 };
 
@@ -65,9 +66,9 @@ struct LabelledPieces {
 using PieceBeliefs = std::vector<std::vector<float>>;
 
 /// The labels that a piece may have. First these are all lines of its family whose depth lies in
-/// the volume. Each has the cost of the piece's colours, of the slant that the line would give the
-/// surface and of its depth beside a stated floor. Then only those that the crossings support best
-/// are kept (options.max_labels).
+/// the volume, or also behind it where the camera shows a room. Each has the cost of the piece's
+/// colours, of the slant that the line would give the surface and of its depth beside a stated
+/// floor. Then only those that the crossings support best are kept (options.max_labels).
 [[nodiscard]] LabelledPieces possible_labels(const Rig& rig,
                                              const std::vector<ColorFamily>& families,
                                              const GridGraph& graph, const JointOptions& options);
