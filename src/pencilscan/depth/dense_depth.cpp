@@ -91,18 +91,64 @@ Quadric quadric_of(const TangentView& at, int half) {
   return q;
 }
 
-/// A stated floor in one camera. Its lines continue those of the object one or more lines off;
-/// there a window may fit a surface in the air beside the object as well as the floor that it
-/// shows.
-class FloorView {
- public:
-  FloorView(const CameraLight& light, const ObjectSpace& space)
-      : light_(light), floor_(space.floor()), space_(space.with_floor()) {}
+/// The background's points at the light's pixels.
+std::vector<MeasuredPoint> seen_by(const CameraLight& light, std::vector<MeasuredPoint> points) {
+  for (MeasuredPoint& p : points) {
+    const auto pixel = light.camera->project(position_of(p));
+    if (!pixel) continue;
+    p.u = static_cast<float>(pixel->x());
+    p.v = static_cast<float>(pixel->y());
+  }
+  return points;
+}
 
-  /// True when the floor explains the window as well as the fit does.
+/// Floors and walls in one camera. Their lines continue those of the object one or more lines off;
+/// there a window may fit a surface in the air beside the object as well as the background that it
+/// shows.
+class BackgroundView {
+ public:
+  BackgroundView(const CameraLight& light, const Background& background,
+                 const DepthOptions& options)
+      : light_(light),
+        options_(options),
+        floor_(background.space.floor()),
+        space_(background.space.with_floor()) {
+    if (!background.points.empty())
+      seeds_.emplace(*light.camera, background.points.front().camera,
+                     seen_by(light, background.points));
+  }
+
+  /// True when the background explains the window as well as the fit does.
   [[nodiscard]] bool shows(const Vec2& pixel, const WindowFit& fit, WindowFitter& fitter) const {
-    constexpr double kSameLine = 0.2;  // lines; a floor off the stated plane, and its relief
-    constexpr float kAsWell = 1.1F;    // chi^2 of a window's hundred samples scatters by so much
+    return shows_floor(pixel, fit, fitter) || shows_named_lines(pixel, fit, fitter);
+  }
+
+ private:
+  static constexpr double kSameLine = 0.2;  // lines; a floor off the stated plane, and its relief
+
+  /// True when a fit that starts on the background stays there, and is as good.
+  static bool is_as_good(const Vec2& pixel, const Quadric& start, const WindowFit& fit,
+                         WindowFitter& fitter) {
+    constexpr float kAsWell = 1.1F;  // chi^2 of a window's hundred samples scatters by so much
+    const auto behind = fitter.fit(pixel, start, 5);
+    if (!behind || behind->misfit > kAsWell * fit.misfit || behind->lit.count() < fit.lit.count())
+      return false;
+    // It still is the background, over the whole window.
+    return (behind->q - start).head<3>().cwiseAbs().sum() *
+               static_cast<double>(behind->lines_per_w) <
+           kSameLine;
+  }
+
+  [[nodiscard]] bool shows_named_lines(const Vec2& pixel, const WindowFit& fit,
+                                       WindowFitter& fitter) const {
+    if (!seeds_) return false;
+    for (const Quadric& start : seeds_->planes(pixel, options_.seed_radius_px, fitter.half()))
+      if (is_as_good(pixel, start, fit, fitter)) return true;
+    return false;
+  }
+
+  [[nodiscard]] bool shows_floor(const Vec2& pixel, const WindowFit& fit,
+                                 WindowFitter& fitter) const {
     if (!floor_) return false;
     const Ray ray = light_.camera->ray(pixel);
     const double descent = -ray.direction.dot(floor_->normal);
@@ -121,16 +167,9 @@ class FloorView {
       const double apart = *fitted - *on_floor;
       if (std::abs(apart - std::round(apart)) > kSameLine) return false;
     }
-    const Quadric start = quadric_of(at, fitter.half());
-    const auto floor = fitter.fit(pixel, start, 5);
-    if (!floor || floor->misfit > kAsWell * fit.misfit || floor->lit.count() < fit.lit.count())
-      return false;
-    // It still is the floor, over the whole window.
-    return (floor->q - start).head<3>().cwiseAbs().sum() * static_cast<double>(floor->lines_per_w) <
-           kSameLine;
+    return is_as_good(pixel, quadric_of(at, fitter.half()), fit, fitter);
   }
 
- private:
   [[nodiscard]] std::optional<double> line(std::size_t pattern, const Vec2& m,
                                            const Eigen::Matrix2d& jacobian, double w) const {
     bool ok = false;
@@ -140,8 +179,10 @@ class FloorView {
   }
 
   const CameraLight& light_;
+  const DepthOptions& options_;
   std::optional<Floor> floor_;
   ObjectSpace space_;
+  std::optional<CurveSeeds> seeds_;
 };
 
 constexpr std::size_t kPilots = 100;
@@ -212,10 +253,11 @@ std::vector<PilotWindow> pilot_windows(const CameraLight& light, const RayScene&
   return pilots;
 }
 
-void grow(const CameraLight& light, const ObjectSpace& space, const DepthOptions& options,
+void grow(const CameraLight& light, const Background& background, const DepthOptions& options,
           DepthMap& map) {
   WindowFitter fitter(light, options.half);
-  const FloorView floor(light, space);
+  const BackgroundView behind(light, background, options);
+  const ObjectSpace& space = background.space;
   std::vector<std::size_t> front;
   for (std::size_t i = 0; i < map.nodes.size(); ++i)
     if (map.nodes[i].measured()) front.push_back(i);
@@ -249,7 +291,7 @@ void grow(const CameraLight& light, const ObjectSpace& space, const DepthOptions
           best = fit;
         }
       }
-      if (best && !floor.shows(map.pixel(j), *best, fitter))
+      if (best && !behind.shows(map.pixel(j), *best, fitter))
         found.emplace_back(j, node_of(*best, options.half, map.lit_sets));
     }
     for (const auto& [j, node] : found) {
@@ -260,7 +302,7 @@ void grow(const CameraLight& light, const ObjectSpace& space, const DepthOptions
 }
 
 DepthMap dense_depth(const CameraLight& light, int camera, std::span<const MeasuredPoint> points,
-                     const ObjectSpace& space, const DepthOptions& options) {
+                     const Background& background, const DepthOptions& options) {
   DepthMap map;
   map.camera = camera;
   map.stride = options.stride;
@@ -269,7 +311,8 @@ DepthMap dense_depth(const CameraLight& light, int camera, std::span<const Measu
   map.nodes.resize(static_cast<std::size_t>(map.columns) * static_cast<std::size_t>(map.rows));
   const CurveSeeds seeds(*light.camera, camera, points);
   WindowFitter fitter(light, options.half);
-  const FloorView floor(light, space);
+  const BackgroundView behind(light, background, options);
+  const ObjectSpace& space = background.space;
   // Nodes near labelled curves.
   for (std::size_t i = 0; i < map.nodes.size(); ++i) {
     const Vec2 pixel = map.pixel(i);
@@ -281,23 +324,24 @@ DepthMap dense_depth(const CameraLight& light, int camera, std::span<const Measu
         best = fit;
       }
     }
-    if (!best || floor.shows(pixel, *best, fitter)) continue;
+    if (!best || behind.shows(pixel, *best, fitter)) continue;
     map.nodes[i] = node_of(*best, options.half, map.lit_sets);
     map.nodes[i].seeded = true;
   }
-  grow(light, space, options, map);
+  grow(light, background, options, map);
   mark_saturated(light, options.half, map);
   return map;
 }
 
 std::size_t complete_map(const CameraLight& light, const RayScene& surface,
-                         const ObjectSpace& space, double sigma_factor, const DepthOptions& options,
-                         DepthMap& map) {
+                         const Background& background, double sigma_factor,
+                         const DepthOptions& options, DepthMap& map) {
   constexpr float kConfidence = 0.9F;  // of rendered objects' nodes, 96 % or more are right
   constexpr double kHardPlaces = 1.8;  // rims and gaps: errors beyond what the window's fit says
   const Camera& camera = *light.camera;
   WindowFitter fitter(light, options.half);
-  const FloorView floor(light, space);
+  const BackgroundView behind(light, background, options);
+  const ObjectSpace& space = background.space;
   std::size_t found = 0;
   for (std::size_t i = 0; i < map.nodes.size(); ++i) {
     if (map.nodes[i].measured()) continue;
@@ -309,7 +353,7 @@ std::size_t complete_map(const CameraLight& light, const RayScene& surface,
     const auto fit = fitter.fit(pixel, start, 5);
     if (!fit || !acceptable(light, pixel, *fit, space, options.half, options)) continue;
     const double move = (camera.point_at_depth(pixel, 1 / fit->q[0]) - hit->point).norm();
-    if (move > options.max_move || floor.shows(pixel, *fit, fitter)) continue;
+    if (move > options.max_move || behind.shows(pixel, *fit, fitter)) continue;
     map.nodes[i] = node_of(*fit, options.half, map.lit_sets);
     map.nodes[i].sigma *= static_cast<float>(kHardPlaces * sigma_factor);
     map.nodes[i].confidence = kConfidence;

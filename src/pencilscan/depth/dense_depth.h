@@ -26,6 +26,13 @@ struct DepthOptions {
   double max_move_lines = 0.16;   ///< line spacings, if that is more
 };
 
+/// What one camera may see beside the object: where the object cannot be, and points of it that
+/// have named lines.
+struct Background {
+  ObjectSpace space;
+  std::vector<MeasuredPoint> points;  ///< of this camera
+};
+
 /// The options as they are for one camera's pictures: windows behind a mosaic are wider, and so are
 /// those of wide lines.
 [[nodiscard]] DepthOptions options_for(const CameraLight& light, DepthOptions options);
@@ -41,13 +48,14 @@ struct DepthOptions {
 
 /// The depth map of camera `camera` (index in the rig), one node every options.stride px. Windows
 /// of nodes near labelled curve points start from these; grow() goes on from there. Of `points`,
-/// those of this camera count. What lies outside `space` has no depth.
+/// those of this camera count. What lies outside the object's space has no depth, nor has a window
+/// that the background explains as well.
 [[nodiscard]] DepthMap dense_depth(const CameraLight& light, int camera,
-                                   std::span<const MeasuredPoint> points, const ObjectSpace& space,
-                                   const DepthOptions& options);
+                                   std::span<const MeasuredPoint> points,
+                                   const Background& background, const DepthOptions& options);
 
 /// Outwards from nodes with depth, in rounds: the windows of their neighbours start from them.
-void grow(const CameraLight& light, const ObjectSpace& space, const DepthOptions& options,
+void grow(const CameraLight& light, const Background& background, const DepthOptions& options,
           DepthMap& map);
 
 /// Fits the windows of nodes without depth whose rays meet `surface`. Each fit starts from the
@@ -55,7 +63,7 @@ void grow(const CameraLight& light, const ObjectSpace& space, const DepthOptions
 /// does not end there. sigma is multiplied by `sigma_factor`. Returns the number of nodes that got
 /// depth.
 std::size_t complete_map(const CameraLight& light, const RayScene& surface,
-                         const ObjectSpace& space, double sigma_factor, const DepthOptions& options,
-                         DepthMap& map);
+                         const Background& background, double sigma_factor,
+                         const DepthOptions& options, DepthMap& map);
 
 }  // namespace pencilscan

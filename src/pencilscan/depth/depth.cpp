@@ -19,6 +19,13 @@ cv::Mat unsaturated(const cv::Mat& values) {
   return valid;
 }
 
+Background background_of(const Rig& rig, std::span<const MeasuredPoint> points, int camera) {
+  Background background{ObjectSpace(rig), {}};
+  for (const MeasuredPoint& p : points)
+    if (p.camera == camera) background.points.push_back(p);
+  return background;
+}
+
 CameraDepthReport camera_report(const DepthMap& map, double blur_px) {
   CameraDepthReport report;
   report.camera = map.camera;
@@ -37,14 +44,14 @@ CameraDepthReport camera_report(const DepthMap& map, double blur_px) {
 DepthResult measure_depth(const Rig& rig, const std::vector<ColorFamily>& families,
                           std::span<const cv::Mat> images,
                           std::span<const CameraDetection> detections,
-                          std::span<const MeasuredPoint> points, const DepthStageOptions& options) {
+                          std::span<const MeasuredPoint> points, const DepthStageOptions& options,
+                          std::span<const MeasuredPoint> background) {
   PENCILSCAN_CHECK(images.size() == rig.cameras.size() && detections.size() == images.size());
   DepthResult result;
   std::vector<std::size_t> cameras;
   for (std::size_t c = 0; c < images.size(); ++c) {
     if (!images[c].empty() && !rig.cameras[c].sees_texture_only) cameras.push_back(c);
   }
-  const ObjectSpace space(rig);
   result.maps.resize(cameras.size());
   result.lights.resize(cameras.size());
   parallel_for(cameras.size(), [&](std::size_t i) {
@@ -71,10 +78,11 @@ DepthResult measure_depth(const Rig& rig, const std::vector<ColorFamily>& famili
     }
     light.noise.assign(families.size(), NoiseModel{});
     measure_light(pilot_windows(light, static_cast<int>(c), points, depth), depth.half, light);
-    result.maps[i] = dense_depth(light, static_cast<int>(c), points, space, depth);
+    const Background behind = background_of(rig, background, static_cast<int>(c));
+    result.maps[i] = dense_depth(light, static_cast<int>(c), points, behind, depth);
     with_wider_windows(
         light, binning_for(static_cast<double>(light.spacing_px), depth), result.maps[i],
-        [&](const CameraLight& wide, DepthMap& map) { grow(wide, space, depth, map); });
+        [&](const CameraLight& wide, DepthMap& map) { grow(wide, behind, depth, map); });
   });
 
   std::vector<int> pattern_projector;
@@ -90,18 +98,18 @@ DepthResult measure_depth(const Rig& rig, const std::vector<ColorFamily>& famili
 }
 
 void guided_depth(const Rig& rig, const RayScene& surface, const DepthStageOptions& options,
-                  DepthResult& result) {
+                  std::span<const MeasuredPoint> background, DepthResult& result) {
   PENCILSCAN_CHECK(result.lights.size() == result.maps.size());
-  const ObjectSpace space(rig);
   std::vector<std::size_t> found(result.maps.size());
   parallel_for(result.maps.size(), [&](std::size_t i) {
     DepthMap& map = result.maps[i];
+    const Background behind = background_of(rig, background, map.camera);
     DepthOptions depth = options_for(result.lights[i], options.depth);
     depth.max_move = std::max(depth.max_move, depth.max_move_lines * line_spacing(rig));
     const auto completed = [&](const CameraLight& light, DepthMap& completing) {
       std::size_t count = 0;
       const auto complete = [&](const CameraLight& seen, DepthMap& nodes) {
-        count += complete_map(seen, surface, space, result.report.consistency.sigma_factor, depth,
+        count += complete_map(seen, surface, behind, result.report.consistency.sigma_factor, depth,
                               nodes);
       };
       complete(light, completing);

@@ -42,12 +42,14 @@ struct DepthResult {
 /// fitted to the image of all lit projectors at once (window_fit.h), started from labelled curve
 /// points or from solved neighbours; then the cameras check each other (consistency.h). `images` as
 /// read, one per camera of the rig (empty: missing); `detections` of them, whose presence images
-/// the maps' lights share.
+/// the maps' lights share. `background`: points of named lines where the object cannot be, of all
+/// cameras; windows that they explain as well show them.
 [[nodiscard]] DepthResult measure_depth(const Rig& rig, const std::vector<ColorFamily>& families,
                                         std::span<const cv::Mat> images,
                                         std::span<const CameraDetection> detections,
                                         std::span<const MeasuredPoint> points,
-                                        const DepthStageOptions& options = {});
+                                        const DepthStageOptions& options = {},
+                                        std::span<const MeasuredPoint> background = {});
 
 /// How the object moved within the exposure, from the blur of the lines on the measured surface
 /// (line_blur.h). `result`: with its lights.
@@ -58,7 +60,8 @@ struct DepthResult {
 /// surface. Growth from neighbours does not cross a gap; the surface bridges it. A patch that no
 /// other camera confirmed enters only if it agrees with the surface. Only what the images show
 /// (dense_depth.h) is added to the maps of `result`. `surface`: in world coordinates, mm.
+/// `background` as above.
 void guided_depth(const Rig& rig, const RayScene& surface, const DepthStageOptions& options,
-                  DepthResult& result);
+                  std::span<const MeasuredPoint> background, DepthResult& result);
 
 }  // namespace pencilscan

@@ -222,7 +222,7 @@ TEST(DenseDepth, ASurfaceNearbyGivesDepthBackAndOneThatIsOffDoesNot) {
   ASSERT_GT(hole.size(), 30u);
   const auto found_of_hole = [&](double radius_mm) {
     DepthResult completed = result;
-    guided_depth(scene.rig, RayScene(make_sphere(radius_mm, 96)), {}, completed);
+    guided_depth(scene.rig, RayScene(make_sphere(radius_mm, 96)), {}, {}, completed);
     std::size_t found = 0;
     for (const std::size_t i : hole) {
       const DepthNode& node = completed.maps[0].nodes[i];
@@ -279,7 +279,7 @@ TEST(DenseDepth, ACameraWithoutLabelsSeesItsBlurAndDepthOnTheSurfaceOfOthers) {
   const auto guided = [&](float confidence) {
     surface.confidence.assign(surface.vertices.size(), confidence);
     DepthResult result = without;
-    guided_depth(scene.rig, RayScene(surface), {}, result);
+    guided_depth(scene.rig, RayScene(surface), {}, {}, result);
     return result;
   };
   EXPECT_LT(guided(0).report.cameras[1].measured, nodes / 10);  // nobody measured the surface

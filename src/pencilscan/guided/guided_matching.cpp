@@ -16,6 +16,7 @@
 #include "pencilscan/guided/denied_lines.h"
 #include "pencilscan/guided/line_chains.h"
 #include "pencilscan/points/triangulate.h"
+#include "pencilscan/rig/object_space.h"
 #include "pencilscan/view/places.h"
 
 namespace pencilscan {
@@ -125,7 +126,9 @@ class CameraMatching {
   const GuidedMatchingOptions& options_;
   std::vector<PatternRef> patterns_;  ///< that the camera can see
   std::vector<cv::Mat> unexplained_;  ///< per family; empty without images
+  ObjectSpace space_;
   LocalSurface surface_;
+  std::vector<char> shows_object_;          ///< per patch, 0: floors and walls
   bool has_dense_;                          ///< the surface does not rest on labels alone
   std::vector<MeasuredPoint> dense_;        ///< more points, not on the surface yet
   std::vector<LabeledRun> not_on_surface_;  ///< runs whose points it does not hold yet
@@ -149,6 +152,7 @@ CameraMatching::CameraMatching(const Rig& rig, const std::vector<ColorFamily>& f
       runs_(runs),
       tentative_(tentative),
       options_(options),
+      space_(rig),
       surface_(camera_, options.surface),
       has_dense_(!dense.empty()),
       known_(camera_.width, camera_.height, kPlaceCellPx),
@@ -202,13 +206,22 @@ void CameraMatching::grow_surface() {
   labeling.runs.resize(rig_.cameras.size());
   labeling.runs[static_cast<std::size_t>(graph_.camera)] = std::exchange(not_on_surface_, {});
   TriangulationOptions options;
-  // A floor is a surface like others here: its lines keep curves from names in the air above it.
-  options.keeps_floor = true;
+  // Floors and walls are surfaces like others here: their lines keep curves from names in the air
+  // before them.
+  options.keeps_background = true;
   options.used_of_seven = options_.surface.used_of_seven;
   std::vector<MeasuredPoint> points = triangulate(rig_, {&graph_, 1}, labeling, options);
   points.insert(points.end(), dense_.begin(), dense_.end());
   dense_.clear();
   surface_.add(points);
+  shows_object_.resize(surface_.patches().size());
+  for (std::size_t k = 0; k < shows_object_.size(); ++k) {
+    const SurfacePatch& patch = surface_.patches()[k];
+    if (surface_.refitted()[k] == 0 || !patch.exists()) continue;
+    const double depth = 1 / static_cast<double>(patch.inverse_depth(patch.pixel));
+    const Vec3 place = camera_.point_at_depth(patch.pixel.cast<double>(), depth);
+    shows_object_[k] = space_.holds(place) ? 1 : 0;
+  }
 }
 
 LocalSurface CameraMatching::take_surface() {
@@ -238,7 +251,7 @@ void CameraMatching::predict() {
        predict_lines(rig_, camera_, surface_, patterns_, options_.prediction)) {
     const bool is_named = is_known(p);
     if (!is_named) missing_.push_back(p);
-    if (!is_first || p.spacing_px < kFarApart) continue;
+    if (!is_first || p.spacing_px < kFarApart || shows_object_[p.patch] == 0) continue;
     ExpectedLines& of_projector = expected_[static_cast<std::size_t>(p.pattern.projector)];
     ++of_projector.points;
     of_projector.named += is_named ? 1 : 0;
@@ -566,8 +579,11 @@ void CameraMatching::find_missing() {
   std::vector<LabeledRun> labeled;
   std::vector<Curve> found;
   for (const LineChain& chain : chain_points(missing_)) {
-    // Where the surface is as it was, the line was not found before.
-    const auto is_new = [&](const PredictedPoint& p) { return surface_.refitted()[p.patch] != 0; };
+    // Where the surface is as it was, the line was not found before. Lines of floors and walls that
+    // no curve shows give no curve a wrong name.
+    const auto is_new = [&](const PredictedPoint& p) {
+      return surface_.refitted()[p.patch] != 0 && shows_object_[p.patch] != 0;
+    };
     if (static_cast<int>(chain.size()) < options_.min_points ||
         std::none_of(chain.begin(), chain.end(), is_new))
       continue;

@@ -37,6 +37,24 @@ std::string why_nothing(const PointResult& result) {
          " times as bright as the noise of the pictures (median)";
 }
 
+/// True where what lies in the volume is no more than wrong names among the room's lines make.
+bool shows_room_alone(const PointResult& result) {
+  // Before walls alone up to .06 % of the points lay in the volume (docs/sensors.md). Chosen: eight
+  // times as many, since rooms differ. A smaller object needs a smaller picture of the room.
+  constexpr double kWrong = 0.005;
+  return !result.background.empty() && static_cast<double>(result.points.size()) <
+                                           kWrong * static_cast<double>(result.background.size());
+}
+
+/// Of a frame that does so.
+std::string why_room_alone(const PointResult& result) {
+  return "nothing of the object was seen: of the points on lines that could be named, " +
+         std::to_string(result.background.size()) + " lie outside the volume or on the floor, " +
+         std::to_string(result.points.size()) +
+         " in the volume, no more than wrong names make: is the object in the volume that the rig "
+         "states?";
+}
+
 /// What is done once no line's name changes any more.
 void end_points(const Rig& rig, const Frame& frame, PointResult& result) {
   if (auto warning = volume_warning(rig, lines_cut_by_volume(rig, result.graphs, result.labeling)))
@@ -83,6 +101,7 @@ FrameResult measure_frame(const Rig& rig, const Frame& frame, PointResult lines,
   const bool looks_again = options.meshes && options.shape.depth.enabled && !lines.corrected;
   result.points = place_points(
       rig, std::move(lines), looks_again ? before_surface(options.points) : options.points, clock);
+  if (shows_room_alone(result.points)) throw NothingFound(why_room_alone(result.points));
   if (result.points.points.empty()) throw NothingFound(why_nothing(result.points));
   if (!options.meshes) {
     end_points(rig, frame, result.points);

@@ -103,6 +103,8 @@ struct PointResult {
   bool is_on_surface = false;    ///< matched once more, and settled, on the dense surface
   std::size_t contradicted = 0;  ///< labelled curve points that the dense surface contradicted
   std::vector<MeasuredPoint> points;
+  /// Of named lines that the object cannot show: on a stated floor, or outside the volume.
+  std::vector<MeasuredPoint> background;
   /// Per point, footprints: what its sigma rests on. Empty where it did not settle on the surface.
   std::vector<PointEvidence> evidence;
   std::vector<Warning> warnings;

@@ -8,6 +8,7 @@
 #include "pencilscan/pipeline/frame_warnings.h"
 #include "pencilscan/pipeline/view_agreement.h"
 #include "pencilscan/points/surface_check.h"
+#include "pencilscan/rig/object_space.h"
 
 // Of a frame's way: from the lines to points, and to points on the dense surface.
 
@@ -66,6 +67,18 @@ std::vector<MeasuredPoint> dense_points(const Rig& rig, std::span<const DepthMap
   return points;
 }
 
+/// Takes out what lies where the object cannot be.
+std::vector<MeasuredPoint> take_background(const Rig& rig, double volume_margin,
+                                           std::vector<MeasuredPoint>& points) {
+  const ObjectSpace space(rig, volume_margin);
+  const auto first =
+      std::stable_partition(points.begin(), points.end(),
+                            [&](const MeasuredPoint& p) { return space.holds(position_of(p)); });
+  std::vector<MeasuredPoint> background(first, points.end());
+  points.erase(first, points.end());
+  return background;
+}
+
 /// The presence images, which nobody looks at any more.
 std::vector<std::vector<cv::Mat>> taken_presence(std::span<CameraDetection> detections) {
   std::vector<std::vector<cv::Mat>> presence;
@@ -114,6 +127,7 @@ PointResult place_points(const Rig& rig, PointResult lines, const PointOptions& 
   }
   clock("triangulation", [&] {
     TriangulationOptions triangulation = options.triangulation;
+    triangulation.keeps_background = true;
     SettleOptions settle = options.settle;
     if (result.corrected) {
       triangulation.projection_sigma_px =
@@ -122,6 +136,7 @@ PointResult place_points(const Rig& rig, PointResult lines, const PointOptions& 
     }
     const auto place = [&] {
       result.points = triangulate(rig, result.graphs, result.labeling, triangulation);
+      result.background = take_background(rig, triangulation.volume_margin, result.points);
       if (result.corrected) surfaces = local_surfaces(rig, result.points, options.guided.surface);
       if (!is_guided) return ViewsApart{};
       result.points = settle_points(rig, std::move(result.points), surfaces, settle);

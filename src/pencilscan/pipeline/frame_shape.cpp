@@ -105,7 +105,7 @@ std::vector<Silhouette> silhouettes_of(const Rig& rig, const std::vector<ColorVi
 DepthResult depth_of(const Rig& rig, const Frame& frame, const PointResult& points,
                      const DepthStageOptions& options) {
   return measure_depth(rig, points.families, frame.images, points.detections, points.points,
-                       options);
+                       options, points.background);
 }
 
 /// One closed surface of the depth maps: that of the moment before, moved, where it fits. `next`
@@ -161,7 +161,7 @@ void fuse(const Rig& rig, const PointResult& points, const std::vector<ColorView
       rig, views, options, static_cast<bool>(links.hand_on), before.get(), result, next);
   next.coarse_faces = surface.mesh.faces;
   result.carried_since = next.age;
-  guided_depth(rig, RayScene(surface.mesh), options.depth, result.depth);
+  guided_depth(rig, RayScene(surface.mesh), options.depth, points.background, result.depth);
   result.depth.lights.clear();
   follow_depth(rig, result.depth.maps, options.fusion, surface);
   if (links.hand_on && !surface.mesh.faces.empty())

@@ -37,7 +37,7 @@ double position_sigma(const Curve& curve, int i, const TriangulationOptions& opt
 }
 
 void add_run(const Rig& rig, const GridGraph& graph, const LabeledRun& run,
-             const ObjectSpace& space, const TriangulationOptions& options,
+             const ObjectSpace* space, const TriangulationOptions& options,
              std::vector<MeasuredPoint>& points) {
   const Camera& camera = rig.camera(graph.camera);
   const Curve& curve = graph.curves[static_cast<std::size_t>(run.curve)];
@@ -57,7 +57,7 @@ void add_run(const Rig& rig, const GridGraph& graph, const LabeledRun& run,
     if (!depth) continue;
     const Vec3 x_in_camera = *depth * direction;
     const Vec3 x = world_from_camera * x_in_camera;
-    if (!space.holds(x)) continue;
+    if (space != nullptr && !space->holds(x)) continue;
     const double slope = std::abs(ray.slope(*depth, pattern.axis));
     const double gain = coordinate_per_pixel(camera, projector, projector_from_camera, pattern.axis,
                                              p.normal, x_in_camera);
@@ -125,7 +125,7 @@ class OnePerPixel {
 
 /// Of one camera.
 std::vector<MeasuredPoint> triangulate_graph(const Rig& rig, const GridGraph& graph,
-                                             std::vector<LabeledRun> runs, const ObjectSpace& space,
+                                             std::vector<LabeledRun> runs, const ObjectSpace* space,
                                              const TriangulationOptions& options) {
   std::stable_sort(runs.begin(), runs.end(), is_line_before);
   // New pages cost more than what is done with them: no vector grows by copies.
@@ -150,7 +150,7 @@ std::vector<MeasuredPoint> triangulate(const Rig& rig, std::span<const GridGraph
                                        const Labeling& labeling,
                                        const TriangulationOptions& options) {
   const ObjectSpace of_object(rig, options.volume_margin);
-  const ObjectSpace space = options.keeps_floor ? of_object.with_floor() : of_object;
+  const ObjectSpace* space = options.keeps_background ? nullptr : &of_object;
   std::vector<std::vector<MeasuredPoint>> per_camera(graphs.size());
   parallel_for(graphs.size(), [&](std::size_t g) {
     per_camera[g] = triangulate_graph(

@@ -11,7 +11,7 @@ namespace pencilscan {
 struct TriangulationOptions {
   double volume_margin =
       1.1;  ///< points farther out than this many radii are dropped (rig/object_space.h)
-  bool keeps_floor = false;           ///< points on a stated floor stay
+  bool keeps_background = false;      ///< points behind the volume or on a stated floor stay
   double projection_sigma_px = 0.03;  ///< error of the projector model across the line
   // What the profile fit cannot see; measured on rendered bunny, hand and balls (the "sigma"
   // figures of `evaluate`).
