@@ -13,8 +13,8 @@
 namespace pencilscan {
 namespace {
 
-constexpr double kBallRadius = 60;  // mm
-constexpr double kBehind = 450;     // mm, of the wall behind the ball's centre: outside the volume
+constexpr double kBallBeforeWall = 60;  // mm
+constexpr double kWallBehind = 450;  // mm, of the wall behind the ball's centre: outside the volume
 
 Rig rig_before_wall() {
   RingOptions ring;
@@ -36,13 +36,13 @@ TriangleMesh wall_behind(const Rig& rig, TriangleMesh mesh) {
   constexpr double kHalf = 1300;
   for (const auto& [x, z] : {std::pair(-kHalf, -kHalf), std::pair(kHalf, -kHalf),
                              std::pair(kHalf, kHalf), std::pair(-kHalf, kHalf)})
-    mesh.vertices.push_back(kBehind * back + x * aside + z * Vec3::UnitZ());
+    mesh.vertices.push_back(kWallBehind * back + x * aside + z * Vec3::UnitZ());
   mesh.faces.push_back({first, first + 1, first + 2});
   mesh.faces.push_back({first, first + 2, first + 3});
   return mesh;
 }
 
-Frame frame_of(const Rig& rig, const TriangleMesh& mesh) {
+Frame photograph_of(const Rig& rig, const TriangleMesh& mesh) {
   PhotographyOptions photo;
   photo.noise = "medium";
   return sample::photographed_frame(rig, SimulatedObject(mesh), photo);
@@ -50,13 +50,13 @@ Frame frame_of(const Rig& rig, const TriangleMesh& mesh) {
 
 bool is_in_air(const Vec3& x) {
   constexpr double kNear = 2;  // mm
-  return std::abs(x.norm() - kBallRadius) > kNear;
+  return std::abs(x.norm() - kBallBeforeWall) > kNear;
 }
 
 TEST(Room, AWallBehindTheObjectMakesNoSurfaceInTheAir) {
   const Rig rig = rig_before_wall();
-  const FrameResult result =
-      reconstruct_frame(rig, frame_of(rig, wall_behind(rig, make_sphere(kBallRadius, 96))));
+  const FrameResult result = reconstruct_frame(
+      rig, photograph_of(rig, wall_behind(rig, make_sphere(kBallBeforeWall, 96))));
   std::size_t in_air = 0;
   for (const MeasuredPoint& p : result.points.points) in_air += is_in_air(position_of(p)) ? 1 : 0;
   const std::size_t points = result.points.points.size();
@@ -71,7 +71,7 @@ TEST(Room, AWallBehindTheObjectMakesNoSurfaceInTheAir) {
 TEST(Room, AWallAloneIsNoObject) {
   const Rig rig = rig_before_wall();
   try {
-    const FrameResult result = reconstruct_frame(rig, frame_of(rig, wall_behind(rig, {})));
+    const FrameResult result = reconstruct_frame(rig, photograph_of(rig, wall_behind(rig, {})));
     ADD_FAILURE() << result.points.points.size() << " points";
   } catch (const NothingFound& nothing) {
     EXPECT_NE(std::string(nothing.what()).find("nothing of the object was seen"), std::string::npos)
