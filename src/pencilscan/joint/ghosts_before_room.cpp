@@ -1,28 +1,13 @@
 #include "pencilscan/joint/ghosts_before_room.h"
 
-#include <numeric>
 #include <vector>
+
+#include "pencilscan/core/disjoint_sets.h"
 
 namespace pencilscan {
 namespace {
 
 enum class Shown : char { kNothing, kObject, kRoom };
-
-/// Pieces that belong together, each set by one of its own.
-class Patches {
- public:
-  explicit Patches(std::size_t pieces) : parent_(pieces) {
-    std::iota(parent_.begin(), parent_.end(), std::size_t{0});
-  }
-  [[nodiscard]] std::size_t of(std::size_t piece) {
-    while (parent_[piece] != piece) piece = parent_[piece] = parent_[parent_[piece]];
-    return piece;
-  }
-  void join(std::size_t a, std::size_t b) { parent_[of(a)] = of(b); }
-
- private:
-  std::vector<std::size_t> parent_;
-};
 
 }  // namespace
 
@@ -42,13 +27,14 @@ void leave_ghosts_before_room(const Camera& camera, const LabelledPieces& pieces
     is_room_named = is_room_named || shown[p] == Shown::kRoom;
   }
   if (!is_room_named) return;
-  Patches patches(shown.size());
-  std::vector<int> ends(shown.size(), 2);   // of its curve, per piece, then per patch
+  DisjointSets patches(shown.size());
+  std::vector<int> ends(shown.size(), 2);   // of its curve, per piece
   std::vector<int> meets(shown.size(), 0);  // lines of the room, likewise
   const auto note = [&](std::size_t a, std::size_t b, bool is_same_surface) {
     if (shown[a] == Shown::kNothing || shown[b] == Shown::kNothing) return;
     if (shown[a] == shown[b]) {
-      if (is_same_surface && shown[a] == Shown::kObject) patches.join(a, b);
+      if (is_same_surface && shown[a] == Shown::kObject)
+        patches.join(static_cast<int>(a), static_cast<int>(b));
     } else if (!is_same_surface) {
       ++meets[shown[a] == Shown::kObject ? a : b];
     }
@@ -68,11 +54,14 @@ void leave_ghosts_before_room(const Camera& camera, const LabelledPieces& pieces
     const bool are_named = decisions[a].label >= 0 && decisions[b].label >= 0;
     note(a, b, are_named && label_of(a).of() == label_of(b).of());
   }
+  const auto patch_of = [&](std::size_t p) {
+    return static_cast<std::size_t>(patches.root(static_cast<int>(p)));
+  };
   std::vector<int> excess(shown.size(), 0);
   for (std::size_t p = 0; p < shown.size(); ++p)
-    if (shown[p] == Shown::kObject) excess[patches.of(p)] += meets[p] - ends[p];
+    if (shown[p] == Shown::kObject) excess[patch_of(p)] += meets[p] - ends[p];
   for (std::size_t p = 0; p < shown.size(); ++p)
-    if (shown[p] == Shown::kObject && excess[patches.of(p)] > 0) decisions[p] = {};
+    if (shown[p] == Shown::kObject && excess[patch_of(p)] > 0) decisions[p] = {};
 }
 
 }  // namespace pencilscan
