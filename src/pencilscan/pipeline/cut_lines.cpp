@@ -26,7 +26,7 @@ class Cuts {
         least_height_(line_spacing(rig)) {}
 
   /// `runs`: of one curve, in the order of its points.
-  [[nodiscard]] bool is_cut(std::span<const LabeledRun> runs) const {
+  void count(std::span<const LabeledRun> runs, CutLines& lines) const {
     const Curve& curve = graph_.curves[static_cast<std::size_t>(runs.front().curve)];
     bool is_inside = false;
     bool is_beyond = false;
@@ -44,7 +44,8 @@ class Cuts {
         is_beyond |= !is_held && (!rig_.floor || rig_.floor->height(*x) > least_height_);
       }
     }
-    return is_inside && is_beyond;
+    if (is_inside) ++lines.inside;
+    if (is_inside && is_beyond) ++lines.cut;
   }
 
  private:
@@ -83,8 +84,7 @@ CutLines lines_cut_by_volume(const Rig& rig, std::span<const GridGraph> graphs,
     for (std::size_t first = 0; first < runs.size();) {
       std::size_t end = first + 1;
       while (end < runs.size() && runs[end].curve == runs[first].curve) ++end;
-      ++lines.named;
-      if (cuts.is_cut(std::span(runs).subspan(first, end - first))) ++lines.cut;
+      cuts.count(std::span(runs).subspan(first, end - first), lines);
       first = end;
     }
   }

@@ -235,7 +235,7 @@ std::optional<Warning> volume_warning(const Rig& rig, const CutLines& lines) {
   return Warning{WarningCode::kVolumeCuts,
                  "what was measured goes on beyond the volume, whose edge cuts " +
                      formatted(100 * lines.share(), "%.0f") +
-                     " % of the named lines: if that is the object, " +
+                     " % of the lines in it: if that is the object, " +
                      (rig.volume ? "state a larger volume" : "state a volume that holds it") +
                      "; if it is what the object stands on, state \"floor\"",
                  {},
