@@ -53,14 +53,11 @@ class Cuts {
                                           const CurveLabel& label) const {
     const Projector& projector = rig_.projector(label.pattern.projector);
     const LinePattern& pattern = rig_.pattern(label.pattern);
-    const RigidTransform world_from_camera = camera_.device_from_world.inverse();
     const Vec2 pixel = curve.points[static_cast<std::size_t>(point)].position.cast<double>();
-    const Vec3 direction = camera_.normalized_from_pixel(pixel).homogeneous();
-    const RayInProjector ray(projector.device_from_world * world_from_camera, projector,
-                             direction.head<2>());
+    const RayInProjector ray(camera_, projector, pixel);
     const auto depth = ray.depth(pattern.position_px(label.plane), pattern.axis);
     if (!depth) return std::nullopt;
-    return world_from_camera * (*depth * direction);
+    return camera_.point_at_depth(pixel, *depth);
   }
 
   const Rig& rig_;
