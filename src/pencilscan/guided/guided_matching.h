@@ -33,11 +33,14 @@ struct GuidedMatchingOptions {
 /// Guided matching, per camera: the labelled surface tells where the lines that the solution missed
 /// have to be. Each pass
 ///   1. predicts the lines of all projectors on the surface around the labelled points,
-///   2. gives an undecided stretch of a curve the label of the predicted line that it lies on, if
-///      no other curve shows that line, the stretch does not have another line's colour, and lines
-///      around or, on a dense surface, its own colour support it,
+///   2. confirms tentative labels where the predicted line is the same, and gives an undecided
+///      stretch of a curve the label of the predicted line that it lies on, if no other curve shows
+///      that line, the stretch does not have another line's colour, and lines around or, on a dense
+///      surface, its own colour support it,
 ///   3. fits a new curve where a line is predicted and no curve was found. The fit is to the image
-///      that remains once the known curves are subtracted.
+///      that remains once the known curves are subtracted,
+///   4. on a dense surface, names predicted lines that lie on curves of other projectors too
+///      (shared_curves.h).
 /// New curves are appended to `graphs`, new runs to `labeling`. The function returns, per graph,
 /// the surface that all labelled points show. `presence`: the presence image of each graph and
 /// colour family, CV_32FC1, of the whole camera image; what nobody else holds is used up. `dense`:

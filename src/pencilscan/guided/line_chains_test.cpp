@@ -17,7 +17,7 @@ namespace {
 
 constexpr float kFarthestLink = 2.5F;  // px, line_chains.h
 
-std::tuple<int, int, int> name_of(const PredictedPoint& p) {
+std::tuple<int, int, int> rank_of(const PredictedPoint& p) {
   return {p.pattern.projector, p.pattern.pattern, p.line};
 }
 
@@ -117,7 +117,7 @@ TEST(ChainPoints, AreTheShortestWaysThroughAllPointsOfALine) {
     for (const LineChain& way : shortest_ways(points)) expected.insert(order_of(way));
     EXPECT_EQ(found, expected) << scene;
     EXPECT_TRUE(std::is_sorted(chains.begin(), chains.end(), [](const auto& a, const auto& b) {
-      return name_of(a.front()) < name_of(b.front());
+      return rank_of(a.front()) < rank_of(b.front());
     }));
   }
   EXPECT_GE(longest, 6U);

@@ -8,6 +8,13 @@
 
 namespace pencilscan {
 
+/// A projected line.
+struct LineName {
+  PatternRef pattern;
+  int line = 0;
+  friend bool operator==(const LineName&, const LineName&) = default;
+};
+
 /// Where a camera must see a projected line, if nothing is in the way of the light.
 struct PredictedPoint {
   PatternRef pattern;
@@ -18,6 +25,8 @@ struct PredictedPoint {
   float sigma_px = 0;                                  ///< across the line
   std::size_t patch = 0;                               ///< of the surface, that says so
 };
+
+[[nodiscard]] inline LineName name_of(const PredictedPoint& p) { return {p.pattern, p.line}; }
 
 struct PredictionOptions {
   double min_spacing_px = 2.6;      ///< denser lines cannot be told apart
