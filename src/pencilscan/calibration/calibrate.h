@@ -83,10 +83,9 @@ struct CalibrationResult {
   bool solved = false;
 };
 
-/// From correspondences, and corners of boards if any, to a rig: guesses of focal lengths,
-/// structure for the best few of them, bundle adjustment in stages (focal lengths; principal
-/// points; aspect and k1; the other terms), outliers dropped between them. Where pairs contradict
-/// the result, once more without these, which counts if fewer then do (but for swapped folders).
+/// From correspondences, and corners of boards if any, to a rig (calibrate_once.h). Where pairs
+/// contradict it, once more without these, which counts if fewer then do (but for swapped folders);
+/// where devices moved between captures, without what they saw of these.
 [[nodiscard]] CalibrationResult calibrate(const CalibrationInput& input,
                                           const CalibrateOptions& options = {},
                                           const Progress& progress = {});

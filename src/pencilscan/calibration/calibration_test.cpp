@@ -13,6 +13,7 @@
 #include "pencilscan/calibration/pair_matches.h"
 #include "pencilscan/calibration/rig_frame.h"
 #include "pencilscan/calibration/sample_input.h"
+#include "pencilscan/calibration/track_errors.h"
 
 namespace pencilscan {
 namespace {
@@ -264,7 +265,7 @@ CalibrationResult exact_ring(const std::vector<Track>& tracks, const Rig& truth)
     result.problem.devices.back().present = true;
   }
   result.problem.tracks = tracks;
-  triangulate_all(result.problem, 0.02);
+  triangulate_all(result.problem, kLeastAngle);
   return result;
 }
 

@@ -9,6 +9,7 @@
 
 #include "pencilscan/calibration/calibration_report.h"
 #include "pencilscan/calibration/sample_input.h"
+#include "pencilscan/calibration/track_errors.h"
 
 namespace pencilscan {
 namespace {
@@ -55,7 +56,7 @@ CalibrationResult found(const CalibrationInput& input, const Rig& truth) {
     device.prior_sigma[kFy] = 1e-6;
   }
   result.problem.tracks = input.tracks;
-  triangulate_all(result.problem, 0.02);
+  triangulate_all(result.problem, kLeastAngle);
   result.adjustment = kFocalLengths;
   adjust(result.problem, kFocalLengths);
   result.placed.assign(device_count(truth), 1);

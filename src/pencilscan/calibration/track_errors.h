@@ -7,6 +7,8 @@
 
 namespace pencilscan {
 
+inline constexpr double kLeastAngle = 0.02;  ///< rad between rays of a point that is used
+
 /// Errors of all views of a track but the hub at the point that fits them best.
 [[nodiscard]] std::vector<double> track_errors(const BundleProblem& problem, const Track& track,
                                                const Vec3& point);
