@@ -4,7 +4,6 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 namespace pencilscan {
 namespace {
@@ -20,11 +19,6 @@ float least_significance(float sampled_share) {
   return std::max(5.F, 8.F * std::sqrt(sampled_share));
 }
 
-constexpr float kSideStart = 0.2F;    // of the radius: where a side of the window begins
-constexpr float kLeastLight = 0.6F;   // share of the predicted light that a side must show ...
-constexpr float kLeastEnergy = 40.F;  // ... where that would be beyond noise
-constexpr float kMiddle2 = 0.2F;      // squared radius of the middle, in radii
-
 constexpr double kBow = 6;  // footprints over the window's half, of the prior on curvature
 constexpr double kRidge = 1e-6;
 constexpr double kLongestStep = 0.15;  // lines, within which the profile is well linear
@@ -34,23 +28,9 @@ constexpr float kLeastAmplitude = 0.003F;
 }  // namespace
 
 WindowFitter::WindowFitter(const CameraLight& light, int half)
-    : light_(&light), grid_(half), of_family_(grid_, light.patterns.size()) {
-  const std::size_t padded = grid_.padded;
-  const float* x = grid_.monomial(1);
-  const float* y = grid_.monomial(2);
-  parts_.assign((kSides + 1) * padded, 0.F);
-  for (std::size_t part = 0; part <= kSides; ++part) {
-    const double angle = 2 * std::numbers::pi * static_cast<double>(part) / kSides;
-    const auto cosine = static_cast<float>(std::cos(angle));
-    const auto sine = static_cast<float>(std::sin(angle));
-    for (std::size_t i = 0; i < static_cast<std::size_t>(grid_.count); ++i) {
-      const bool is_in = part == kSides ? x[i] * x[i] + y[i] * y[i] < kMiddle2
-                                        : x[i] * cosine + y[i] * sine > kSideStart;
-      parts_[part * padded + i] = is_in ? 1.F : 0.F;
-    }
-  }
-  valid_.assign(padded, 0.F);
-  w_ = scratch_ = valid_;
+    : light_(&light), grid_(half), parts_(grid_), of_family_(grid_, light.patterns.size()) {
+  valid_.assign(grid_.padded, 0.F);
+  w_ = valid_;
   const std::size_t patterns = light.patterns.size();
   seen_.resize(light.families.size());
   for (Seen& seen : seen_) {
@@ -311,35 +291,13 @@ bool WindowFitter::iterate(Quadric& q, int rounds) {
 }
 
 void WindowFitter::compare_light() {
-  std::fill(scratch_.begin(), scratch_.end(), 0.F);
-  std::fill(w_.begin(), w_.end(), 0.F);  // not needed any more
+  parts_.reset();
   for (std::size_t f = 0; f < seen_.size(); ++f) {
     const Seen& seen = seen_[f];
     collect(f);
-    add_light(grid_, seen.light, seen.image.data(), seen.weight.data(), seen.inverse_variance,
-              scratch_.data(), w_.data());
+    parts_.add(seen.light, seen.image.data(), seen.weight.data(), seen.inverse_variance);
   }
-  constexpr int kParts = kSides + 1;
-  sum_parts(grid_, scratch_.data(), parts_.data(), kParts, light_seen_.data());
-  sum_parts(grid_, w_.data(), parts_.data(), kParts, light_predicted_.data());
-}
-
-std::optional<std::size_t> WindowFitter::dark_side() const {
-  std::optional<std::size_t> darkest;
-  float least = kLeastLight;
-  for (std::size_t side = 0; side < kSides; ++side) {
-    const float energy = light_predicted_[side];
-    const float seen = light_seen_[side];
-    if (!(energy > kLeastEnergy && seen < least * energy)) continue;
-    least = seen / energy;
-    darkest = side;
-  }
-  return darkest;
-}
-
-bool WindowFitter::is_middle_dark() const {
-  const float energy = light_predicted_[kSides];
-  return energy > kLeastEnergy && light_seen_[kSides] < kLeastLight * energy;
+  parts_.sum_up();
 }
 
 std::optional<WindowFit> WindowFitter::finish(const Quadric& q, bool cut) {
@@ -388,17 +346,17 @@ std::optional<WindowFit> WindowFitter::fit(const Vec2& pixel, const Quadric& sta
   };
   if (!fit_window()) return std::nullopt;
   // Where the surface ends within the window, fit what is left of it.
-  const std::optional<std::size_t> side = dark_side();
+  const std::optional<std::size_t> side = parts_.dark_side();
   if (side) {
-    const float* beyond = parts_.data() + *side * grid_.padded;
+    const float* beyond = parts_.side(*side);
     for (Seen& seen : seen_) {
       for (std::size_t i = 0; i < grid_.padded; ++i) seen.weight[i] *= 1.F - beyond[i];
       set_weight(seen);
     }
-    if (!fit_window() || dark_side()) return std::nullopt;
+    if (!fit_window() || parts_.dark_side()) return std::nullopt;
   }
   // The centre itself must show the light that is predicted there.
-  if (is_middle_dark()) return std::nullopt;
+  if (parts_.is_middle_dark()) return std::nullopt;
   return finish(q, side.has_value());
 }
 

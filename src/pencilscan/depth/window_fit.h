@@ -1,7 +1,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <array>
 #include <memory>
 #include <opencv2/core.hpp>
 #include <optional>
@@ -12,6 +11,7 @@
 #include "pencilscan/depth/family_equations.h"
 #include "pencilscan/depth/pattern_view.h"
 #include "pencilscan/depth/window_equations.h"
+#include "pencilscan/depth/window_parts.h"
 #include "pencilscan/depth/window_sums.h"
 
 namespace pencilscan {
@@ -115,24 +115,18 @@ class WindowFitter {
   [[nodiscard]] bool iterate(Quadric& q, int rounds);
   /// Light that the fit predicts at each pixel, and what is seen of it, over the parts.
   void compare_light();
-  /// The side that shows too little of the predicted light.
-  [[nodiscard]] std::optional<std::size_t> dark_side() const;
-  [[nodiscard]] bool is_middle_dark() const;
   [[nodiscard]] std::optional<WindowFit> finish(const Quadric& q, bool cut);
-
-  static constexpr std::size_t kSides = 8;
 
   const CameraLight* light_;
   WindowGrid grid_;
-  std::vector<float> parts_;  ///< masks of the sides, then of the middle
-  std::vector<float> valid_, w_, scratch_;
+  WindowParts parts_;
+  std::vector<float> valid_, w_;
   std::vector<Seen> seen_;  ///< per family
   std::vector<Lit> lit_;
   std::vector<std::vector<float>> profile_, slope_;  ///< per lit: P, dP/dw
   FamilyEquations of_family_;
   WindowEquations equations_;
-  double chi2_ = 0, degrees_ = 0;                                   ///< of the last equations
-  std::array<float, kSides + 1> light_seen_{}, light_predicted_{};  ///< per part
+  double chi2_ = 0, degrees_ = 0;  ///< of the last equations
 };
 
 }  // namespace pencilscan

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <array>
+#include <optional>
+#include <vector>
+
+#include "pencilscan/depth/window_sums.h"
+
+namespace pencilscan {
+
+/// Whether parts of a window show the light that a fit predicts there: eight overlapping sides,
+/// beyond a fifth of the radius in as many directions, and the middle.
+class WindowParts {
+ public:
+  /// The grid must outlive it.
+  explicit WindowParts(const WindowGrid& grid);
+
+  /// Begins anew: reset(), then add() for each family, as add_light() takes it, then sum_up().
+  void reset();
+  void add(const FamilyLight& light, const float* image, const float* weight, float certainty);
+  void sum_up();
+
+  /// The side that shows too little of the predicted light, the darkest.
+  [[nodiscard]] std::optional<std::size_t> dark_side() const;
+  [[nodiscard]] bool is_middle_dark() const;
+  /// Per pixel of the grid, 1 in a side.
+  [[nodiscard]] const float* side(std::size_t side) const {
+    return masks_.data() + side * grid_->padded;
+  }
+
+ private:
+  static constexpr std::size_t kSides = 8;
+  static constexpr std::size_t kParts = kSides + 1;
+
+  const WindowGrid* grid_;
+  std::vector<float> masks_;             ///< of the sides, then of the middle
+  std::vector<float> seen_, predicted_;  ///< per pixel
+  std::array<float, kParts> seen_in_{}, predicted_in_{};
+};
+
+}  // namespace pencilscan
