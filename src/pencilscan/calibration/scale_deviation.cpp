@@ -22,12 +22,21 @@ double share_if_exact(const BundleProblem& problem, const Uncertainty& uncertain
   double square_size = 0;
   for (const std::size_t d : devices)
     square_size += (center_of(problem.devices[d]) - middle).squaredNorm();
-  Eigen::VectorXd change = Eigen::VectorXd::Zero(uncertainty.size_and_centers.rows());
-  change[0] = 1;
-  for (const std::size_t d : devices)
-    change.segment<3>(1 + 3 * static_cast<Eigen::Index>(d)) =
-        -(center_of(problem.devices[d]) - middle) / square_size;
-  return std::sqrt(std::max(0.0, change.dot(uncertainty.size_and_centers * change)));
+  // The rows of the covariance that it takes part in: of two devices seven, however many there are.
+  std::vector<Eigen::Index> rows{0};
+  std::vector<double> changes{1};
+  for (const std::size_t d : devices) {
+    const Vec3 change = -(center_of(problem.devices[d]) - middle) / square_size;
+    for (Eigen::Index axis = 0; axis < 3; ++axis) {
+      rows.push_back(1 + 3 * static_cast<Eigen::Index>(d) + axis);
+      changes.push_back(change[axis]);
+    }
+  }
+  double variance = 0;
+  for (std::size_t i = 0; i < rows.size(); ++i)
+    for (std::size_t j = 0; j < rows.size(); ++j)
+      variance += changes[i] * uncertainty.size_and_centers(rows[i], rows[j]) * changes[j];
+  return std::sqrt(std::max(0.0, variance));
 }
 
 }  // namespace
