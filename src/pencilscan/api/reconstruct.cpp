@@ -1,28 +1,15 @@
 #include "pencilscan/api/reconstruct.h"
 
 #include <optional>
-#include <system_error>
 
 #include "pencilscan/api/frame_input.h"
 #include "pencilscan/api/run_stages.h"
-#include "pencilscan/core/error.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/io/file.h"
 #include "pencilscan/io/mesh_file.h"
 #include "pencilscan/labeling/point_file.h"
 
 namespace pencilscan {
-namespace {
-
-/// The file of an earlier result, where there is one, is not this one's.
-void remove_older(const std::filesystem::path& path) {
-  std::error_code failure;
-  std::filesystem::remove(path, failure);
-  if (failure && failure != std::errc::not_a_directory)
-    throw StageError(path.string() + ": cannot be removed: " + failure.message());
-}
-
-}  // namespace
 
 Reconstruction reconstruct(const Rig& rig, const Images& images,
                            const ReconstructionOptions& options) {
@@ -42,7 +29,7 @@ Reconstruction reconstruct(const Rig& rig, const Images& images,
 
 void write_reconstruction(const std::filesystem::path& folder, const Reconstruction& result) {
   if (result.mesh.faces.empty()) {
-    for (const char* name : {"mesh.ply", "mesh_measured.ply"}) remove_older(folder / name);
+    for (const char* name : {"mesh.ply", "mesh_measured.ply"}) remove_older_mesh(folder / name);
   }
   write_points(folder / "points.ply", result.points, result.unit_known);
   write_curves(folder / "curves.ply", result.curves);

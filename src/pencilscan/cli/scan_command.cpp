@@ -1,7 +1,6 @@
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <system_error>
 
 #include "pencilscan/cli/command.h"
 #include "pencilscan/core/counted_progress.h"
@@ -41,10 +40,7 @@ double median_spacing(std::vector<SurfaceSample> samples) {
 /// Points and mesh of one scan: a mesh of an earlier one does not stay beside new points.
 void write_scan(const fs::path& out, const std::vector<MeasuredPoint>& points,
                 const TriangleMesh& mesh, bool unit_known) {
-  std::error_code failure;
-  fs::remove(out / kMeshFile, failure);
-  if (failure && failure != std::errc::not_a_directory)
-    throw StageError((out / kMeshFile).string() + ": cannot be removed: " + failure.message());
+  remove_older_mesh(out / kMeshFile);
   write_points(out / kPointsFile, points, unit_known);
   if (!mesh.faces.empty()) write_mesh(out / kMeshFile, mesh, unit_known);
 }

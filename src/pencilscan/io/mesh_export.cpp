@@ -11,13 +11,14 @@
 #include "pencilscan/io/file.h"
 #include "pencilscan/io/little_endian.h"
 #include "pencilscan/io/mesh_file.h"
+#include "pencilscan/io/mesh_unit.h"
 #include "pencilscan/io/srgb.h"
 
 namespace pencilscan {
 namespace {
 
 std::string obj_text(const TriangleMesh& mesh, bool unit_known) {
-  std::string text = unit_known ? "# unit mm\n" : "# unit unknown\n";
+  std::string text = obj_unit(unit_known);
   char line[128];
   for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
     const Vec3& v = mesh.vertices[i];
@@ -44,7 +45,7 @@ void append_vector(std::string& bytes, const Vec3& v) {
 }
 
 std::string stl_bytes(const TriangleMesh& mesh, bool unit_known) {
-  std::string bytes = unit_known ? "binary STL, unit mm" : "binary STL, unit unknown";
+  std::string bytes = stl_unit(unit_known);
   bytes.resize(80, ' ');
   append_little_endian(bytes, static_cast<std::uint32_t>(mesh.faces.size()));
   for (std::size_t f = 0; f < mesh.faces.size(); ++f) {

@@ -12,6 +12,7 @@
 #include <span>
 #include <sstream>
 #include <string>
+#include <system_error>
 #include <utility>
 
 #include "pencilscan/core/byte_order_mark.h"
@@ -20,6 +21,7 @@
 #include "pencilscan/core/lower_case.h"
 #include "pencilscan/io/file.h"
 #include "pencilscan/io/little_endian.h"
+#include "pencilscan/io/mesh_unit.h"
 #include "pencilscan/io/ply.h"
 #include "pencilscan/io/polygon_mesh.h"
 #include "pencilscan/io/srgb.h"
@@ -328,8 +330,8 @@ void write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh, boo
     for (const int corner : face) append_little_endian(bytes, static_cast<std::int32_t>(corner));
   }
   write_atomically(path, [&](std::ostream& stream) {
-    stream << "ply\nformat binary_little_endian 1.0\ncomment unit "
-           << (unit_known ? "mm" : "unknown") << ", world frame of rig.json\nelement vertex "
+    stream << "ply\nformat binary_little_endian 1.0\n"
+           << ply_unit(unit_known) << " world frame of rig.json\nelement vertex "
            << mesh.vertices.size() << "\nproperty float x\nproperty float y\nproperty float z\n";
     if (has_sigma) stream << "property float sigma\n";
     if (has_confidence) stream << "property float confidence\n";
@@ -339,6 +341,13 @@ void write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh, boo
            << "\nproperty list uchar int vertex_indices\nend_header\n"
            << bytes;
   });
+}
+
+void remove_older_mesh(const std::filesystem::path& path) {
+  std::error_code failure;
+  std::filesystem::remove(path, failure);
+  if (failure && failure != std::errc::not_a_directory)
+    throw StageError(path.string() + ": cannot be removed: " + failure.message());
 }
 
 }  // namespace pencilscan

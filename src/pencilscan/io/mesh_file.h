@@ -18,6 +18,10 @@ namespace pencilscan {
 void write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh,
                 bool unit_known = true);
 
+/// Removes the mesh of an earlier result, where there is one, so that it does not stay beside new
+/// points. StageError when it cannot be removed.
+void remove_older_mesh(const std::filesystem::path& path);
+
 /// Writes for other programs, by the ending: .obj (text, mm), .stl (binary, mm) or .glb (glTF 2.0
 /// binary: metres, y up, as glTF wants it), positions, triangles and colours. Without `unit_known`
 /// the numbers are those of the mesh in all of them, and the file says that their unit is unknown.
