@@ -64,8 +64,8 @@ bool is_grey(const cv::Mat& picture) {
   cv::minMaxLoc(rgb[1], nullptr, &brightest);
   const double step = std::min(kStep, kFaint * static_cast<float>(brightest));
   const cv::Mat colorful = (cv::abs(rgb[0] - rgb[1]) > step) | (cv::abs(rgb[2] - rgb[1]) > step);
-  constexpr std::size_t kFew = 1000;  // one in so many
-  return static_cast<std::size_t>(cv::countNonZero(colorful)) * kFew < rows.total();
+  constexpr int kFew = 1000;  // one pixel in so many
+  return !are_more_than_one_in(kFew, colorful);
 }
 
 bool is_same(const cv::Mat& a, const cv::Mat& b) {

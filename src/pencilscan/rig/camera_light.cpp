@@ -37,12 +37,9 @@ void check_light(const cv::Mat& image, const std::filesystem::path& path) {
   // deviation is .043, three and a half times that of the sensor preset "high".
   constexpr double kLeast = -0.1;
   const cv::Mat values = image.reshape(1);
-  const auto are_many = [&](const cv::Mat& found) {
-    constexpr std::int64_t kFew = 100;  // one in so many: more are no glints of a renderer's light
-    return cv::countNonZero(found) * kFew > static_cast<std::int64_t>(values.total());
-  };
-  const bool is_above = are_many(values > 1);
-  if (!is_above && !are_many(values < kLeast)) return;
+  constexpr int kFew = 100;  // one in so many: more are no glints of a renderer's light
+  const bool is_above = are_more_than_one_in(kFew, values > 1);
+  if (!is_above && !are_more_than_one_in(kFew, values < kLeast)) return;
   double least = 0;
   double most = 0;
   cv::minMaxIdx(values, &least, &most);
@@ -82,15 +79,19 @@ cv::Mat linear_light(const Camera& camera, const cv::Mat& stored) {
   return camera.mosaic ? demosaiced(linear, *camera.mosaic) : linear;
 }
 
+bool are_more_than_one_in(int n, const cv::Mat& found) {
+  return static_cast<std::int64_t>(cv::countNonZero(found)) * n >
+         static_cast<std::int64_t>(found.total());
+}
+
 double sensor_range(const cv::Mat& stored) {
   if (stored.depth() != CV_16U) return 1;
   // Chosen: a sensor has fewer pixels that are stuck, and a driver writes fewer numbers of its own
   // into a picture; light that needs 16 bits takes more, as a line does.
-  constexpr std::int64_t kFew = 10000;  // one in so many
+  constexpr int kStuck = 10000;  // one in so many
   const cv::Mat values = stored.reshape(1);
   for (const int bits : {10, 12, 14})
-    if (cv::countNonZero(values >= 1 << bits) * kFew <= static_cast<std::int64_t>(values.total()))
-      return ((1 << bits) - 1) / 65535.;
+    if (!are_more_than_one_in(kStuck, values >= 1 << bits)) return ((1 << bits) - 1) / 65535.;
   return 1;
 }
 

@@ -30,6 +30,9 @@ void check_camera_image(const Camera& camera, const std::filesystem::path& path)
 /// that a mosaic leaves out interpolated (io/mosaic.h).
 [[nodiscard]] cv::Mat linear_light(const Camera& camera, const cv::Mat& stored);
 
+/// True where more than one value in `n` of an image is among those found, CV_8UC1: not 0.
+[[nodiscard]] bool are_more_than_one_in(int n, const cv::Mat& found);
+
 /// Sensors of 10, 12 or 14 bits fill 16 of them, or leave their values in the low ones. The
 /// greatest value, in [0, 1] of 16 bits, of the sensor with the fewest bits that hold the image:
 /// all of it but a ten-thousandth, of pixels that are stuck. 1 for other images than CV_16U.
