@@ -76,9 +76,7 @@ Frame frame_of(const Rig& rig, const Images& images, const ReconstructionOptions
   Frame frame;
   frame.name = options.frame;
   frame.images = camera_images(rig, images, "images");
-  const bool is_empty = std::all_of(frame.images.begin(), frame.images.end(),
-                                    [](const cv::Mat& image) { return image.empty(); });
-  if (is_empty)
+  if (!has_pictures(frame))
     throw InputError("images", "", "", "must hold the picture of at least one camera of the rig");
   if (!options.plain.empty()) frame.plain = camera_images(rig, options.plain, "plain");
   return frame;

@@ -65,6 +65,11 @@ void end_points(const Rig& rig, const Frame& frame, PointResult& result) {
 
 }  // namespace
 
+bool has_pictures(const Frame& frame) {
+  return !std::all_of(frame.images.begin(), frame.images.end(),
+                      [](const cv::Mat& image) { return image.empty(); });
+}
+
 void restore_light(const Frame& frame, PointResult& result) {
   for (std::size_t c = 0; c < frame.gains.size(); ++c) {
     for (Curve& curve : result.graphs[c].curves)
@@ -74,10 +79,7 @@ void restore_light(const Frame& frame, PointResult& result) {
 
 FrameResult reconstruct_frame(const Rig& stated, const Frame& frame, const FrameOptions& options,
                               const FrameLinks& links) {
-  if (std::all_of(frame.images.begin(), frame.images.end(),
-                  [](const cv::Mat& image) { return image.empty(); })) {
-    throw NothingFound("no camera of the rig has a picture of this moment");
-  }
+  if (!has_pictures(frame)) throw NothingFound("no camera of the rig has a picture of this moment");
   std::vector<StageTime> times;
   const StageClock clock(links.progress, times);
   const SensorFrame fine = sensor_frame(in_footprints(stated), frame);

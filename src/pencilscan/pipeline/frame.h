@@ -45,6 +45,9 @@ struct Frame {
   std::vector<float> gains;  ///< per camera, of the light in `images` over that stored; empty: 1
 };
 
+/// False where no camera has a picture.
+[[nodiscard]] bool has_pictures(const Frame& frame);
+
 /// What decides the labelled points.
 struct PointOptions {
   DetectionOptions detection;
