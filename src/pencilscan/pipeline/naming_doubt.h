@@ -26,6 +26,8 @@ class NamingDoubt {
   [[nodiscard]] std::string denied() const { return colors_.denied(); }
   /// Projectors whose lines are of several colours and all look alike; empty: none.
   [[nodiscard]] std::string alike() const { return colors_.alike(); }
+  /// What the colours say, by pattern.
+  [[nodiscard]] std::vector<ShownColors> shown_colors() const { return colors_.shown(); }
   /// In plain words, projectors most of what is drawn in whose colours has no name, and devices
   /// that colours deny; empty: none. One that shows nothing is not among them.
   [[nodiscard]] std::string of_projectors() const;

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <utility>
@@ -42,12 +41,11 @@ std::vector<Labeling> labels_of(const Rig& rig, std::span<const FrameCurves> fra
 
 NamedCrossings named_crossings(const Rig& rig, std::span<const FrameCurves> frames,
                                std::span<const Labeling> labelings) {
-  NamedCrossings result{{}, 0, naming_doubt(rig, frames, labelings)};
+  NamedCrossings result{crossing_tracks(rig, frames, labelings), 0,
+                        naming_doubt(rig, frames, labelings)};
   std::size_t points = 0;
   std::size_t labelled = 0;
   for (std::size_t f = 0; f < frames.size(); ++f) {
-    auto tracks = crossing_tracks(rig, frames[f].graphs, labelings[f]);
-    std::move(tracks.begin(), tracks.end(), std::back_inserter(result.tracks));
     labelled += labelled_points(labelings[f]);
     for (const GridGraph& graph : frames[f].graphs) points += curve_points(graph);
   }

@@ -14,7 +14,6 @@
 #include "pencilscan/pipeline/naming_doubt.h"
 #include "pencilscan/pipeline/view_agreement.h"
 #include "pencilscan/refinement/moved_devices.h"
-#include "pencilscan/refinement/shown_colors.h"
 
 namespace pencilscan {
 namespace {
@@ -25,17 +24,6 @@ std::vector<Labeling> label(const Rig& rig, std::span<const FrameCurves> frames,
   for (const FrameCurves& frame : frames)
     labelings.push_back(solve_joint(rig, frame.families, frame.graphs, options));
   return labelings;
-}
-
-std::vector<CrossingTrack> tracks_of(const Rig& rig, std::span<const FrameCurves> frames,
-                                     std::span<const Labeling> labelings,
-                                     const TrackOptions& options) {
-  std::vector<CrossingTrack> tracks;
-  for (std::size_t f = 0; f < frames.size(); ++f) {
-    auto of_frame = crossing_tracks(rig, frames[f].graphs, labelings[f], options);
-    std::move(of_frame.begin(), of_frame.end(), std::back_inserter(tracks));
-  }
-  return tracks;
 }
 
 /// What one first tolerance leads to.
@@ -49,14 +37,6 @@ struct Attempt {
   std::optional<FoundProjector> misplaced;  ///< by the last names; it is the objection
   std::size_t points = 0;
 };
-
-ShownColorCount shown_colors(const Rig& rig, std::span<const FrameCurves> frames,
-                             std::span<const Labeling> labelings) {
-  ShownColorCount count(rig);
-  for (std::size_t f = 0; f < frames.size(); ++f)
-    count.add(frames[f].families, frames[f].graphs, labelings[f]);
-  return count;
-}
 
 /// Where few devices moved and all others are as calibrated, refinement starts with those put back.
 void put_back_few(const Rig& calibrated, std::span<const CrossingTrack> tracks, Attempt& attempt) {
@@ -83,7 +63,7 @@ bool run_rounds(const Rig& calibrated, std::span<const FrameCurves> frames, doub
   while (true) {
     joint.projection_sigma_px = tolerance;
     const auto labelings = label(refinement.rig, frames, joint);
-    const auto tracks = tracks_of(refinement.rig, frames, labelings, options.tracks);
+    const auto tracks = crossing_tracks(refinement.rig, frames, labelings, options.tracks);
     if (refinement.rounds.empty() && result.moved.empty()) {
       put_back_few(calibrated, tracks, result);
       refine.moved = result.moved;
@@ -103,7 +83,7 @@ bool run_rounds(const Rig& calibrated, std::span<const FrameCurves> frames, doub
                          std::min(0.5 * tolerance, kTolerancePerMedian * round.after.median_px));
   }
   refinement.labelings = label(refinement.rig, frames, joint);
-  result.tracks = tracks_of(refinement.rig, frames, refinement.labelings, options.tracks);
+  result.tracks = crossing_tracks(refinement.rig, frames, refinement.labelings, options.tracks);
   return true;
 }
 
@@ -132,7 +112,7 @@ bool turn_by_colors(const Rig& calibrated, std::span<const FrameCurves> frames, 
   RigCorrection correction = result.correction;
   correction.resize(device_count(calibrated));
   for (const ShownColors& shown :
-       shown_colors(calibrated, frames, result.refinement.labelings).shown()) {
+       naming_doubt(calibrated, frames, result.refinement.labelings).shown_colors()) {
     if (shown.better_shift() == 0) continue;
     const auto p = static_cast<std::size_t>(shown.pattern.projector);
     const LinePattern& lines =
@@ -259,6 +239,17 @@ Attempt best_attempt(const Rig& calibrated, std::span<const FrameCurves> frames,
 }
 
 }  // namespace
+
+std::vector<CrossingTrack> crossing_tracks(const Rig& rig, std::span<const FrameCurves> frames,
+                                           std::span<const Labeling> labelings,
+                                           const TrackOptions& options) {
+  std::vector<CrossingTrack> tracks;
+  for (std::size_t f = 0; f < frames.size(); ++f) {
+    auto of_frame = crossing_tracks(rig, frames[f].graphs, labelings[f], options);
+    std::move(of_frame.begin(), of_frame.end(), std::back_inserter(tracks));
+  }
+  return tracks;
+}
 
 RigRefinement refine_rig_on_frames(const Rig& stated, std::span<const FrameCurves> frames,
                                    const RigRefinementOptions& options) {

@@ -48,6 +48,12 @@ struct FrameCurves {
   std::vector<GridGraph> graphs;  ///< per camera
 };
 
+/// Crossings of the labelled lines of several frames, a labeling per frame.
+[[nodiscard]] std::vector<CrossingTrack> crossing_tracks(const Rig& rig,
+                                                         std::span<const FrameCurves> frames,
+                                                         std::span<const Labeling> labelings,
+                                                         const TrackOptions& options = {});
+
 /// Corrects the poses of the devices so that the crossings of labelled lines of all frames agree:
 /// joint labels with a wide tolerance, refinement of the rig, labels with a narrower one, and so
 /// on. Refused where the crossings of the last labels do not determine the devices.
