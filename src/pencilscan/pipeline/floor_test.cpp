@@ -3,11 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <utility>
 
 #include "pencilscan/pipeline/frame.h"
 #include "pencilscan/pipeline/sample_frame.h"
-#include "pencilscan/planning/ring.h"
 #include "pencilscan/simulation/simulated_object.h"
 
 namespace pencilscan {
@@ -20,24 +18,17 @@ const Vec3 kBallCenter(0, 0, -10);
 constexpr double kFloorHeight = -70;  // mm, height
 
 Rig rig_before_floor() {
-  RingOptions ring;
+  RingOptions ring = sample::small_ring();
   ring.cameras = ring.projectors = 3;
   ring.arc_rad = 2.4;
-  ring.camera_width = 640;
-  ring.camera_height = 480;
-  ring.camera_focal_px = 1150;
   return make_ring(ring);
 }
 
 Frame frame_of(const Rig& rig) {
   TriangleMesh mesh = make_sphere(kBallRadius, 96, kBallCenter);
-  const auto first = static_cast<int>(mesh.vertices.size());
   constexpr double kHalf = 400;
-  for (const auto& [x, y] : {std::pair(-kHalf, -kHalf), std::pair(kHalf, -kHalf),
-                             std::pair(kHalf, kHalf), std::pair(-kHalf, kHalf)})
-    mesh.vertices.emplace_back(x, y, kFloorHeight);
-  mesh.faces.push_back({first, first + 1, first + 2});
-  mesh.faces.push_back({first, first + 2, first + 3});
+  sample::add_square(kFloorHeight * Vec3::UnitZ(), kHalf * Vec3::UnitX(), kHalf * Vec3::UnitY(),
+                     mesh);
   PhotographyOptions photo;
   photo.noise = "medium";
   return sample::photographed_frame(rig, SimulatedObject(mesh), photo);

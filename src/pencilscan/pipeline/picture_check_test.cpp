@@ -241,11 +241,7 @@ TEST_F(PictureCheck, AProjectorWithAnotherPatternIsNamed) {
 
 /// What is left in its colours is of others that share them, and no sign that it was moved.
 TEST_F(PictureCheck, AProjectorThatIsOffStandsNowhereElse) {
-  RingOptions ring;
-  ring.camera_width = 640;
-  ring.camera_height = 480;
-  ring.camera_focal_px = 1150;
-  const Rig rig = make_ring(ring);
+  const Rig rig = make_ring(sample::small_ring());
   Rig lit = rig;
   lit.projectors.erase(lit.projectors.begin() + 2);
   const Frame frame =

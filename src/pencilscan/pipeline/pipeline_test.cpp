@@ -384,11 +384,8 @@ TEST_F(PipelineTest, ACameraThatWasKnockedIsFoundByTheSurfaceOfTheOthers) {
 
 /// Turned so far that crossings meet at the names of other lines.
 TEST(RigCheck, ACameraThatMeasuresWhatTheOthersDoNotIsNoFit) {
-  RingOptions ring;
+  RingOptions ring = sample::small_ring();
   ring.cameras = ring.projectors = 3;
-  ring.camera_width = 640;
-  ring.camera_height = 480;
-  ring.camera_focal_px = 1150;
   const Rig rig = make_ring(ring);
   TriangleMesh egg = make_sphere(100, 40);
   for (Vec3& vertex : egg.vertices) vertex = vertex.cwiseProduct(Vec3(1, 0.8, 1.3));

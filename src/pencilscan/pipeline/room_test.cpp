@@ -3,11 +3,9 @@
 #include <cmath>
 #include <cstddef>
 #include <string>
-#include <utility>
 
 #include "pencilscan/pipeline/frame.h"
 #include "pencilscan/pipeline/sample_frame.h"
-#include "pencilscan/planning/ring.h"
 #include "pencilscan/simulation/simulated_object.h"
 
 namespace pencilscan {
@@ -17,12 +15,9 @@ constexpr double kBallBeforeWall = 60;  // mm
 constexpr double kWallBehind = 450;  // mm, of the wall behind the ball's centre: outside the volume
 
 Rig rig_before_wall() {
-  RingOptions ring;
+  RingOptions ring = sample::small_ring();
   ring.cameras = ring.projectors = 4;
   ring.arc_rad = 2.6;
-  ring.camera_width = 640;
-  ring.camera_height = 480;
-  ring.camera_focal_px = 1150;
   return make_ring(ring);
 }
 
@@ -32,13 +27,8 @@ TriangleMesh wall_behind(const Rig& rig, TriangleMesh mesh) {
   for (const Camera& camera : rig.cameras) devices += camera.center();
   const Vec3 back = -Vec3(devices.x(), devices.y(), 0).normalized();
   const Vec3 aside = back.cross(Vec3::UnitZ());
-  const auto first = static_cast<int>(mesh.vertices.size());
   constexpr double kHalf = 1300;
-  for (const auto& [x, z] : {std::pair(-kHalf, -kHalf), std::pair(kHalf, -kHalf),
-                             std::pair(kHalf, kHalf), std::pair(-kHalf, kHalf)})
-    mesh.vertices.push_back(kWallBehind * back + x * aside + z * Vec3::UnitZ());
-  mesh.faces.push_back({first, first + 1, first + 2});
-  mesh.faces.push_back({first, first + 2, first + 3});
+  sample::add_square(kWallBehind * back, kHalf * aside, kHalf * Vec3::UnitZ(), mesh);
   return mesh;
 }
 

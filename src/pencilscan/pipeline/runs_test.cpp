@@ -12,9 +12,7 @@
 #include "pencilscan/io/file.h"
 #include "pencilscan/io/image.h"
 #include "pencilscan/io/mesh_file.h"
-#include "pencilscan/pipeline/frame_files.h"
 #include "pencilscan/pipeline/pipeline_fixture.h"
-#include "pencilscan/pipeline/rig_refinement.h"
 #include "pencilscan/pipeline/sequence.h"
 #include "pencilscan/rig/device_list.h"
 

@@ -1,15 +1,36 @@
 #pragma once
 
-// Frames for tests.
+// Rigs, scenes and frames for tests.
 
 #include <cstdint>
 #include <opencv2/core.hpp>
 #include <utility>
 
 #include "pencilscan/pipeline/frame.h"
+#include "pencilscan/planning/ring.h"
 #include "pencilscan/simulation/photography.h"
 
 namespace pencilscan::sample {
+
+/// The default ring with cameras of a quarter of the pixels, which see as much.
+inline RingOptions small_ring() {
+  RingOptions ring;
+  ring.camera_width /= 2;
+  ring.camera_height /= 2;
+  ring.camera_focal_px /= 2;
+  return ring;
+}
+
+/// Adds a square, or a parallelogram, about its centre: `x` and `y` lead to the middles of two
+/// sides.
+inline void add_square(const Vec3& center, const Vec3& x, const Vec3& y, TriangleMesh& mesh) {
+  const auto first = static_cast<int>(mesh.vertices.size());
+  for (const auto& [a, b] :
+       {std::pair(-1, -1), std::pair(1, -1), std::pair(1, 1), std::pair(-1, 1)})
+    mesh.vertices.push_back(center + a * x + b * y);
+  mesh.faces.push_back({first, first + 1, first + 2});
+  mesh.faces.push_back({first, first + 2, first + 3});
+}
 
 /// What the cameras take of an object, or of its moments (whatever photograph() takes), with values
 /// from 0 to 1.
