@@ -5,7 +5,6 @@
 #include <cmath>
 #include <utility>
 
-#include "pencilscan/core/check.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/depth/wide_windows.h"
 #include "pencilscan/io/linear_light.h"

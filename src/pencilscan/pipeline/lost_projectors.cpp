@@ -8,7 +8,6 @@
 #include "pencilscan/core/evenly_picked.h"
 #include "pencilscan/core/median.h"
 #include "pencilscan/pipeline/projector_places.h"
-#include "pencilscan/refinement/crossing_tracks.h"
 
 namespace pencilscan {
 namespace {
