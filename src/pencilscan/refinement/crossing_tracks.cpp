@@ -9,6 +9,7 @@
 
 #include "pencilscan/core/median.h"
 #include "pencilscan/core/parallel.h"
+#include "pencilscan/refinement/like_lines.h"
 
 namespace pencilscan {
 namespace {
@@ -52,7 +53,7 @@ std::optional<SheetDepth> sheet_depth(const Rig& rig, int camera, const LineOfPr
 }
 
 /// Labelled crossings of one camera with their points.
-std::vector<Sighting> sightings_of(const Rig& rig, const GridGraph& graph,
+std::vector<Sighting> sightings_of(const Rig& rig, const LikeLines& like, const GridGraph& graph,
                                    std::span<const LabeledRun> runs, const Sphere& volume,
                                    const TrackOptions& options) {
   const Camera& camera = rig.cameras[static_cast<std::size_t>(graph.camera)];
@@ -74,6 +75,16 @@ std::vector<Sighting> sightings_of(const Rig& rig, const GridGraph& graph,
         (a->depth / (a->per_px * a->per_px) + b->depth / (b->per_px * b->per_px)) / information;
     sighting.point = camera.point_at_depth(pixel, depth);
     if ((sighting.point - volume.center).norm() > 1.1 * volume.radius) continue;
+    const auto named = [&](const CurveLabel& label, int curve, float at) {
+      const auto& points = graph.curves[static_cast<std::size_t>(curve)].points;
+      return LikeLines::NamedCurve{label.pattern,
+                                   rig.pattern(label.pattern).position_px(label.line),
+                                   points[static_cast<std::size_t>(at)].normal.cast<double>()};
+    };
+    const auto of_a = named(*label_a, x.curve_a, x.at_a);
+    const auto of_b = named(*label_b, x.curve_b, x.at_b);
+    if (like.may_touch(camera, pixel, of_a, of_b) || like.may_touch(camera, pixel, of_b, of_a))
+      continue;
     sightings.push_back(std::move(sighting));
   }
   return sightings;
@@ -223,10 +234,12 @@ Eigen::Matrix2d crossing_whitening(const GridGraph& graph, const Crossing& x,
 std::vector<CrossingTrack> crossing_tracks(const Rig& rig, std::span<const GridGraph> graphs,
                                            const Labeling& labeling, const TrackOptions& options) {
   const Sphere volume = working_volume(rig);
+  const LikeLines like(rig);
   std::vector<std::vector<Sighting>> per_camera(graphs.size());
   parallel_for(graphs.size(), [&](std::size_t g) {
-    per_camera[g] = sightings_of(
-        rig, graphs[g], labeling.runs[static_cast<std::size_t>(graphs[g].camera)], volume, options);
+    per_camera[g] =
+        sightings_of(rig, like, graphs[g],
+                     labeling.runs[static_cast<std::size_t>(graphs[g].camera)], volume, options);
   });
   std::vector<Sighting> all;
   for (const auto& part : per_camera) all.insert(all.end(), part.begin(), part.end());

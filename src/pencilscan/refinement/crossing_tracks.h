@@ -54,7 +54,8 @@ struct TrackOptions {
                                                  const TrackOptions& options);
 
 /// The crossings of labelled curves of one frame, those of the same two lines seen by several
-/// cameras joined. Ordered by lines, then camera: independent of the number of threads.
+/// cameras joined, but for those of curves that may hold the light of two lines (like_lines.h).
+/// Ordered by lines, then camera: independent of the number of threads.
 [[nodiscard]] std::vector<CrossingTrack> crossing_tracks(const Rig& rig,
                                                          std::span<const GridGraph> graphs,
                                                          const Labeling& labeling,

@@ -255,5 +255,35 @@ TEST(CrossingTracks, JoinTheViewsOfOneSurfacePoint) {
   EXPECT_LT(crossing_disagreement(scene.rig, tracks).median_px, 0.02);
 }
 
+TEST(CrossingTracks, LeaveOutCurvesThatMayHoldTwoLines) {
+  TwoProjectorScene scene;
+  std::vector<GridGraph> graphs = {scene.graph(0, 40, 0, 1)};
+  Labeling labeling;
+  labeling.runs.resize(2);
+  for (std::size_t k = 0; k < graphs[0].curves.size(); ++k) {
+    std::vector<CurvePoint>& points = graphs[0].curves[k].points;
+    const CurveLabel label{*graphs[0].identities[k].pattern, scene.true_lines[0][k], 0, 1};
+    labeling.runs[0].push_back({static_cast<int>(k), 0, static_cast<int>(points.size()), label});
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const Eigen::Vector2f way =
+          points[std::min(i + 1, points.size() - 1)].position - points[i < 1 ? 0 : i - 1].position;
+      points[i].normal = Eigen::Vector2f(way.y(), -way.x()).normalized();
+    }
+  }
+  const std::size_t all = crossing_tracks(scene.rig, graphs, labeling).size();
+  ASSERT_GT(all, 30U);
+  // A projector of the same colours whose lines lie beside those of the first one.
+  scene.rig.projectors.push_back(scene.rig.projectors[0]);
+  LinePattern& beside = scene.rig.projectors[2].patterns.front();
+  const double offset = beside.offset_px;
+  beside.offset_px = offset + 0.1 * beside.pitch_px;
+  EXPECT_EQ(crossing_tracks(scene.rig, graphs, labeling).size(), 0U);
+  beside.offset_px = offset + 0.5 * beside.pitch_px;
+  EXPECT_EQ(crossing_tracks(scene.rig, graphs, labeling).size(), all) << "apart in the picture";
+  beside.offset_px = offset;
+  beside.colors = scene.rig.projectors[1].patterns.front().colors;
+  EXPECT_EQ(crossing_tracks(scene.rig, graphs, labeling).size(), all) << "another family's light";
+}
+
 }  // namespace
 }  // namespace pencilscan
