@@ -11,6 +11,7 @@
 #include "pencilscan/detection/code_evidence.h"
 #include "pencilscan/detection/curve_rendering.h"
 #include "pencilscan/detection/refine.h"
+#include "pencilscan/geometry/light_sheet.h"
 #include "pencilscan/guided/denied_lines.h"
 #include "pencilscan/guided/line_chains.h"
 #include "pencilscan/guided/named_points.h"
@@ -18,9 +19,25 @@
 #include "pencilscan/guided/shared_curves.h"
 #include "pencilscan/points/triangulate.h"
 #include "pencilscan/rig/object_space.h"
+#include "pencilscan/view/places.h"
 
 namespace pencilscan {
 namespace {
+
+using ShownPoint = std::pair<const CurvePoint*, int>;  ///< and its family
+
+/// True where a curve of the family runs along a point within `reach`, px.
+bool is_beside(const CurvePoint& point, int family, float reach, const Places<ShownPoint>& curves) {
+  constexpr float kSameDirection = 0.9F;  // cosine, as of a predicted line (predicted_places.h)
+  bool found = false;
+  curves.around(point.position, reach, [&](const ShownPoint& shown) {
+    const CurvePoint& other = *shown.first;
+    found = found || (shown.second == family &&
+                      (other.position - point.position).squaredNorm() < reach * reach &&
+                      std::abs(other.normal.dot(point.normal)) > kSameDirection);
+  });
+  return found;
+}
 
 /// Guided matching in one camera.
 class CameraMatching {
@@ -55,8 +72,12 @@ class CameraMatching {
   [[nodiscard]] bool fits(const CurvePoint& point, const LineName& name, int family) const;
   [[nodiscard]] float color_margin(const Curve& curve, int begin, int end,
                                    const LineName& name) const;
+  [[nodiscard]] float color_lead(const Curve& curve, int begin, int end, const LineName& name,
+                                 const LineName& other) const;
   [[nodiscard]] bool is_supported(const Curve& curve, int begin, int end, const LineName& name,
                                   float margin) const;
+  [[nodiscard]] bool is_of_object(const LabeledRun& run, int at) const;
+  [[nodiscard]] bool agrees_along(int curve, int begin, int end, const LineName& name) const;
   [[nodiscard]] bool is_long_enough(const std::vector<char>& decided, int begin, int end) const;
   [[nodiscard]] std::vector<std::vector<char>> decided_points() const;
   [[nodiscard]] LabeledRun run_of(int curve, int begin, int end, const LineName& name) const {
@@ -66,6 +87,8 @@ class CameraMatching {
   }
   [[nodiscard]] std::vector<LineChain> still_missing();
   [[nodiscard]] Curve guess_of(const LineChain& chain) const;
+  [[nodiscard]] Places<ShownPoint> undecided_places() const;
+  [[nodiscard]] std::size_t color_of(const LineName& name, int family) const;
 
   const Rig& rig_;
   const std::vector<ColorFamily>& families_;
@@ -216,19 +239,34 @@ void CameraMatching::confirm_tentative() {
   accept(std::move(confirmed));
 }
 
+/// Which colour of its family a line has.
+std::size_t CameraMatching::color_of(const LineName& name, int family) const {
+  const LinePattern& pattern = rig_.pattern(name.pattern);
+  return static_cast<std::size_t>(families_[static_cast<std::size_t>(family)].color_of_symbol(
+      pattern)[static_cast<std::size_t>(pattern.symbol(name.line))]);
+}
+
 /// Logarithm of how much likelier the colour of a stretch [begin, end) is under a name than under
 /// the likeliest other colour; 0 where the family has one colour.
 float CameraMatching::color_margin(const Curve& curve, int begin, int end,
                                    const LineName& name) const {
   const auto family = static_cast<std::size_t>(curve.family);
-  const LinePattern& pattern = rig_.pattern(name.pattern);
-  const auto own = static_cast<std::size_t>(families_[family].color_of_symbol(
-      pattern)[static_cast<std::size_t>(pattern.symbol(name.line))]);
+  const std::size_t own = color_of(name, curve.family);
   std::vector<float> evidence = color_evidence(curve, begin, end, families_[family].colors.size());
   std::swap(evidence[own], evidence.back());
   const float of_name = evidence.back();
   evidence.pop_back();
   return evidence.empty() ? 0 : of_name - *std::max_element(evidence.begin(), evidence.end());
+}
+
+/// Logarithm of how much likelier the colour of a stretch [begin, end) is under one name than under
+/// another.
+float CameraMatching::color_lead(const Curve& curve, int begin, int end, const LineName& name,
+                                 const LineName& other) const {
+  const auto family = static_cast<std::size_t>(curve.family);
+  const std::vector<float> evidence =
+      color_evidence(curve, begin, end, families_[family].colors.size());
+  return evidence[color_of(name, curve.family)] - evidence[color_of(other, curve.family)];
 }
 
 /// True where the lines around support a name. On a dense surface the stretch's own colour may do
@@ -241,6 +279,39 @@ bool CameraMatching::is_supported(const Curve& curve, int begin, int end, const 
     return fits(p, name, curve.family);
   });
   return 2 * supported > end - begin;
+}
+
+/// True where a label puts a point of its curve where the object can be.
+bool CameraMatching::is_of_object(const LabeledRun& run, int at) const {
+  const LinePattern& pattern = rig_.pattern(run.label.pattern);
+  const CurvePoint& p =
+      graph_.curves[static_cast<std::size_t>(run.curve)].points[static_cast<std::size_t>(at)];
+  const Vec2 pixel = p.position.cast<double>();
+  const auto projector = static_cast<std::size_t>(run.label.pattern.projector);
+  const auto depth = RayInProjector(camera_, rig_.projectors[projector], pixel)
+                         .depth(pattern.position_px(run.label.line), pattern.axis);
+  return !depth || space_.holds(camera_.point_at_depth(pixel, *depth));
+}
+
+/// True where the name of a stretch [begin, end) agrees with those of its curve before and after
+/// it. Lines of the object end at a floor or wall; a surface that is wrong by whole lines makes
+/// them go on along its curves. Both names then say what colour the stretch has.
+bool CameraMatching::agrees_along(int curve, int begin, int end, const LineName& name) const {
+  constexpr float kJump = 6;  // of a curve to another line, as for the joint solution (joint.cpp)
+  const float certainty = std::log(options_.confidence / (1 - options_.confidence));
+  const auto after = std::lower_bound(
+      runs_.begin(), runs_.end(), std::pair(curve, begin),
+      [](const LabeledRun& r, const auto& at) { return std::pair(r.curve, r.begin) < at; });
+  const auto has_other = [&](const LabeledRun& run, int at) {
+    const LineName other{run.label.pattern, run.label.line};
+    return !(other == name) && !is_of_object(run, at) &&
+           color_lead(graph_.curves[static_cast<std::size_t>(curve)], begin, end, name, other) <
+               kJump - certainty;
+  };
+  if (after != runs_.end() && after->curve == curve && has_other(*after, after->begin))
+    return false;
+  return after == runs_.begin() || (after - 1)->curve != curve ||
+         !has_other(*(after - 1), (after - 1)->end - 1);
 }
 
 /// A stretch [begin, end) on one line, within what is undecided of its curve.
@@ -283,7 +354,8 @@ void CameraMatching::adopt_curves() {
       if (margin < -certainty && has_dense_ && end - begin >= options_.min_adopted)
         denied_.push_back({run_of(static_cast<int>(c), begin, end, *name),
                            spacings[static_cast<std::size_t>((begin + end) / 2)]});
-      if (margin > -certainty && is_supported(curve, begin, end, *name, margin))
+      if (margin > -certainty && agrees_along(static_cast<int>(c), begin, end, *name) &&
+          is_supported(curve, begin, end, *name, margin))
         adopted.push_back(run_of(static_cast<int>(c), begin, end, *name));
     });
   }
@@ -342,8 +414,23 @@ Curve CameraMatching::guess_of(const LineChain& chain) const {
   return curve;
 }
 
+/// The points of curves that have no name.
+Places<ShownPoint> CameraMatching::undecided_places() const {
+  const auto decided = decided_points();
+  Places<ShownPoint> places(camera_.width, camera_.height, 3);
+  for (std::size_t c = 0; c < graph_.curves.size(); ++c) {
+    const Curve& curve = graph_.curves[c];
+    for (std::size_t i = 0; i < curve.points.size(); ++i) {
+      if (decided[c][i] == 0)
+        places.add(curve.points[i].position, {&curve.points[i], curve.family});
+    }
+  }
+  return places;
+}
+
 void CameraMatching::find_missing() {
   if (unexplained_.empty()) return;
+  const Places<ShownPoint> undecided = undecided_places();
   RefineOptions fitting;
   fitting.min_points = options_.min_points;
   std::vector<LabeledRun> labeled;
@@ -361,9 +448,15 @@ void CameraMatching::find_missing() {
     Curve guess = guess_of(chain);
     const int family = guess.family;
     const cv::Mat& image = unexplained_[static_cast<std::size_t>(family)];
+    // As near as a curve lies to its line.
+    const auto reach = static_cast<float>(
+        std::min(options_.max_offset_px,
+                 options_.max_offset_lines * static_cast<double>(chain.front().spacing_px)));
     for (Curve& curve : fit_guess(image, std::move(guess), fitting)) {
       std::vector<char> good;
-      for (const CurvePoint& p : curve.points) good.push_back(fits(p, name, family));
+      // On a curve that has no name, what is left of the image is left of that curve.
+      for (const CurvePoint& p : curve.points)
+        good.push_back(!is_beside(p, family, reach, undecided) && fits(p, name, family));
       const int index = static_cast<int>(graph_.curves.size() + found.size());
       bool any = false;
       for_each_stretch(good, [&](int begin, int end) {

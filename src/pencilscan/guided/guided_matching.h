@@ -35,10 +35,12 @@ struct GuidedMatchingOptions {
 ///   1. predicts the lines of all projectors on the surface around the labelled points,
 ///   2. confirms tentative labels where the predicted line is the same, and gives an undecided
 ///      stretch of a curve the label of the predicted line that it lies on, if no other curve shows
-///      that line, the stretch does not have another line's colour, and lines around or, on a dense
-///      surface, its own colour support it,
+///      that line, the stretch does not have another line's colour, its curve does not come from a
+///      floor or wall with another name, and lines around or, on a dense surface, its own colour
+///      support it,
 ///   3. fits a new curve where a line is predicted and no curve was found. The fit is to the image
-///      that remains once the known curves are subtracted,
+///      that remains once the known curves are subtracted. What remains on a curve without a name
+///      is no line,
 ///   4. on a dense surface, names predicted lines that lie on curves of other projectors too
 ///      (shared_curves.h).
 /// New curves are appended to `graphs`, new runs to `labeling`. The function returns, per graph,

@@ -355,6 +355,58 @@ TEST_F(LabeledScene, MissedLineIsFoundInTheImageWhereItIsAndNotWhereItIsDark) {
   EXPECT_GT(static_cast<double>(found), 0.5 * static_cast<double>(truth.size()));
 }
 
+TEST_F(LabeledScene, WhatIsLeftOfAnUndecidedCurveIsNoMissedLine) {
+  const std::size_t curve = middle_curve(0);
+  const int line = true_lines[0][curve];
+  remove_label(curve);
+  // The colour denies the line there, and the fit of the curve left half of its light.
+  std::vector<float>& code = graph_.curves[curve].code;
+  for (std::size_t i = 0; i < code.size(); i += 2) std::swap(code[i], code[i + 1]);
+  std::vector<cv::Mat> presence;
+  for (int f = 0; f < 2; ++f) {
+    std::vector<Curve> of_family;
+    for (const Curve& c : graph_.curves) {
+      if (c.family == f) of_family.push_back(c);
+    }
+    if (f == 0) of_family.push_back(graph_.curves[curve]);
+    presence.push_back(render_curves(of_family, {camera().width, camera().height}));
+  }
+  const std::vector<std::vector<cv::Mat>> images = {presence};
+  const std::size_t before = graph_.curves.size();
+  match_guided(rig, families, images, {&graph_, 1}, labeling_);
+  for (const LabeledRun& run : labeling_.runs[0]) {
+    const bool is_of_line = run.label.pattern == PatternRef{0, 0} && run.label.line == line;
+    EXPECT_FALSE(is_of_line && run.curve >= static_cast<int>(before));
+  }
+}
+
+TEST_F(LabeledScene, CurveOfAWallKeepsItsNameBesideTheObject) {
+  constexpr int kPeriod = 8;  // lines after which the colours repeat
+  rig.volume = Sphere{Vec3::Zero(), 75};
+  const std::size_t curve = middle_curve(0);
+  const int line = true_lines[0][curve];
+  const auto n = static_cast<int>(graph_.curves[curve].points.size());
+  remove_label(curve);
+  const auto points_of_line = [&](int line_of_first_half) {
+    GridGraph graph = graph_;
+    Labeling labeling = labeling_;
+    labeling.runs[0].push_back(
+        {static_cast<int>(curve), 0, n / 2,
+         CurveLabel{{0, 0}, line_of_first_half, 1.0 * line_of_first_half, 1}});
+    std::sort(labeling.runs[0].begin(), labeling.runs[0].end(),
+              [](const auto& a, const auto& b) { return a.curve < b.curve; });
+    match_guided(rig, families, std::vector<std::vector<cv::Mat>>(1), {&graph, 1}, labeling);
+    int points = 0;
+    for (const LabeledRun& run : labeling.runs[0]) {
+      if (run.curve == static_cast<int>(curve) && run.begin >= n / 2 && run.label.line == line)
+        points += run.end - run.begin;
+    }
+    return points;
+  };
+  EXPECT_GT(points_of_line(line), n / 3) << "the curve goes on";
+  EXPECT_EQ(points_of_line(line + 2 * kPeriod), 0) << "far behind the volume";
+}
+
 TEST_F(LabeledScene, FewerPointsAreThoseOfTheLatticeInOrder) {
   const std::vector<MeasuredPoint> all = points();
   const auto place = [](const MeasuredPoint& p) {
