@@ -14,6 +14,7 @@
 #include "pencilscan/geometry/light_sheet.h"
 #include "pencilscan/guided/denied_lines.h"
 #include "pencilscan/guided/line_chains.h"
+#include "pencilscan/guided/merged_lines.h"
 #include "pencilscan/guided/named_points.h"
 #include "pencilscan/guided/predicted_places.h"
 #include "pencilscan/guided/shared_curves.h"
@@ -58,6 +59,8 @@ class CameraMatching {
   void name_shared();
   /// Fits what is still missing to what the known curves leave of the presence images.
   void find_missing();
+  /// Fits it beside named curves, which hold its light too.
+  void find_merged();
   /// Where colours denied a dense surface in the last pass.
   [[nodiscard]] const std::vector<DeniedRun>& denied() const { return denied_; }
   /// Per projector, since predict() was called first.
@@ -67,7 +70,12 @@ class CameraMatching {
 
  private:
   void accept(std::vector<LabeledRun> news);
-  void append(std::vector<Curve> found);
+  struct News {
+    std::vector<Curve> curves;
+    std::vector<LabeledRun> runs;
+  };
+  void add_good(Curve curve, const std::vector<char>& good, const LineName& name, News& news) const;
+  void append(News news, bool hold_light);
   void grow_surface();
   [[nodiscard]] bool fits(const CurvePoint& point, const LineName& name, int family) const;
   [[nodiscard]] float color_margin(const Curve& curve, int begin, int end,
@@ -99,6 +107,7 @@ class CameraMatching {
   const GuidedMatchingOptions& options_;
   std::vector<PatternRef> patterns_;  ///< that the camera can see
   std::vector<cv::Mat> unexplained_;  ///< per family; empty without images
+  std::vector<char> is_subtracted_;   ///< per curve, from them
   ObjectSpace space_;
   LocalSurface surface_;
   std::vector<char> shows_object_;          ///< per patch, 0: floors and walls
@@ -107,6 +116,7 @@ class CameraMatching {
   std::vector<LabeledRun> not_on_surface_;  ///< runs whose points it does not hold yet
   NamedPoints named_;
   std::vector<PredictedPoint> missing_;  ///< predicted points that no label explains
+  std::vector<PredictedPoint> shown_;    ///< those that one does
   PredictedPlaces missing_places_;       ///< those as of the last predict()
   std::vector<DeniedRun> denied_;
   std::vector<ExpectedLines> expected_;
@@ -142,6 +152,7 @@ CameraMatching::CameraMatching(const Rig& rig, const std::vector<ColorFamily>& f
     }
     unexplained_.push_back(std::move(rest));
   }
+  is_subtracted_.assign(graph.curves.size(), 1);
   for (const MeasuredPoint& p : dense) {
     if (p.camera == graph.camera) dense_.push_back(p);
   }
@@ -190,15 +201,16 @@ LocalSurface CameraMatching::take_surface() {
 void CameraMatching::predict() {
   grow_surface();
   // Those that became known lie where the surface grew.
-  std::erase_if(missing_,
-                [&](const PredictedPoint& p) { return surface_.refitted()[p.patch] != 0; });
+  const auto is_old = [&](const PredictedPoint& p) { return surface_.refitted()[p.patch] != 0; };
+  std::erase_if(missing_, is_old);
+  std::erase_if(shown_, is_old);
   constexpr float kFarApart = 5;  // px; of denser lines more are missing by themselves
   const bool is_first = expected_.empty();
   expected_.resize(rig_.projectors.size());
   for (const PredictedPoint& p :
        predict_lines(rig_, camera_, surface_, patterns_, options_.prediction)) {
     const bool is_named = named_.show(p);
-    if (!is_named) missing_.push_back(p);
+    (is_named ? shown_ : missing_).push_back(p);
     if (!is_first || p.spacing_px < kFarApart || shows_object_[p.patch] == 0) continue;
     ExpectedLines& of_projector = expected_[static_cast<std::size_t>(p.pattern.projector)];
     ++of_projector.points;
@@ -377,27 +389,39 @@ std::vector<LineChain> CameraMatching::still_missing() {
 }
 
 void CameraMatching::name_shared() {
-  std::vector<LabeledRun> labeled;
-  std::vector<Curve> found;
+  News news;
   for (SharedCurve& shared : find_shared(camera_, families_, graph_.curves, still_missing(), named_,
                                          missing_places_, options_)) {
-    const int index = static_cast<int>(graph_.curves.size() + found.size());
-    labeled.push_back(run_of(index, 0, static_cast<int>(shared.curve.points.size()), shared.name));
-    found.push_back(std::move(shared.curve));
+    const std::vector<char> all(shared.curve.points.size(), 1);
+    add_good(std::move(shared.curve), all, shared.name, news);
   }
-  append(std::move(found));
-  accept(std::move(labeled));
+  append(std::move(news), false);
 }
 
-/// Curves that no image showed by themselves.
-void CameraMatching::append(std::vector<Curve> found) {
-  for (Curve& curve : found) {
+/// Names the good stretches of a curve, where they are long enough; a curve without one is none.
+void CameraMatching::add_good(Curve curve, const std::vector<char>& good, const LineName& name,
+                              News& news) const {
+  const int index = static_cast<int>(graph_.curves.size() + news.curves.size());
+  const std::size_t before = news.runs.size();
+  for_each_stretch(good, [&](int begin, int end) {
+    if (good[static_cast<std::size_t>(begin)] != 0 && end - begin >= options_.min_points)
+      news.runs.push_back(run_of(index, begin, end, name));
+  });
+  if (news.runs.size() > before) news.curves.push_back(std::move(curve));
+}
+
+/// Curves that no image showed by themselves. `hold_light`: that no other curve holds.
+void CameraMatching::append(News news, bool hold_light) {
+  is_subtracted_.resize(graph_.curves.size() + news.curves.size(), hold_light ? 1 : 0);
+  for (Curve& curve : news.curves) {
     const auto family = static_cast<std::size_t>(curve.family);
+    if (hold_light) subtract_curve(curve, unexplained_[family]);
     curve.code.assign(curve.points.size() * families_[family].colors.size(), 0.F);
     graph_.curves.push_back(std::move(curve));
     graph_.component_of_curve.push_back(-1);
     if (!graph_.identities.empty()) graph_.identities.emplace_back();
   }
+  accept(std::move(news.runs));
 }
 
 /// A curve where a line is predicted, as wide as it would be there.
@@ -433,8 +457,7 @@ void CameraMatching::find_missing() {
   const Places<ShownPoint> undecided = undecided_places();
   RefineOptions fitting;
   fitting.min_points = options_.min_points;
-  std::vector<LabeledRun> labeled;
-  std::vector<Curve> found;
+  News news;
   for (const LineChain& chain : still_missing()) {
     // Where the surface is as it was, the line was not found before. Lines of floors and walls that
     // no curve shows give no curve a wrong name.
@@ -457,20 +480,39 @@ void CameraMatching::find_missing() {
       // On a curve that has no name, what is left of the image is left of that curve.
       for (const CurvePoint& p : curve.points)
         good.push_back(!is_beside(p, family, reach, undecided) && fits(p, name, family));
-      const int index = static_cast<int>(graph_.curves.size() + found.size());
-      bool any = false;
-      for_each_stretch(good, [&](int begin, int end) {
-        if (good[static_cast<std::size_t>(begin)] == 0 || end - begin < options_.min_points) return;
-        labeled.push_back(run_of(index, begin, end, name));
-        any = true;
-      });
-      if (any) found.push_back(std::move(curve));
+      add_good(std::move(curve), good, name, news);
     }
   }
-  for (const Curve& curve : found)
-    subtract_curve(curve, unexplained_[static_cast<std::size_t>(curve.family)]);
-  append(std::move(found));
-  accept(std::move(labeled));
+  append(std::move(news), true);
+}
+
+void CameraMatching::find_merged() {
+  if (unexplained_.empty()) return;
+  // Of the points beside named curves. A line that is there shows along most of them; what the
+  // curves beside an unlit one leave is found here and there.
+  constexpr double kMost = 0.5;
+  const MergedLines merged(camera_, graph_.curves, runs_, is_subtracted_, shown_, unexplained_);
+  News news;
+  for (const LineChain& chain : still_missing()) {
+    const auto is_of_object = [&](const PredictedPoint& p) { return shows_object_[p.patch] != 0; };
+    if (static_cast<int>(chain.size()) < options_.min_points ||
+        std::none_of(chain.begin(), chain.end(), is_of_object))
+      continue;
+    const LineName name = name_of(chain.front());
+    MergedLines::Fit fit = merged.fit(guess_of(chain), name);
+    std::vector<std::vector<char>> good;
+    std::ptrdiff_t count = 0;
+    for (const Curve& piece : fit.pieces) {
+      good.emplace_back();
+      for (const CurvePoint& p : piece.points) good.back().push_back(fits(p, name, piece.family));
+      count += std::count(good.back().begin(), good.back().end(), 1);
+    }
+    if (static_cast<double>(count) < kMost * static_cast<double>(fit.beside)) continue;
+    for (std::size_t k = 0; k < fit.pieces.size(); ++k)
+      add_good(std::move(fit.pieces[k]), good[k], name, news);
+  }
+  // The curves beside them hold their light.
+  append(std::move(news), false);
 }
 
 }  // namespace
@@ -493,7 +535,10 @@ std::vector<LocalSurface> match_guided(const Rig& rig, const std::vector<ColorFa
       look.confirm_tentative();
       look.adopt_curves();
       look.find_missing();
-      if (!dense.empty()) look.name_shared();
+      if (!dense.empty()) {
+        look.find_merged();
+        look.name_shared();
+      }
     }
     if (!look.denied().empty())
       drop_beside_denied(graphs[g], look.denied(), labeling.runs[camera],

@@ -41,8 +41,8 @@ struct GuidedMatchingOptions {
 ///   3. fits a new curve where a line is predicted and no curve was found. The fit is to the image
 ///      that remains once the known curves are subtracted. What remains on a curve without a name
 ///      is no line,
-///   4. on a dense surface, names predicted lines that lie on curves of other projectors too
-///      (shared_curves.h).
+///   4. on a dense surface, tells lines apart that made one curve (merged_lines.h), and names
+///      predicted lines that lie on curves of other projectors too (shared_curves.h).
 /// New curves are appended to `graphs`, new runs to `labeling`. The function returns, per graph,
 /// the surface that all labelled points show. `presence`: the presence image of each graph and
 /// colour family, CV_32FC1, of the whole camera image; what nobody else holds is used up. `dense`:
