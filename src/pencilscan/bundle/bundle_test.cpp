@@ -98,6 +98,40 @@ TEST(Uncertainty, WhereThePrincipalPointLiesSaysNothingOfTheImagesSize) {
   EXPECT_EQ(at_the_edge.volume_median, in_the_middle.volume_median);
 }
 
+/// Ratio of the largest to the smallest stated shared error of scenes that differ in noise only.
+double shared_error_ratio(double shared_px) {
+  const Rig truth = ring(2, 2);
+  double least = std::numeric_limits<double>::infinity();
+  double most = 0;
+  for (std::uint64_t seed = 1; seed <= 8; ++seed) {
+    BundleProblem problem;
+    for (std::size_t d = 0; d < device_count(truth); ++d) {
+      problem.devices.push_back(bundle_device(device_at(truth, d)));
+      problem.devices.back().present = true;
+      problem.devices.back().prior_sigma.fill(0);
+    }
+    problem.tracks = tracks_of(truth, {.count = 400, .noise_seed = seed});
+    for (Track& track : problem.tracks)
+      for (std::size_t i = 1; i < track.views.size(); ++i) {
+        TrackView& view = track.views[i];
+        view.pixel.y() += shared_px * (view.pixel.x() < 500 ? 1 : -1);
+      }
+    triangulate_all(problem, 0.01);
+    const double shared = uncertainty(problem, {}).shared_px;
+    least = std::min(least, shared);
+    most = std::max(most, shared);
+  }
+  return most / least;
+}
+
+/// A threshold on what residuals show of shared errors made it 0 in some and 0.02 px in others.
+TEST(Uncertainty, EqualScenesShareErrorsAlike) {
+  // Eight scenes lie within three deviations of chance, each of which makes 2.5 of the variance.
+  const double most = std::sqrt(std::pow(2.5, 3));
+  for (const double shared_px : {0.0, 0.005, 0.01, 0.02})
+    EXPECT_LT(shared_error_ratio(shared_px), most) << shared_px;
+}
+
 /// A start that cannot be adjusted must not look like the best one.
 TEST(Adjust, WhatCannotBeTakenCostsInfinitely) {
   const Rig truth = ring(1, 1);

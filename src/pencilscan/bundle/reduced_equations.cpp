@@ -5,6 +5,7 @@
 
 #include "pencilscan/bundle/board_corners.h"
 #include "pencilscan/bundle/bundle_device.h"
+#include "pencilscan/bundle/extra_variance.h"
 #include "pencilscan/geometry/cross_matrix.h"
 #include "pencilscan/geometry/least_squares.h"
 
@@ -55,6 +56,8 @@ ReducedEquations::ReducedEquations(const BundleProblem& problem, const BundleOpt
       adjusted_(adjusted),
       H_(Eigen::MatrixXd::Zero(kBlock * count(), kBlock * count())),
       patches_(Eigen::MatrixXd::Zero(kBlock * count(), 2 * kPatches * kPatches * count())),
+      cells_(Eigen::MatrixXd::Zero(kBlock * count(), 2 * kCells * kCells * count())),
+      in_cells_(static_cast<std::size_t>(kCells * kCells * count())),
       shapes_(Eigen::MatrixXd::Zero(kBlock * count(), kBoardShapes)),
       patch_views_(Eigen::VectorXd::Zero(patches_.cols())) {
   for (const BundleDevice& device : problem.devices) rotations_.push_back(rotation_of(device));
@@ -89,22 +92,56 @@ Eigen::MatrixXd ReducedEquations::systematic(double shared_px) const {
   return all;
 }
 
-double ReducedEquations::shared_error(double visible_px, const Eigen::MatrixXd& root) const {
+Eigen::MatrixXd ReducedEquations::free_rows(const Eigen::MatrixXd& all) const {
+  Eigen::MatrixXd rows(std::count(free_.begin(), free_.end(), true), all.cols());
+  Eigen::Index row = 0;
+  for (Eigen::Index i = 0; i < all.rows(); ++i)
+    if (is_free(i)) rows.row(row++) = all.row(i);
+  return rows;
+}
+
+double ReducedEquations::visible_shared_variance(const Eigen::MatrixXd& root) const {
+  constexpr double kFewest = 5;  // views in a cell
+  // With J the derivatives of whitened residuals, points taken out, and C = root root', residuals
+  // keep I - J C J' of errors, so (I - J C J')^2 of their covariance.
+  const Eigen::MatrixXd by_free = free_rows(free_rows(of_tracks_).transpose());
+  const Eigen::MatrixXd of_root = root.transpose() * by_free * root;
+  const Eigen::MatrixXd cells = root.transpose() * free_rows(cells_);
+  double squares = 0;
+  double weight = 0;
+  double freedom = 0;  // of the means
+  double within = 0;   // what scatter within cells makes of `squares`, with all of `freedom_within`
+  double freedom_within = 0;
+  for (std::size_t i = 0; i < in_cells_.size(); ++i) {
+    const Cell& cell = in_cells_[i];
+    const double views = cell.weight2 > 0 ? cell.weight * cell.weight / cell.weight2 : 0;
+    if (views < kFewest) continue;
+    const auto columns = cells.middleCols<2>(2 * static_cast<Eigen::Index>(i));
+    const double taken =
+        2 * columns.squaredNorm() - (columns.transpose() * of_root * columns).trace();
+    const double of_mean = cell.error.squaredNorm();
+    squares += of_mean / cell.weight;
+    weight += 2 * cell.weight;
+    freedom += (cell.freedom - taken) / cell.weight;
+    within += (cell.squares - of_mean / views) / (1 - 1 / views) / cell.weight;
+    freedom_within += cell.freedom / cell.weight;
+  }
+  if (freedom <= 0) return 0;
+  return mean_extra_variance(squares, freedom, within / freedom_within, weight / freedom);
+}
+
+double ReducedEquations::shared_error(const Eigen::MatrixXd& root) const {
   // A camera and a projector before a plane, the weakest rig there, show .2 (docs/calibration.md).
   constexpr double kLeastShare = 0.05;
   constexpr double kLeastFreedom = 3;  // Student's t has a variance above 2 only
-  if (patch_views_.isZero()) return visible_px;
-  Eigen::MatrixXd free_rows(root.rows(), patches_.cols());
-  Eigen::Index row = 0;
-  for (Eigen::Index i = 0; i < patches_.rows(); ++i)
-    if (is_free(i)) free_rows.row(row++) = patches_.row(i);
-  const double fitted = (root.transpose() * free_rows).squaredNorm();
+  if (patch_views_.isZero()) return 0;
+  const double fitted = (root.transpose() * free_rows(patches_)).squaredNorm();
   const double all = patch_views_.sum();
   const double share =
       std::max((after_points_ - fitted) / (adjusted_.track_weight * all), kLeastShare);
   const double numbers = all * all / patch_views_.squaredNorm();
   const double freedom = std::max(share * numbers, kLeastFreedom);
-  return visible_px * std::sqrt(freedom / (share * (freedom - 2)));
+  return std::sqrt(visible_shared_variance(root) * freedom / (share * (freedom - 2)));
 }
 
 double ReducedEquations::fair_track_weight(double shared_px) const {
@@ -132,15 +169,20 @@ ReducedEquations::ViewRow ReducedEquations::row_of(const ViewLinearization& view
   row.device_part *= std::sqrt(weight);
   row.point_part = std::sqrt(weight) * view.point;
   row.by_px = std::sqrt(weight) / std::hypot(seen.sigma_px, is_hub ? 0 : adjusted_.extra_sigma_px);
-  row.patch = -1;
+  row.residual = std::sqrt(weight) * view.residual;
+  row.patch = row.cell = -1;
   if (is_hub) return row;
-  // Patches are square: rows beyond the last patch count with it.
-  const double patch_px = static_cast<double>(problem_.devices[seen.device].width) / kPatches;
-  const auto place = [&](double x) {
-    return std::clamp<Eigen::Index>(static_cast<Eigen::Index>(x / patch_px), 0, kPatches - 1);
+  // Squares: rows beyond the last one count with it.
+  const auto square = [&](Eigen::Index parts) {
+    const double px =
+        static_cast<double>(problem_.devices[seen.device].width) / static_cast<double>(parts);
+    const auto place = [&](double x) {
+      return std::clamp<Eigen::Index>(static_cast<Eigen::Index>(x / px), 0, parts - 1);
+    };
+    return 2 * (parts * parts * row.device + parts * place(seen.pixel.y()) + place(seen.pixel.x()));
   };
-  row.patch = 2 * (kPatches * kPatches * row.device + kPatches * place(seen.pixel.y()) +
-                   place(seen.pixel.x()));
+  row.patch = square(kPatches);
+  row.cell = square(kCells);
   return row;
 }
 
@@ -181,15 +223,24 @@ void ReducedEquations::add_track(std::size_t t) {
       H_.block<kBlock, kBlock>(kBlock * a.device, kBlock * b.device) -=
           WaV * (b.point_part.transpose() * b.device_part);
       if (b.patch < 0) continue;
-      auto by_patch = patches_.block<kBlock, 2>(kBlock * a.device, b.patch);
-      by_patch -= b.by_px * WaV * b.point_part.transpose();
-      if (&a != &b) continue;
-      by_patch += b.by_px * b.device_part.transpose();
-      const double square = b.by_px * b.by_px;
-      patch_views_.segment<2>(b.patch).array() += square / adjusted_.track_weight;
-      const Eigen::Matrix2d taken = b.point_part * V_inverse * b.point_part.transpose();
-      after_points_ += square * (2 - taken.trace());
+      Eigen::Matrix<double, kBlock, 2> by_shared = -b.by_px * WaV * b.point_part.transpose();
+      if (&a == &b) by_shared += b.by_px * b.device_part.transpose();
+      patches_.block<kBlock, 2>(kBlock * a.device, b.patch) += by_shared;
+      cells_.block<kBlock, 2>(kBlock * a.device, b.cell) += by_shared;
     }
+  }
+  for (const ViewRow& row : rows) {
+    if (row.patch < 0) continue;
+    const double left = 2 - (row.point_part * V_inverse * row.point_part.transpose()).trace();
+    const double square = row.by_px * row.by_px;
+    patch_views_.segment<2>(row.patch).array() += square / adjusted_.track_weight;
+    after_points_ += square * left;
+    Cell& cell = in_cells_[static_cast<std::size_t>(row.cell / 2)];
+    cell.error += row.by_px * row.residual;
+    cell.weight += square;
+    cell.weight2 += square * square;
+    cell.squares += square * row.residual.squaredNorm();
+    cell.freedom += square * left;
   }
 }
 

@@ -3,9 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <map>
 #include <numeric>
-#include <tuple>
 
 #include "pencilscan/bundle/board_corners.h"
 #include "pencilscan/bundle/bundle_device.h"
@@ -42,45 +40,6 @@ Eigen::MatrixXd gauge(const BundleProblem& problem, const Vec3& middle) {
   }
   if (boards_join_devices(problem.board_views)) G.conservativeResize(Eigen::NoChange, 6);
   return G;
-}
-
-/// Error that neighbours in an image share, px, as far as residuals show it: what the means of
-/// cells scatter beyond what as many independent errors would. Lenses unlike the model, texture and
-/// light from elsewhere make neighbours err alike. 0 where chance explains the means (to one
-/// standard error).
-double visible_shared_error(const BundleProblem& problem) {
-  constexpr int kCells = 8;  // along an image's width
-  constexpr double kFewest = 5;
-  struct Cell {
-    Vec2 sum = Vec2::Zero();
-    double squares = 0;
-    double count = 0;
-  };
-  std::map<std::tuple<std::size_t, int, int>, Cell> cells;
-  for_each_residual(problem, [&](std::size_t, const TrackView& view, const Vec2& error) {
-    const double size = static_cast<double>(problem.devices[view.device].width) / kCells;
-    Cell& cell = cells[{view.device, static_cast<int>(view.pixel.x() / size),
-                        static_cast<int>(view.pixel.y() / size)}];
-    cell.sum += error;
-    cell.squares += error.squaredNorm();
-    cell.count += 1;
-  });
-  double sum = 0;
-  double squares = 0;
-  double count = 0;
-  for (const auto& [key, cell] : cells) {
-    if (cell.count < kFewest) continue;
-    const double of_mean = cell.sum.squaredNorm() / (cell.count * cell.count);
-    const double by_chance = cell.squares / (cell.count * cell.count);
-    const double shared = (of_mean - by_chance) / 2;
-    sum += shared;
-    squares += shared * shared;
-    count += 1;
-  }
-  if (count < 2) return 0;
-  const double mean = sum / count;
-  const double error = std::sqrt(std::max(0.0, squares / count - mean * mean) / count);
-  return mean > error ? std::sqrt(mean) : 0;
 }
 
 /// R with R R' = a symmetric positive semi-definite matrix.
@@ -132,7 +91,7 @@ Covariance invert(const ReducedEquations& normal, const BundleProblem& problem, 
   const double least = 1e-14 * values.maxCoeff();
   for (double& v : values) v = 1 / std::max(v, least);
   const Eigen::MatrixXd root = P * eigen.vectors * values.cwiseSqrt().asDiagonal();
-  found.shared_px = normal.shared_error(visible_shared_error(problem), unit.asDiagonal() * root);
+  found.shared_px = normal.shared_error(unit.asDiagonal() * root);
   found.track_weight = normal.fair_track_weight(found.shared_px);
   const Eigen::MatrixXd of_all = normal.systematic(found.shared_px);
   Eigen::MatrixXd systematic(n, of_all.cols());

@@ -194,6 +194,8 @@ nlohmann::ordered_json calibration_json(const CalibrationReport& report) {
                      {"rms_px", result.board_rms_px}};
   json["extra_sigma_px"] = result.adjustment.extra_sigma_px;
   json["shared_error_px"] = report.uncertainty.shared_px;
+  // What a correspondence counted for, since neighbours share errors.
+  json["track_weight"] = result.adjustment.track_weight;
   json["volume"] = {{"radius", report.uncertainty.volume_radius},
                     {"point_sigma_median", report.uncertainty.volume_median},
                     {"point_sigma_p95", report.uncertainty.volume_p95}};
