@@ -77,7 +77,9 @@ Rig with_drawn_lenses(Rig rig, std::uint64_t seed) {
     device.K(1, 1) = device.K(0, 0) * (1 + random.normal(0, is_camera ? 0.002 : 0.02));
     device.distortion[1] += random.normal(0, 0.5);
     for (const std::size_t i : {2, 3}) device.distortion[i] = random.normal(0, 0.002);
-    device.distortion[4] = random.normal(0, unmodelled_k3(device));
+    BundleDevice drawn = bundle_device(device);
+    set_priors({}, {}, is_camera, drawn);
+    device.distortion[4] = random.normal(0, drawn.prior_sigma[kK3]);
   }
   return rig;
 }

@@ -20,15 +20,17 @@ struct GivenTolerance {
 /// tolerance given values are rough: a start that any data overrule. Values in, standard deviations
 /// out.
 void set_priors(const GivenCalibration& known, const std::optional<GivenTolerance>& tolerance,
-                bool is_camera, const Device& device, BundleDevice& bundle);
+                bool is_camera, BundleDevice& device);
 /// Holds what was given at its value.
-void hold_given(const GivenCalibration& known, BundleDevice& bundle);
+void hold_given(const GivenCalibration& known, BundleDevice& device);
 
-/// One standard deviation of k3, which nobody estimates: what the model's polynomial leaves out
-/// displaces the corner of the image that lies farthest from the principal point by half a
-/// thousandth of its distance (lenses: a few tenths of a pixel).
-[[nodiscard]] double unmodelled_k3(const Device& device);
+/// One standard deviation of k3. Lenses that compress angles have one: the equidistant projection
+/// f theta has -1/7 in the series of tan theta, the stereographic one, 2 f tan(theta / 2), -5/64.
+/// And what the model leaves out displaces the corner of the image that lies farthest from the
+/// principal point by half a thousandth of its distance (lenses: a few tenths of a pixel). k3
+/// displaces that corner by no more than k1 may, of which given distortion says more.
+[[nodiscard]] double usual_k3(const BundleDevice& device);
 /// Sets it for devices whose distortion is not held, from their focal lengths so far.
-void expect_unmodelled(const Rig& sizes, BundleProblem& problem);
+void expect_k3(BundleProblem& problem);
 
 }  // namespace pencilscan

@@ -81,14 +81,8 @@ Eigen::MatrixXd ReducedEquations::random() const {
 }
 
 Eigen::MatrixXd ReducedEquations::systematic(double shared_px) const {
-  Eigen::MatrixXd lenses = Eigen::MatrixXd::Zero(H_.rows(), count());
-  for (Eigen::Index d = 0; d < count(); ++d) {
-    const Eigen::Index k3 = kBlock * d + kPose + kK3;
-    if (!is_free(k3))
-      lenses.col(d) = problem_.devices[static_cast<std::size_t>(d)].prior_sigma[kK3] * H_.col(k3);
-  }
-  Eigen::MatrixXd all(H_.rows(), patches_.cols() + shapes_.cols() + lenses.cols());
-  all << shared_px * patches_, shapes_, lenses;
+  Eigen::MatrixXd all(H_.rows(), patches_.cols() + shapes_.cols());
+  all << shared_px * patches_, shapes_;
   return all;
 }
 

@@ -34,8 +34,8 @@ class ReducedEquations {
   /// Covariance of b in H x = b from errors of one view, corner or prior each; 15 D x 15 D.
   [[nodiscard]] Eigen::MatrixXd random() const;
   /// Per column one systematic error of one standard deviation, as it enters H x = b; 15 D x N.
-  /// Boards may be bent and stretched, lenses have terms that are not estimated; `shared_px` is the
-  /// error that all views in a ninth of an image share.
+  /// Boards may be bent and stretched; `shared_px` is the error that all views in a ninth of an
+  /// image share.
   [[nodiscard]] Eigen::MatrixXd systematic(double shared_px) const;
 
   /// One standard deviation of the errors that views in a ninth of an image share, from what

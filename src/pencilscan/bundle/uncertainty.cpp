@@ -72,6 +72,9 @@ Covariance invert(const ReducedEquations& normal, const BundleProblem& problem, 
     const Eigen::Index at = result.at[static_cast<std::size_t>(i)];
     const Eigen::Index kind = at % kBlock;
     unit[i] = kind < 3 ? 1 : kind < 6 ? distance : kind < kPose + kK1 ? 1000 : 1;
+    // k3 of a narrow lens is a large number that does little.
+    const double of_k3 = problem.devices[static_cast<std::size_t>(at / kBlock)].prior_sigma[kK3];
+    if (kind == kPose + kK3 && std::isfinite(of_k3)) unit[i] = of_k3;
     G.row(i) = full_gauge.row(at) / unit[i];
   }
   for (Eigen::Index i = 0; i < n; ++i) {

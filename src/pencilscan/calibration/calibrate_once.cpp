@@ -24,7 +24,7 @@ namespace {
 constexpr unsigned bit(Intrinsic i) { return 1U << static_cast<unsigned>(i); }
 constexpr unsigned kFocal = bit(kFx) | bit(kFy);
 constexpr unsigned kCenter = bit(kCx) | bit(kCy);
-constexpr unsigned kAll = kFocal | kCenter | bit(kK1) | bit(kK2) | bit(kP1) | bit(kP2);
+constexpr unsigned kAll = kFocal | kCenter | bit(kK1) | bit(kK2) | bit(kP1) | bit(kP2) | bit(kK3);
 
 class Calibration {
  public:
@@ -142,11 +142,10 @@ class Calibration {
     for (std::size_t d = 0; d < agrees.size(); ++d) {
       if (!input_.known[d].K) continue;
       const bool is_camera = d < input_.rig.cameras.size();
-      const Device& given = device_at(input_.rig, d);
       BundleDevice& device = result_.problem.devices[d];
       if (agrees[d] == 0) {
         result_.given[d] = GivenUse::kContradicted;
-        set_priors({}, {}, is_camera, given, device);
+        set_priors({}, {}, is_camera, device);
         continue;
       }
       device = within_tolerance(d);
@@ -159,11 +158,10 @@ class Calibration {
   /// A device as found, with the priors of its given values; what a tolerance of 0 holds is as it
   /// was given.
   [[nodiscard]] BundleDevice within_tolerance(std::size_t d) const {
-    const Device& given = device_at(input_.rig, d);
     BundleDevice device = result_.problem.devices[d];
     const BundleDevice found = device;
-    device.inner = bundle_device(given).inner;
-    set_priors(input_.known[d], options_.tolerance, d < input_.rig.cameras.size(), given, device);
+    device.inner = bundle_device(device_at(input_.rig, d)).inner;
+    set_priors(input_.known[d], options_.tolerance, d < input_.rig.cameras.size(), device);
     for (std::size_t i = 0; i < kIntrinsics; ++i)
       if (device.prior_sigma[i] > 0) device.inner[i] = found.inner[i];
     return device;
@@ -206,7 +204,7 @@ class Calibration {
     weigh_corners(problem);
     adjust(problem, bundle);
     result_.adjustment = bundle;
-    expect_unmodelled(input_.rig, problem);
+    expect_k3(problem);
   }
 
   /// What correspondences should count at the solution so far, whose weights may be others.

@@ -179,7 +179,7 @@ class GivenRing : public testing::Test {
     for (std::size_t d = 0; d < device_count(truth_); ++d) {
       BundleDevice device = bundle_device(device_at(truth_, d));
       device.present = true;
-      set_priors(input_.known[d], GivenTolerance{}, d < kCameras, device_at(truth_, d), device);
+      set_priors(input_.known[d], GivenTolerance{}, d < kCameras, device);
       found_.problem.devices.push_back(device);
       found_.given.push_back(d < kCameras ? GivenUse::kTolerance : GivenUse::kNone);
     }

@@ -24,8 +24,7 @@ std::vector<BundleDevice> devices_of(const StartUp& start, const FocalGuess& gue
   std::vector<BundleDevice> devices;
   for (std::size_t d = 0; d < device_count(rig); ++d) {
     devices.push_back(bundle_device(device_at(rig, d)));
-    set_priors(start.input.known[d], start.tolerance, d < rig.cameras.size(), device_at(rig, d),
-               devices.back());
+    set_priors(start.input.known[d], start.tolerance, d < rig.cameras.size(), devices.back());
     devices.back().present = posed;
   }
   return devices;

@@ -206,7 +206,7 @@ class Judge {
     const BundleDevice& device = result_.problem.devices[d];
     double worst = 0;
     const char* which = "";
-    for (const std::size_t i : {kFy, kP1, kP2, kCx, kK1, kK2}) {
+    for (const std::size_t i : {kFy, kP1, kP2, kCx, kK1, kK2, kK3}) {
       // How far a given K moved is told in its tolerances, but for the shape of its pixels.
       if (is_given(d) && (i == kCx || i == kCy)) continue;
       const double sigma = device.prior_sigma[i];
