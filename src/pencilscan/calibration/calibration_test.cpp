@@ -185,17 +185,18 @@ TEST(Verdict, FoldersSwappedInOneCaptureAreNamedWithIt) {
               HasSubstr("the folders proj1/cam1 and proj1/cam2 (--captures number 2) are swapped"));
 }
 
-/// Three captures; in the last one cam1 is turned by so many pixels about the axis of its frame.
-std::vector<Track> tracks_with_a_turn(const Rig& truth, const Vec3& axis, double px) {
+/// In the last capture cam1 is turned by so many pixels about the axis of its frame.
+std::vector<Track> tracks_with_a_turn(const Rig& truth, const Vec3& axis, double px,
+                                      std::size_t captures = 3) {
   Rig turned = truth;
   const double angle = px / truth.cameras[1].K(0, 0);
   RigidTransform& pose = turned.cameras[1].device_from_world;
   const Mat3 R = Eigen::AngleAxisd(angle, axis).toRotationMatrix();
   pose = {R * pose.rotation, R * pose.translation};
   std::vector<Track> all;
-  for (std::size_t capture = 0; capture < 3; ++capture) {
+  for (std::size_t capture = 0; capture < captures; ++capture) {
     const std::uint64_t seed = 10 + 2 * capture;
-    for (Track& track : tracks_of(capture == 2 ? turned : truth,
+    for (Track& track : tracks_of(capture + 1 == captures ? turned : truth,
                                   {.count = 300, .seed = seed, .noise_seed = seed + 1})) {
       track.capture = capture;
       all.push_back(std::move(track));
@@ -213,6 +214,16 @@ TEST(Verdict, ACameraThatMovedBetweenCapturesIsNamed) {
                                 "--captures number 3"),
                       Not(HasSubstr("camera cam0")), Not(HasSubstr("projector proj"))))
         << axis.transpose() << ", " << px << " px";
+}
+
+/// Which of two captures is the odd one nobody knows.
+TEST(Verdict, OfTwoCapturesNeitherIsAccused) {
+  const Rig truth = ring(3, 3);
+  const std::string all = findings_of(truth, tracks_with_a_turn(truth, Vec3::UnitY(), 10, 2));
+  EXPECT_THAT(all,
+              HasSubstr("camera cam1 has moved, or was zoomed, between captures: its picture"));
+  EXPECT_THAT(all, HasSubstr("two captures do not tell where it usually stands"));
+  EXPECT_THAT(all, Not(HasSubstr("off where the rig has it")));
 }
 
 TEST(Verdict, NothingMovedWhereNothingDid) {

@@ -121,29 +121,49 @@ Finding name_mover(const CalibrationInput& input, const Matches& matches, const 
           (when.empty() ? "" : ". Where nothing was touched, the object moved between pictures")};
 }
 
+/// Captures in which a device saw something, or showed something that others saw.
+std::set<std::size_t> captures_of(const std::vector<Track>& tracks, std::size_t device) {
+  std::set<std::size_t> captures;
+  for (const Track& track : tracks)
+    if (view_in(track, device) != nullptr) captures.insert(track.capture);
+  return captures;
+}
+
+/// Of two captures neither is the one that is off.
+std::string where_it_lies(const std::vector<CaptureMove>& when,
+                          const std::set<std::size_t>& captures) {
+  double most = 0;
+  std::vector<std::string> numbers;
+  for (const CaptureMove& move : when) {
+    most = std::max(most, move.shift_px);
+    numbers.push_back(std::to_string(move.capture + 1));
+  }
+  if (when.size() == 1 && captures.size() == 2) {
+    const std::size_t other =
+        *captures.begin() == when[0].capture ? *captures.rbegin() : *captures.begin();
+    return "its picture lies " + formatted(most) + " px elsewhere in --captures number " +
+           numbers[0] + " than in number " + std::to_string(other + 1) +
+           ". The rig has it as in number " + std::to_string(other + 1) +
+           "; two captures do not tell where it usually stands";
+  }
+  return "in --captures number " + name_list(numbers) + " its picture lies " +
+         (when.size() > 1 ? "up to " : "") + formatted(most) + " px off where the rig has it";
+}
+
 /// One finding per device that moved between captures.
 std::vector<Finding> name_moved(const CalibrationInput& input,
                                 const std::vector<CaptureMove>& moves) {
   std::map<std::size_t, std::vector<CaptureMove>> by_device;
   for (const CaptureMove& move : moves) by_device[move.device].push_back(move);
   std::vector<Finding> findings;
-  for (const auto& [device, when] : by_device) {
-    double most = 0;
-    std::vector<std::string> numbers;
-    for (const CaptureMove& move : when) {
-      most = std::max(most, move.shift_px);
-      numbers.push_back(std::to_string(move.capture + 1));
-    }
+  for (const auto& [device, when] : by_device)
     findings.push_back(
         {Grade::kDoubtful,
          std::string(device < input.rig.cameras.size() ? "camera " : "projector ") +
-             device_at(input.rig, device).name +
-             " has moved, or was zoomed, between captures: in --captures number " +
-             name_list(numbers) + " its picture lies " + (when.size() > 1 ? "up to " : "") +
-             formatted(most) + " px off where the rig has it",
+             device_at(input.rig, device).name + " has moved, or was zoomed, between captures: " +
+             where_it_lies(when, captures_of(input.tracks, device)),
          "fix the device, and take the captures again: the rig may not have it where it stands "
          "now. Where nothing was touched, the object moved between pictures"});
-  }
   return findings;
 }
 
