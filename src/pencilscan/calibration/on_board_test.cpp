@@ -78,6 +78,7 @@ class OnBoard : public testing::Test {
     for (std::size_t d = 0; d < input_.known.size(); ++d) {
       Device& device = device_at(input_.rig, d);
       device.K = Mat3::Identity();
+      device.distortion = {};
       device.device_from_world = {};
     }
     return calibrate(input_);
