@@ -231,6 +231,17 @@ TEST_F(GivenRing, TheToleranceOfGivenKIsNoWeaknessOfTheData) {
   EXPECT_THAT(findings(), HasSubstr("known weakly"));
 }
 
+/// Before a plane a rig with a wrong K fits as well as the right one.
+TEST_F(GivenRing, APlaneThatDeterminesNoRigContradictsNoK) {
+  overstate(1, 5);
+  focal_sigma_ = 0.1;
+  EXPECT_THAT(findings(), HasSubstr("the data contradict the given K of cam0"));
+  found_.pairs.resize(1);
+  found_.pairs[0].inliers = 100;
+  found_.pairs[0].planar_share = 0.9;
+  EXPECT_THAT(findings(), Not(HasSubstr("contradict the given K")));
+}
+
 /// Each alone would pass, and a ring with all focal lengths wrong alike fits its data.
 TEST_F(GivenRing, AllKAreNotOffByTwoTolerances) {
   overstate(kCameras, 2.4);

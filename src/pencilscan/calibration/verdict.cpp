@@ -154,7 +154,7 @@ class Judge {
   }
 
   void judge_devices() {
-    double worst = 0;
+    double& worst = worst_focal_sigma_;
     std::size_t worst_device = 0;
     std::vector<std::string> at_prior;
     for (std::size_t d = 0; d < result_.placed.size(); ++d) {
@@ -352,6 +352,14 @@ class Judge {
   }
 
   void judge_given() {
+    // Before a plane another rig fits as well as the right one, and has another K.
+    if (worst_focal_sigma_ > options_.usable_focal_sigma &&
+        planar_share_ >= options_.mostly_planar_share) {
+      if (std::count(result_.given.begin(), result_.given.end(), GivenUse::kNone) <
+          static_cast<std::ptrdiff_t>(result_.given.size()))
+        add(Grade::kGood, "given K are not judged: " + plane_text());
+      return;
+    }
     const std::string unit = tolerances();
     const std::string advice =
         "check that K is of this lens, focus and image size, or say how rough it is "
@@ -398,7 +406,8 @@ class Judge {
   const CalibrationResult& result_;
   const Uncertainty& uncertainty_;
   const VerdictOptions& options_;
-  double planar_share_ = 0;  ///< of the correspondences of all pairs
+  double planar_share_ = 0;       ///< of the correspondences of all pairs
+  double worst_focal_sigma_ = 0;  ///< over the focal length
   std::vector<Finding> findings_;
 };
 
