@@ -173,5 +173,19 @@ TEST(FrameWarnings, DoubtfulNamesAreNoRigThatIsOff) {
   EXPECT_STREQ(to_string(naming_warning("projector proj0").code), "names-doubtful");
 }
 
+// Light that spreads below a surface moves the lines of all devices.
+TEST(FrameWarnings, WhatAllDevicesMissIsNoFaultOfOne) {
+  const Scene scene(fine_rig(1));
+  const std::size_t cameras = scene.rig.cameras.size();
+  ASSERT_GE(cameras, 2U);
+  std::vector<CrossingDisagreement> of_devices(cameras + scene.rig.projectors.size(),
+                                               {1000, 0.2, 0.2, {}});
+  of_devices[0].median_px = 0.52;
+  EXPECT_TRUE(device_warning(scene.rig, of_devices)) << "2.6 times noise, the others one";
+  for (std::size_t c = 1; c < cameras; ++c) of_devices[c].median_px = 0.44;
+  EXPECT_FALSE(device_warning(scene.rig, of_devices)) << "all miss by twice the noise";
+  EXPECT_TRUE(device_that_is_off(of_devices)) << "such a rig still does not fit";
+}
+
 }  // namespace
 }  // namespace pencilscan
