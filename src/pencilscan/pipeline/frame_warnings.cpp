@@ -164,18 +164,21 @@ double over_noise(double miss_px, const CrossingDisagreement& d) {
   return miss_px / std::max(0.05, d.expected_px);
 }
 
-/// What a device's crossings miss beyond those of another one of its kind, px: what the object
-/// does to all of them, light that spreads below its surface, adds to that in squares.
+double squared(double x) { return x * x; }
+
+/// What a device's crossings miss without what those of all of its kind miss beyond noise, px. That
+/// the object does, whose light spreads below its surface, and it adds in squares.
 double own_miss(std::size_t device, std::span<const CrossingDisagreement> of_kind) {
-  double common = of_kind[device].median_px;
+  double common2 = squared(of_kind[device].median_px);
   bool is_alone = true;
   for (std::size_t k = 0; k < of_kind.size(); ++k) {
     if (k == device || of_kind[k].crossings < kEnoughCrossings) continue;
-    common = std::min(common, of_kind[k].median_px);
+    const double beyond = squared(of_kind[k].median_px) - squared(of_kind[k].expected_px);
+    common2 = std::min(common2, std::max(0.0, beyond));
     is_alone = false;
   }
   const double all = of_kind[device].median_px;
-  return is_alone ? all : std::sqrt(all * all - common * common);
+  return is_alone ? all : std::sqrt(squared(all) - common2);
 }
 
 }  // namespace
