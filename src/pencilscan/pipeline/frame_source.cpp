@@ -144,8 +144,7 @@ FrameSource FrameSource::open(const Rig& rig, const fs::path& path) {
   }
   if (recorded->sets.sets.empty())
     throw InputError(path.string(), "frames", "none", "must hold at least one frame");
-  for (std::size_t k = 0; k < recorded->sets.sets.size(); ++k)
-    source.names_.push_back(six_digits(k));
+  for (const FrameSet& set : recorded->sets.sets) source.names_.push_back(six_digits(set.number));
   source.storage_ = std::move(recorded);
   return source;
 }

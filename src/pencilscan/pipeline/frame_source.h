@@ -27,7 +27,7 @@ class FrameSource {
   [[nodiscard]] const std::vector<std::string>& names() const { return names_; }
   /// Cameras, by name, that have pictures here and are not of the rig; sorted.
   [[nodiscard]] const std::vector<std::string>& strangers() const { return strangers_; }
-  /// Pictures of a recording that are in no frame: a sentence a camera.
+  /// Rows of a recording without a picture, and pictures that are in no frame: a sentence each.
   [[nodiscard]] const std::vector<std::string>& left_out() const { return left_out_; }
   /// False of a recording that was cut off, or goes on: frames may lack at its end.
   [[nodiscard]] bool is_closed() const { return closed_; }

@@ -291,6 +291,18 @@ TEST_F(Sequence, ARecordingGivesTheFramesOfItsFolders) {
               HasSubstr("must hold a camera of the rig"));
 }
 
+TEST_F(Sequence, ARecordingOfFramesWithGapsHasTheirNumbersAndNoOthers) {
+  for (std::size_t k = 1; k + 1 < kFrames; ++k)
+    if (k != 4) fs::remove_all(frames() / six_digits(k));
+  const fs::path packed = temporary_.path() / "gaps.zarr";
+  pack_recording(frames(), packed);
+  const FrameSource recorded = FrameSource::open(rig_, packed);
+  EXPECT_THAT(recorded.names(), ElementsAre("000000", "000004", "000109"));
+  EXPECT_EQ(recorded.names(), FrameSource::open(rig_, frames()).names());
+  EXPECT_EQ(recorded.read(rig_, 1).images[0].at<cv::Vec3b>(0, 0)[0], 4);
+  EXPECT_THAT(recorded.left_out(), ElementsAre(HasSubstr("no frames: 107 (000001, 000002")));
+}
+
 TEST_F(Sequence, WarnsOfPicturesOfNoCamera) {
   EXPECT_FALSE(strangers_warning(FrameSource::open(rig_, frames())));
   EXPECT_FALSE(strangers_warning(FrameSource::open(rig_, recording())));

@@ -199,12 +199,13 @@ std::size_t row_count(std::span<const ShotTimes> cameras) {
   return rows;
 }
 
-/// Set k is row k. Pictures without a time are taken in as well.
+/// Set number k is row k. Pictures without a time are taken in as well.
 void take_rows(std::span<const ShotTimes> cameras, FrameSets& result) {
   result.by_row = true;
   result.sets.resize(row_count(cameras));
   for (std::size_t k = 0; k < result.sets.size(); ++k) {
     FrameSet& set = result.sets[k];
+    set.number = k;
     set.rows.resize(cameras.size());
     set.offset_ns.resize(cameras.size(), 0);
     for (std::size_t c = 0; c < cameras.size(); ++c) {
@@ -222,6 +223,16 @@ void note_offsets(const std::vector<TimedShot>& shots, FrameSet& set) {
   for (const TimedShot& shot : shots) set.offset_ns[shot.camera] = shot.time_ns - middle;
 }
 
+/// Sets without any picture are no frames.
+void leave_out_empty(FrameSets& result) {
+  std::erase_if(result.sets, [&](const FrameSet& set) {
+    const bool is_empty = std::none_of(set.rows.begin(), set.rows.end(),
+                                       [](const auto& row) { return row.has_value(); });
+    if (is_empty) result.no_frame.push_back(set.number);
+    return is_empty;
+  });
+}
+
 void name_dropped_and_late(std::span<const ShotTimes> cameras, FrameSets& result) {
   for (std::size_t c = 0; c < cameras.size(); ++c) {
     CameraClock& clock = result.clocks[c];
@@ -229,12 +240,11 @@ void name_dropped_and_late(std::span<const ShotTimes> cameras, FrameSets& result
       clock.limit_ns =
           cameras[c].exposure_us > 0 ? 500 * cameras[c].exposure_us : result.period_ns / 4;
     }
-    for (std::size_t k = 0; k < result.sets.size(); ++k) {
-      const FrameSet& set = result.sets[k];
+    for (const FrameSet& set : result.sets) {
       if (!set.rows[c])
-        clock.dropped.push_back(k);
+        clock.dropped.push_back(set.number);
       else if (clock.timed && clock.limit_ns > 0 && std::abs(set.offset_ns[c]) > clock.limit_ns)
-        clock.late.push_back(k);
+        clock.late.push_back(set.number);
     }
   }
 }
@@ -305,6 +315,7 @@ void take_moments(std::span<const ShotTimes> cameras,
   for (const std::vector<TimedShot>& shots : sets) {
     for (const TimedShot& shot : shots) set_of[shot.camera][shot.row] = result.sets.size();
     FrameSet& set = result.sets.emplace_back();
+    set.number = result.sets.size() - 1;
     set.rows.resize(cameras.size());
     set.offset_ns.resize(cameras.size(), 0);
     for (const TimedShot& shot : shots) {
@@ -332,6 +343,7 @@ FrameSets group_frames(std::span<const ShotTimes> cameras) {
     take_moments(cameras, sets, result);
   }
   name_gaps(sets, result);
+  leave_out_empty(result);
   name_dropped_and_late(cameras, result);
   return result;
 }

@@ -12,6 +12,7 @@ namespace pencilscan {
 
 /// The pictures of one moment.
 struct FrameSet {
+  std::size_t number = 0;  ///< its row, or which moment it is, from 0; it names the frame
   std::vector<std::optional<std::size_t>> rows;  ///< one per camera; nothing: it has no picture
   /// When each exposure began, ns after the median of the set by the common clock; 0 where it is
   /// unknown or there is no picture.
@@ -27,19 +28,20 @@ struct CameraClock {
   double drift_ppm = 0;              ///< how much faster its clock runs
   double period_ns = 0;              ///< median time from picture to picture; 0: unknown
   double limit_ns = 0;               ///< a picture is late from here on; 0: unknown
-  std::vector<std::size_t> dropped;  ///< sets without its picture
-  std::vector<std::size_t> late;     ///< sets where its picture is of another moment
+  std::vector<std::size_t> dropped;  ///< numbers of sets without its picture
+  std::vector<std::size_t> late;     ///< numbers of sets where its picture is of another moment
   /// Rows whose picture is in no set: it has no time stamp, and the rows do not tell its moment.
   std::vector<std::size_t> left_out;
 };
 
 /// Which pictures show one moment.
 struct FrameSets {
-  std::vector<FrameSet> sets;
-  std::vector<CameraClock> clocks;  ///< one per camera
-  bool by_row = true;               ///< set k is row k of every camera
-  double period_ns = 0;             ///< median from set to set; 0: unknown
-  /// Sets before which moments are missing in all cameras, and how many.
+  std::vector<FrameSet> sets;         ///< each has a picture
+  std::vector<std::size_t> no_frame;  ///< numbers of rows, or moments, without any valid picture
+  std::vector<CameraClock> clocks;    ///< one per camera
+  bool by_row = true;                 ///< set number k is row k of every camera
+  double period_ns = 0;               ///< median from set to set; 0: unknown
+  /// Numbers before which moments are missing in all cameras, and how many.
   std::vector<std::pair<std::size_t, std::size_t>> gaps;
 };
 
@@ -75,7 +77,8 @@ struct ShotTimes {
 /// A picture is late when it began more than half an exposure before or after its set, so that it
 /// shows mostly another moment; where the exposure is unknown, more than a quarter of a period.
 ///
-/// Where nothing is timed, or the rows already are the moments, set k is row k.
+/// Where nothing is timed, or the rows already are the moments, set number k is row k. A row or a
+/// moment without a valid picture of any camera is no set; the others keep their numbers.
 [[nodiscard]] FrameSets group_frames(std::span<const ShotTimes> cameras);
 [[nodiscard]] FrameSets group_frames(const Recording& recording);
 

@@ -283,5 +283,37 @@ TEST(FrameSets, WithoutTimesRowsAreMoments) {
   EXPECT_FALSE(sets.clocks[0].timed);
 }
 
+TEST(FrameSets, WhatHasNoPictureIsNoFrameAndTheOthersKeepTheirNumbers) {
+  std::vector<ShotTimes> cameras(2);
+  cameras[0].times_ns = {kUnknownTime, kUnknownTime, kUnknownTime, kUnknownTime};
+  cameras[1].times_ns = cameras[0].times_ns;
+  cameras[0].valid = {1, 0, 1, 0};
+  cameras[1].valid = {1, 0, 0, 1};
+  FrameSets sets = group_frames(cameras);
+  const auto numbers = [&] {
+    std::vector<std::size_t> result;
+    for (const FrameSet& set : sets.sets) result.push_back(set.number);
+    return result;
+  };
+  EXPECT_THAT(numbers(), ElementsAre(0, 2, 3));
+  EXPECT_THAT(sets.no_frame, ElementsAre(1));
+  EXPECT_EQ(sets.sets[1].rows[0], 2U);
+  EXPECT_THAT(sets.clocks[0].dropped, ElementsAre(3));
+  EXPECT_THAT(sets.clocks[1].dropped, ElementsAre(2));
+
+  // Of moments, too: times without a picture, of cameras whose rows are not the moments.
+  Trigger trigger;
+  trigger.moments = 20;
+  trigger.cameras[0].dropped = {3};
+  std::vector<ShotTimes> shots = trigger.shots();
+  for (std::size_t c = 0; c < shots.size(); ++c) shots[c].valid[c == 0 ? 9 : 10] = 0;
+  sets = group_frames(shots);
+  EXPECT_FALSE(sets.by_row);
+  EXPECT_THAT(sets.no_frame, ElementsAre(10));
+  ASSERT_EQ(sets.sets.size(), 19U);
+  EXPECT_EQ(sets.sets[10].number, 11U);
+  EXPECT_EQ(sets.sets[10].rows[1], 11U);
+}
+
 }  // namespace
 }  // namespace pencilscan

@@ -32,7 +32,8 @@ constexpr const char* kTimesFile = "timestamps.csv";
 using CameraFiles = std::map<std::size_t, fs::path>;
 
 struct FoundFrames {
-  std::vector<std::string> names;              ///< by row; empty: no folder
+  std::vector<std::string> names;              ///< by row; empty: no folder, or one of no picture
+  std::vector<std::string> without_picture;    ///< names of folders
   std::map<std::string, CameraFiles> cameras;  ///< by name
 };
 
@@ -68,13 +69,20 @@ FoundFrames find_pictures(const fs::path& folder) {
   FoundFrames found;
   for (std::size_t i = 0; i < names.size(); ++i) {
     const std::size_t row = numbered ? std::stoul(names[i]) : i;
-    found.names.resize(row + 1);
-    found.names[row] = names[i];
+    bool any = false;
     for (const auto& entry : fs::directory_iterator(folder / names[i])) {
       const std::string camera = entry.path().stem().string();
       const auto file = find_image(folder / names[i], camera);
-      if (file && *file == entry.path()) found.cameras[camera][row] = *file;
+      if (!file || *file != entry.path()) continue;
+      found.cameras[camera][row] = *file;
+      any = true;
     }
+    if (!any) {
+      found.without_picture.push_back(names[i]);
+      continue;
+    }
+    found.names.resize(row + 1);
+    found.names[row] = names[i];
   }
   if (found.cameras.empty()) {
     throw InputError(folder.string(), "images", "none",
@@ -242,7 +250,7 @@ void refuse_what_would_stay(const Recording& recording, const FrameSets& sets,
   };
   if (!has_times(recording, sets) && fs::exists(out / kTimesFile)) refuse(out / kTimesFile);
   std::map<std::string, std::size_t> frames;
-  for (std::size_t k = 0; k < sets.sets.size(); ++k) frames[six_digits(k)] = k;
+  for (std::size_t k = 0; k < sets.sets.size(); ++k) frames[six_digits(sets.sets[k].number)] = k;
   for (const auto& entry : fs::directory_iterator(out)) {
     const std::string name = entry.path().filename().string();
     if (!entry.is_directory() || name.starts_with('.')) continue;
@@ -263,6 +271,13 @@ void refuse_what_would_stay(const Recording& recording, const FrameSets& sets,
 
 std::vector<std::string> left_out_warnings(const Recording& recording, const FrameSets& sets) {
   std::vector<std::string> warnings;
+  if (!sets.no_frame.empty()) {
+    std::vector<std::string> names;
+    for (const std::size_t number : sets.no_frame) names.push_back(six_digits(number));
+    warnings.push_back(
+        std::string(sets.by_row ? "rows" : "moments") +
+        " of the recording that have no picture, and are no frames: " + counted(names));
+  }
   for (std::size_t c = 0; c < sets.clocks.size(); ++c) {
     std::vector<std::string> rows;
     for (const std::size_t row : sets.clocks[c].left_out) rows.push_back(six_digits(row));
@@ -307,7 +322,9 @@ PackReport pack_recording(const fs::path& frames, const fs::path& out, const Pac
   fs::path times_file = options.times;
   if (times_file.empty() && fs::exists(frames / kTimesFile)) times_file = frames / kTimesFile;
   PackReport report;
-  report.frames = found.names.size();
+  report.frames = static_cast<std::size_t>(
+      std::count_if(found.names.begin(), found.names.end(),
+                    [](const std::string& name) { return !name.empty(); }));
   std::vector<RecordedCamera> cameras;
   std::vector<const CameraFiles*> files;
   for (const auto& [name, pictures] : found.cameras) {
@@ -322,6 +339,10 @@ PackReport pack_recording(const fs::path& frames, const fs::path& out, const Pac
     times = read_times(times_file, report.cameras);
     report.warnings = unmatched(times_file, times, found);
   }
+  if (!found.without_picture.empty())
+    report.warnings.push_back(
+        "frame folders without a picture, which the recording does not hold: " +
+        counted(found.without_picture));
   // A film is a Zarr group, too.
   const bool replaces =
       options.overwrite && Recording::is_one(out) && read_zarr_group(out).contains("cameras");
@@ -357,12 +378,13 @@ PackReport unpack_recording(const Recording& recording, const FrameSets& sets, c
   std::size_t done = 0;  // guarded by `telling`
   const std::size_t cameras = recording.cameras().size();
   parallel_for(sets.sets.size(), [&](std::size_t k) {
-    fs::create_directories(out / six_digits(k));
+    const std::string name = six_digits(sets.sets[k].number);
+    fs::create_directories(out / name);
     for (std::size_t c = 0; c < cameras; ++c) {
       const auto row = sets.sets[k].rows[c];
       const cv::Mat image = row ? recording.read(*row, c) : cv::Mat();
       if (image.empty()) continue;
-      write_image(out / six_digits(k) / (recording.cameras()[c].name + ".png"), image,
+      write_image(out / name / (recording.cameras()[c].name + ".png"), image,
                   recording.cameras()[c].bit_depth);
       ++pictures;
     }
@@ -376,10 +398,10 @@ PackReport unpack_recording(const Recording& recording, const FrameSets& sets, c
   if (!has_times(recording, sets)) return report;
   std::string table = "frame";
   for (const RecordedCamera& camera : recording.cameras()) table += "," + camera.name;
-  for (std::size_t k = 0; k < sets.sets.size(); ++k) {
-    table += "\n" + six_digits(k);
+  for (const FrameSet& set : sets.sets) {
+    table += "\n" + six_digits(set.number);
     for (std::size_t c = 0; c < cameras; ++c) {
-      const auto row = sets.sets[k].rows[c];
+      const auto row = set.rows[c];
       const std::int64_t time = row ? recording.timestamp_ns(*row, c) : kUnknownTime;
       table += "," + (time == kUnknownTime ? std::string() : std::to_string(time));
     }

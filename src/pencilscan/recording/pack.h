@@ -27,8 +27,9 @@ struct PackOptions {
 };
 
 /// Makes a recording of image folders (`frames/<frame>/<camera>.png` and so on), pixels as stored.
-/// Folders of six digits keep their number as their row, so that a gap stays a gap. InputError for
-/// pictures that are damaged or of another size or type than the camera's others, and for time
+/// Folders of six digits keep their number as their row, so that a gap stays a gap: rows without
+/// pictures, which are no frames. Folders without a picture are left out with a warning. InputError
+/// for pictures that are damaged or of another size or type than the camera's others, and for time
 /// stamps of other cameras, of a frame that stands twice, or of none of the frames. Warns of
 /// pictures and time stamps that found no partner. The recording is made in `<out>.partial` and
 /// appears whole; an earlier one stays until then.
@@ -40,7 +41,8 @@ PackReport pack_recording(const std::filesystem::path& frames, const std::filesy
 PackReport unpack_recording(const Recording& recording, const FrameSets& sets,
                             const std::filesystem::path& out, const Progress& progress = {});
 
-/// Says which pictures are in no frame, a sentence a camera (CameraClock::left_out).
+/// Says which rows or moments are no frames (FrameSets::no_frame), and which pictures are in no
+/// frame, a sentence a camera (CameraClock::left_out).
 [[nodiscard]] std::vector<std::string> left_out_warnings(const Recording& recording,
                                                          const FrameSets& sets);
 

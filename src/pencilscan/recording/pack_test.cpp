@@ -47,22 +47,38 @@ TEST_F(Pack, FoldersComeBackAsTheyWere) {
   std::ofstream(frames() / "timestamps.csv")
       << "frame,left,right\n000000,100,110\n000002,80000100,\n000003,120000100,120000110\n";
   const PackReport report = pack_recording(frames(), packed());
-  EXPECT_EQ(report.frames, 4U);
+  EXPECT_EQ(report.frames, 3U);
   EXPECT_EQ(report.pictures, 5U);
-  EXPECT_EQ(report.missing, 3U);
+  EXPECT_EQ(report.missing, 1U);
   const Recording recording = Recording::open(packed());
   EXPECT_EQ(recording.timestamp_ns(3, 1), 120000110);
   EXPECT_EQ(recording.timestamp_ns(2, 1), kUnknownTime);
   const FrameSets sets = group_frames(recording);
   EXPECT_TRUE(sets.by_row);
   const fs::path again = temporary_.path() / "again";
-  EXPECT_EQ(unpack_recording(recording, sets, again).pictures, 5U);
+  const PackReport unpacked = unpack_recording(recording, sets, again);
+  EXPECT_EQ(unpacked.frames, 3U);
+  EXPECT_EQ(unpacked.pictures, 5U);
+  EXPECT_EQ(unpacked.missing, 1U);
+  EXPECT_THAT(unpacked.warnings, ElementsAre("rows of the recording that have no picture, and are "
+                                             "no frames: 1 (000001)"));
   for (const char* file : {"000000/left.png", "000000/right.png", "000002/left.png",
                            "000003/left.png", "000003/right.png"})
     EXPECT_TRUE(equal_pixels(read_stored_image(frames() / file), read_stored_image(again / file)))
         << file;
   EXPECT_FALSE(fs::exists(again / "000002" / "right.png"));
+  EXPECT_FALSE(fs::exists(again / "000001"));
   EXPECT_TRUE(fs::exists(again / "timestamps.csv"));
+}
+
+TEST_F(Pack, AFolderWithoutAPictureIsTold) {
+  put("000000/cam0.png", CV_8UC1, 3);
+  put("000002/cam0.png", CV_8UC1, 5);
+  fs::create_directories(frames() / "000001");
+  const PackReport report = pack_recording(frames(), packed());
+  EXPECT_EQ(report.frames, 2U);
+  EXPECT_THAT(report.warnings, ElementsAre("frame folders without a picture, which the recording "
+                                           "does not hold: 1 (000001)"));
 }
 
 TEST_F(Pack, PicturesOfAnotherKindAreRefusedByName) {
