@@ -38,20 +38,14 @@ std::string camera_names(const Rig& rig) {
 std::vector<FrameFiles> find_frames(const Rig& rig, const std::filesystem::path& folder) {
   std::vector<FrameFiles> frames;
   for (std::string& name : frame_folder_names(folder)) frames.push_back({std::move(name), {}, {}});
+  bool any = false;
   for (FrameFiles& frame : frames) {
     if (!is_utf8(frame.name))
       throw InputError(folder.string(), "frame folder", frame.name, "must have a name in UTF-8");
     const FolderImages images(folder / frame.name);
-    bool any = false;
     for (const Camera& camera : rig.cameras) {
       frame.images.push_back(images.find(camera.name));
       any = any || frame.images.back().has_value();
-    }
-    if (!any) {
-      throw InputError((folder / frame.name).string(), "images", "none",
-                       "must hold an image of a camera of the rig (" + camera_names(rig) +
-                           "), named like it, as " + rig.cameras.front().name + ".png; " +
-                           holdings(folder / frame.name));
     }
     for (std::string& stem : images.stems()) {
       const bool is_known = std::any_of(rig.cameras.begin(), rig.cameras.end(),
@@ -60,6 +54,13 @@ std::vector<FrameFiles> find_frames(const Rig& rig, const std::filesystem::path&
     }
     for (std::size_t c = 0; c < rig.cameras.size(); ++c)
       if (!frame.images[c]) refuse_other_case(folder / frame.name, rig.cameras[c].name);
+  }
+  if (!any) {
+    const std::filesystem::path first = folder / frames.front().name;
+    throw InputError(first.string(), "images", "none",
+                     "must hold an image of a camera of the rig (" + camera_names(rig) +
+                         "), named like it, as " + rig.cameras.front().name + ".png; " +
+                         holdings(first));
   }
   return frames;
 }

@@ -17,9 +17,9 @@ struct FrameFiles {
   std::vector<std::string> strangers = {};  ///< pictures that are named like no camera of the rig
 };
 
-/// Frame folders below `folder`, in the order of frame_folder_names(). InputError when the folder
-/// is not there, holds no frame folder, or a frame folder has no image of any camera of the rig or
-/// a name that is not UTF-8, which no report could hold.
+/// Frame folders below `folder`, in the order of frame_folder_names(); some may have no image of
+/// any camera of the rig. InputError when the folder is not there, holds no frame folder, when no
+/// frame folder has such an image, or one has a name that is not UTF-8, which no report could hold.
 [[nodiscard]] std::vector<FrameFiles> find_frames(const Rig& rig,
                                                   const std::filesystem::path& folder);
 

@@ -303,6 +303,21 @@ TEST_F(Sequence, ARecordingOfFramesWithGapsHasTheirNumbersAndNoOthers) {
   EXPECT_THAT(recorded.left_out(), ElementsAre(HasSubstr("no frames: 107 (000001, 000002")));
 }
 
+TEST_F(Sequence, AFrameFolderWithoutAPictureIsAFailedFrame) {
+  for (std::size_t k = 3; k < kFrames; ++k) fs::remove_all(frames() / six_digits(k));
+  fs::remove(frames() / "000001" / "cam0.png");
+  for (const std::optional<Shard> shard : {std::optional<Shard>(), std::optional(Shard{0, 1})}) {
+    const auto outcome = run(frames(), temporary_.path() / (shard ? "shard" : "whole"), shard);
+    ASSERT_EQ(outcome.frames.size(), 3U);
+    EXPECT_THAT(outcome.frames[0].failure, HasSubstr("no curve"));
+    EXPECT_THAT(outcome.frames[1].failure, HasSubstr("no camera of the rig has a picture"));
+    EXPECT_THAT(outcome.frames[2].failure, HasSubstr("no curve"));
+  }
+  for (const char* name : {"000000", "000002"}) fs::remove_all(frames() / name);
+  EXPECT_THAT(error_of([&] { (void)FrameSource::open(rig_, frames()); }),
+              HasSubstr("000001: images = none: must hold an image of a camera of the rig"));
+}
+
 TEST_F(Sequence, WarnsOfPicturesOfNoCamera) {
   EXPECT_FALSE(strangers_warning(FrameSource::open(rig_, frames())));
   EXPECT_FALSE(strangers_warning(FrameSource::open(rig_, recording())));
