@@ -12,6 +12,7 @@
 #include "pencilscan/detection/ghosts.h"
 #include "pencilscan/detection/mosaic_trace.h"
 #include "pencilscan/io/image.h"
+#include "pencilscan/io/temporary_folder.h"
 #include "pencilscan/view/sample_color.h"
 
 namespace pencilscan {
@@ -211,6 +212,24 @@ TEST(LooksInterpolated, TellsFilledInColoursFromThreeChannels) {
   EXPECT_TRUE(looks_interpolated(demosaiced(sampled(rgb, mosaic), mosaic)));
 }
 
+TEST(LooksInterpolated, LinesAnEvenNumberOfPixelsApartAreNoMosaic) {
+  Random random(3);
+  for (const cv::Point step : {cv::Point(1, 0), cv::Point(0, 1), cv::Point(1, 1)}) {
+    cv::Mat rgb(240, 320, CV_32FC3);
+    for (int y = 0; y < rgb.rows; ++y) {
+      for (int x = 0; x < rgb.cols; ++x) {
+        const int from_line = std::abs((step.x * x + step.y * y) % 8 - 3);
+        const float light = from_line == 0 ? 0.5F : from_line == 1 ? 0.1F : 0.02F;
+        for (int k = 0; k < 3; ++k)
+          rgb.at<cv::Vec3f>(y, x)[k] = light + static_cast<float>(random.normal(0, 0.01));
+      }
+    }
+    EXPECT_FALSE(looks_interpolated(rgb)) << step;
+    const Mosaic mosaic = *Mosaic::from_name("RGGB");
+    EXPECT_TRUE(looks_interpolated(demosaiced(sampled(rgb, mosaic), mosaic))) << step;
+  }
+}
+
 /// Lines of two colours in the noise of three full channels.
 cv::Mat noisy_lines() {
   return cv::max(draw({{.x = 60, .y = 0, .angle = 1.2, .width = 5, .color = {0.1F, 0.8F, 1}},
@@ -250,6 +269,22 @@ cv::Mat gradient_corrected(const cv::Mat& raw, const Mosaic& mosaic) {
     }
   }
   return rgb;
+}
+
+TEST(LooksInterpolated, TellsColoursThatWereFilledInBeforeJpeg) {
+  const Mosaic mosaic = *Mosaic::from_name("RGGB");
+  const TemporaryFolder temporary("looks_interpolated_jpeg");
+  const auto as_jpeg = [&](const cv::Mat& light) {
+    cv::Mat values;
+    cv::pow(cv::max(light, 0.0), 1 / 2.2, values);
+    values.convertTo(values, CV_8U, 255);
+    write_jpeg(temporary.path() / "picture.jpg", values, 92);
+    return read_image(temporary.path() / "picture.jpg");
+  };
+  const cv::Mat lines = noisy_lines();
+  EXPECT_FALSE(looks_interpolated(as_jpeg(lines)));
+  EXPECT_TRUE(looks_interpolated(as_jpeg(gradient_corrected(sampled(lines, mosaic), mosaic))));
+  EXPECT_TRUE(looks_interpolated(as_jpeg(demosaiced(sampled(lines, mosaic), mosaic))));
 }
 
 /// As a camera with a black level and a gamma stores light.

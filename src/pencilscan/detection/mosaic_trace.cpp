@@ -37,8 +37,8 @@ struct PhaseSum {
 /// |value - mean of its four neighbours|.
 std::array<PhaseSum, 4> phase_sums(const cv::Mat& rgb, int channel) {
   std::array<PhaseSum, 4> phases;
-  // Of each four rows two, which hold all four places.
-  for (int y = 1; y + 1 < rgb.rows; y += y % 4 == 1 ? 1 : 3) {
+  // In all rows: of some, lines of other spacings look like these places.
+  for (int y = 1; y + 1 < rgb.rows; ++y) {
     const auto* above = rgb.ptr<cv::Vec3f>(y - 1);
     const auto* here = rgb.ptr<cv::Vec3f>(y);
     const auto* below = rgb.ptr<cv::Vec3f>(y + 1);
@@ -50,6 +50,19 @@ std::array<PhaseSum, 4> phase_sums(const cv::Mat& rgb, int channel) {
     }
   }
   return phases;
+}
+
+/// How many standard deviations the two rows of a mosaic's places, its two columns, and its two
+/// diagonals are apart.
+std::array<double, 3> contrast_deviations(const std::array<PhaseSum, 4>& phases) {
+  double variance = 0;
+  for (const PhaseSum& phase : phases) variance += phase.error() * phase.error();
+  if (!(variance > 0)) return {};
+  const auto apart = [&](std::size_t a, std::size_t b, std::size_t c, std::size_t d) {
+    const double sum = phases[a].mean() + phases[b].mean() - phases[c].mean() - phases[d].mean();
+    return std::abs(sum) / std::sqrt(variance);
+  };
+  return {apart(0, 1, 2, 3), apart(0, 2, 1, 3), apart(0, 3, 1, 2)};
 }
 
 enum class Interpolation { kNearest, kGradientCorrected };
@@ -170,16 +183,19 @@ class Candidate {
 
 bool looks_interpolated(const cv::Mat& rgb) {
   PENCILSCAN_CHECK(rgb.type() == CV_32FC3);
-  constexpr double kDeviations = 8;  // of the difference; neighbouring values are not independent
+  // Of 703 pictures of three channels, a half of them through JPEG, none has a second contrast of
+  // more than 2. Of those filled in behind a mosaic and stored with a gamma of 2.2, as JPEG of
+  // quality 80 and 92 too, all have one of more than 5.
+  constexpr double kDeviations = 4;
   if (rgb.rows < 16 || rgb.cols < 16) return false;
+  std::array<double, 3> contrasts{};
   for (const int channel : {0, 2}) {  // a quarter of the samples each
-    const std::array<PhaseSum, 4> phases = phase_sums(rgb, channel);
-    const auto [least, most] = std::minmax_element(
-        phases.begin(), phases.end(), [](const auto& a, const auto& b) { return a.sum < b.sum; });
-    const double error = std::hypot(least->error(), most->error());
-    if (error > 0 && most->mean() - least->mean() > kDeviations * error) return true;
+    const std::array<double, 3> of_channel = contrast_deviations(phase_sums(rgb, channel));
+    for (std::size_t i = 0; i < contrasts.size(); ++i)
+      contrasts[i] = std::max(contrasts[i], of_channel[i]);
   }
-  return false;
+  std::sort(contrasts.begin(), contrasts.end());
+  return contrasts[1] > kDeviations;
 }
 
 Greens greens_of(const Mosaic& mosaic) {

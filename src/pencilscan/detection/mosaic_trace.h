@@ -9,7 +9,11 @@ namespace pencilscan {
 
 /// Whether the colours of a picture (CV_32FC3) were filled in behind a mosaic: samples differ from
 /// the mean of their neighbours by more than what was interpolated from these (after Gallagher and
-/// Chen 2008). In a picture of three full channels, the four places of a 2 x 2 mosaic are alike.
+/// Chen 2008). One of the four places of a 2 x 2 mosaic stands out so, and with it its row, its
+/// column and its diagonal. In a picture of three full channels the places are alike, but where
+/// lines lie about an even number of pixels apart on a flat face. These make one such contrast
+/// alone: of lines at f cycles a pixel in x and y, the multiples of f modulo 1 are a cyclic group,
+/// and that has at most one of (1/2, 0), (0, 1/2) and (1/2, 1/2). So two contrasts are asked for.
 [[nodiscard]] bool looks_interpolated(const cv::Mat& rgb);
 
 /// Where the green samples of a mosaic lie.
