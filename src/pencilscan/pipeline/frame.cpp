@@ -116,7 +116,7 @@ FrameResult measure_frame(const Rig& rig, const Frame& frame, PointResult lines,
   clock("confirmation",
         [&] { result = finish_shape(rig, std::move(result), options.shape.fusion); });
   end_points(rig, frame, result.points);
-  if (auto warning = little_light_warning(result))
+  if (auto warning = little_light_warning(rig, result.points))
     result.points.warnings.push_back(std::move(*warning));
   return count_motion(rig, std::move(result));
 }

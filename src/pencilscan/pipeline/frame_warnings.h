@@ -58,8 +58,10 @@ namespace pencilscan {
 /// How bright lines are against the noise of their pictures, the median over all curve points; 0
 /// without any.
 [[nodiscard]] double signal_to_noise(const PointResult& result);
-/// That light is too little, where lines are faint and the result lacks much.
-[[nodiscard]] std::optional<Warning> little_light_warning(const FrameResult& result);
+/// That light is too little, where the lines that were found are so faint that others must be lost;
+/// or that lines are too close together to tell, in the pixels of `rig`.
+[[nodiscard]] std::optional<Warning> little_light_warning(const Rig& rig,
+                                                          const PointResult& result);
 
 /// That what one camera sees lies apart from what the others see, and that it was left out, or not.
 [[nodiscard]] Warning another_moment_warning(const Rig& rig, std::size_t camera,

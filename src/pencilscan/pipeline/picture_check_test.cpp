@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numbers>
 #include <opencv2/imgproc.hpp>
 #include <utility>
 
@@ -276,6 +277,29 @@ TEST_F(PictureCheck, LightThatIsTooLittleIsNamed) {
     said = error.what();
   }
   EXPECT_THAT(said, HasSubstr("times as bright as the noise of the pictures"));
+}
+
+TEST_F(PictureCheck, LightIsJudgedByLinesThatDoNotOverlap) {
+  const auto said = [](const Rig& rig, double ratio, double width_px) {
+    PointResult result;
+    CurvePoint point;
+    point.width_px = static_cast<float>(width_px);
+    point.sigma_px = static_cast<float>(std::sqrt(2 * width_px * std::numbers::inv_sqrtpi) / ratio);
+    Curve curve;
+    curve.points.assign(9, point);
+    result.graphs.resize(1);
+    result.graphs[0].curves.push_back(curve);
+    const auto warning = little_light_warning(rig, result);
+    return warning ? warning->text : std::string();
+  };
+  EXPECT_THAT(said(*rig_, 6, 1.1), HasSubstr("light is too little"));
+  EXPECT_THAT(said(*rig_, 9, 1.1), IsEmpty());
+  EXPECT_THAT(said(*rig_, 6, 4), IsEmpty());
+  Rig dense = *rig_;
+  for (Projector& projector : dense.projectors)
+    for (LinePattern& pattern : projector.patterns) pattern.pitch_px /= 4;
+  EXPECT_THAT(said(dense, 6, 1.1), HasSubstr("lines are too close together: 2.1 px"));
+  EXPECT_THAT(said(dense, 9, 1.1), IsEmpty());
 }
 
 TEST_F(PictureCheck, MosaicsThatAreNotStatedOrOthersAreNamed) {
