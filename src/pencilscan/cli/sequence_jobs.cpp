@@ -20,6 +20,7 @@
 #include "pencilscan/pipeline/sequence.h"
 #include "pencilscan/pipeline/sequence_inputs.h"
 #include "pencilscan/pipeline/shard.h"
+#include "pencilscan/recording/pack.h"
 
 namespace pencilscan::cli {
 namespace {
@@ -161,6 +162,7 @@ Job make_job(const SubmitCommand& submit, const CLI::App& command) {
       check_sequence(submit.reconstruct.rig, submit.reconstruct.frames, submit.reconstruct.out,
                      sequence_options(submit.reconstruct));
   warn_of(open_recording_warning(frames));
+  warn_of(order_warning(frames.names()));
   Job job;
   job.kind = submit.slurm           ? JobKind::kSlurm
              : submit.hosts.empty() ? JobKind::kLocal

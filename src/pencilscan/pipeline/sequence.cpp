@@ -24,6 +24,7 @@
 #include "pencilscan/pipeline/sensor_frame.h"
 #include "pencilscan/pipeline/sequence_inputs.h"
 #include "pencilscan/pipeline/surface_chain.h"
+#include "pencilscan/recording/pack.h"
 
 namespace pencilscan {
 namespace {
@@ -336,6 +337,7 @@ SequenceOutcome reconstruct_sequence(const fs::path& rig_path, const fs::path& f
   SequenceOutcome result;
   result.warnings = repetitions(rig, frames, own, images);
   if (auto warning = strangers_warning(frames)) result.warnings.push_back(std::move(*warning));
+  if (auto warning = order_warning(frames.names())) result.warnings.push_back(std::move(*warning));
   if (auto warning = open_recording_warning(frames)) result.warnings.push_back(std::move(*warning));
   for (const std::string& warning : frames.left_out()) result.warnings.push_back(warning);
   if (auto warning = strays_warning(out, inputs.frames))

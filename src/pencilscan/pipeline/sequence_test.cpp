@@ -356,6 +356,15 @@ TEST_F(Sequence, FramesThatAreCountedComeInTheOrderOfTheirNumbers) {
   EXPECT_THAT(FrameSource::open(rig_, counted).names(), ElementsAre("1", "2", "3", "10"));
 }
 
+TEST_F(Sequence, FramesInAnotherOrderThanTheirNumbersAreWarnedOf) {
+  const fs::path shots = temporary_.path() / "shots";
+  const cv::Mat picture(rig_.cameras[0].height, rig_.cameras[0].width, CV_8UC3, cv::Scalar(9));
+  for (const char* name : {"shot_1", "shot_2", "shot_10"})
+    write_image(shots / name / "cam0.png", picture);
+  EXPECT_THAT(run(shots, temporary_.path() / "out", {}).warnings,
+              ElementsAre(HasSubstr("shot_10 comes before shot_2")));
+}
+
 TEST_F(Sequence, ShardsInAnyNumberGiveTheSameBytes) {
   const fs::path one = temporary_.path() / "one";
   const fs::path three = temporary_.path() / "three";

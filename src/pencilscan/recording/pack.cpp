@@ -10,6 +10,7 @@
 #include <set>
 #include <sstream>
 #include <system_error>
+#include <utility>
 
 #include "pencilscan/core/byte_order_mark.h"
 #include "pencilscan/core/error.h"
@@ -43,15 +44,30 @@ bool is_number(const std::string& name) {
 
 bool is_six_digits(const std::string& name) { return name.size() == 6 && is_number(name); }
 
+std::string without_leading_zeros(const std::string& digits) {
+  return digits.substr(std::min(digits.find_first_not_of('0'), digits.size()));
+}
+
 /// Order of whole numbers of any length, and by name where they are equal (1, 01).
 bool is_less_by_number(const std::string& a, const std::string& b) {
-  const auto digits = [](const std::string& name) {
-    return name.substr(std::min(name.find_first_not_of('0'), name.size()));
-  };
-  const std::string x = digits(a);
-  const std::string y = digits(b);
+  const std::string x = without_leading_zeros(a);
+  const std::string y = without_leading_zeros(b);
   if (x.size() != y.size()) return x.size() < y.size();
   return x == y ? a < b : x < y;
+}
+
+/// The numbers in two names at the first place where the names differ; empty: there is none.
+std::pair<std::string, std::string> first_other_numbers(const std::string& a,
+                                                        const std::string& b) {
+  const auto is_digit = [](char c) { return c >= '0' && c <= '9'; };
+  const auto differs = std::mismatch(a.begin(), a.end(), b.begin(), b.end()).first;
+  std::size_t begin = static_cast<std::size_t>(differs - a.begin());
+  while (begin > 0 && is_digit(a[begin - 1])) --begin;
+  const auto number = [&](const std::string& name) {
+    const auto from = name.begin() + static_cast<std::ptrdiff_t>(begin);
+    return std::string(from, std::find_if_not(from, name.end(), is_digit));
+  };
+  return {number(a), number(b)};
 }
 
 /// Not the pictures' own folder, nor one around it: both would go where they are replaced.
@@ -269,6 +285,18 @@ void refuse_what_would_stay(const Recording& recording, const FrameSets& sets,
 
 }  // namespace
 
+std::optional<std::string> order_warning(std::span<const std::string> names) {
+  for (std::size_t i = 1; i < names.size(); ++i) {
+    const auto [before, after] = first_other_numbers(names[i - 1], names[i]);
+    if (before.empty() || after.empty() || !is_less_by_number(after, before)) continue;
+    if (std::all_of(names.begin(), names.end(), is_number)) continue;
+    return "frames are taken in the order of their names, in which " + names[i - 1] +
+           " comes before " + names[i] +
+           ": where their numbers count, give all as many digits, or name them by digits alone";
+  }
+  return std::nullopt;
+}
+
 std::vector<std::string> left_out_warnings(const Recording& recording, const FrameSets& sets) {
   std::vector<std::string> warnings;
   if (!sets.no_frame.empty()) {
@@ -343,6 +371,7 @@ PackReport pack_recording(const fs::path& frames, const fs::path& out, const Pac
     report.warnings.push_back(
         "frame folders without a picture, which the recording does not hold: " +
         counted(found.without_picture));
+  if (auto warning = order_warning(found.names)) report.warnings.push_back(std::move(*warning));
   // A film is a Zarr group, too.
   const bool replaces =
       options.overwrite && Recording::is_one(out) && read_zarr_group(out).contains("cameras");

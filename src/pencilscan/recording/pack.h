@@ -1,6 +1,8 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -32,7 +34,7 @@ struct PackOptions {
 /// for pictures that are damaged or of another size or type than the camera's others, and for time
 /// stamps of other cameras, of a frame that stands twice, or of none of the frames. Warns of
 /// pictures and time stamps that found no partner. The recording is made in `<out>.partial` and
-/// appears whole; an earlier one stays until then.
+/// appears whole; an earlier one stays until then. Warns of what order_warning() says, too.
 PackReport pack_recording(const std::filesystem::path& frames, const std::filesystem::path& out,
                           const PackOptions& options = {}, const Progress& progress = {});
 
@@ -49,6 +51,10 @@ PackReport unpack_recording(const Recording& recording, const FrameSets& sets,
 /// The frame folders below `folder` in their order: by number where all names are digits, else by
 /// name; not those whose names begin with a dot. InputError when there is none.
 [[nodiscard]] std::vector<std::string> frame_folder_names(const std::filesystem::path& folder);
+
+/// Says where the order of names is not that of the numbers in them: shot_10 before shot_2.
+/// `names`: in order.
+[[nodiscard]] std::optional<std::string> order_warning(std::span<const std::string> names);
 
 /// The name of frame k: six digits.
 [[nodiscard]] std::string six_digits(std::size_t frame);

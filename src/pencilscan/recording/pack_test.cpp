@@ -157,6 +157,20 @@ TEST_F(Pack, FramesThatAreCountedComeInTheOrderOfTheirNumbers) {
   EXPECT_THAT(frame_folder_names(frames()), ElementsAre("000", "02", "1", "10", "2", "3", "b"));
 }
 
+TEST_F(Pack, AnOrderOfNamesThatIsNotThatOfTheirNumbersIsSaid) {
+  const auto warning = [](std::vector<std::string> names) { return order_warning(names); };
+  EXPECT_FALSE(warning({"000000", "000001"}));
+  EXPECT_FALSE(warning({"1", "2", "10"}));
+  EXPECT_FALSE(warning({"shot_01", "shot_02", "shot_10"}));
+  EXPECT_FALSE(warning({"a10", "b2"}));
+  EXPECT_FALSE(warning({"shot", "shot_1", "shot_1b"}));
+  EXPECT_TRUE(warning({"10_left", "9_left"}));
+  for (const char* name : {"shot_1", "shot_2", "shot_10"})
+    put(std::string(name) + "/cam0.png", CV_8UC1, 3);
+  EXPECT_THAT(pack_recording(frames(), packed()).warnings,
+              ElementsAre(HasSubstr("in which shot_10 comes before shot_2:")));
+}
+
 TEST_F(Pack, PicturesThatWouldStayAmongUnpackedOnesAreNamed) {
   put("000000/cam0.png", CV_8UC1, 3);
   put("000001/cam0.png", CV_8UC1, 4);
