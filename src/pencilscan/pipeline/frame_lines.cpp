@@ -86,6 +86,7 @@ void forget_camera(std::size_t camera, PointResult& result) {
   clear(result.labeling.tentative);
   clear(result.labeling.undecided);
   clear(result.labeling.denied);
+  if (camera < result.device_crossings.size()) result.device_crossings[camera] = {};
 }
 
 PointResult check_pictures(const Rig& rig, const Frame& frame, PointResult curves) {

@@ -153,6 +153,11 @@ TEST_F(PictureCheck, CamerasThatAreExchangedBeforeABallInTheMiddleLieApartFromTh
     if (warning.code == WarningCode::kWrongPicture) wrong.push_back(warning.device);
   EXPECT_THAT(wrong, testing::UnorderedElementsAre(rig_->cameras[2].name, rig_->cameras[4].name));
   EXPECT_EQ(points.left_out, (std::vector<char>{0, 0, 1, 0, 1, 0}));
+  // What they saw is no figure of theirs.
+  for (const std::size_t camera : {2U, 4U}) {
+    EXPECT_EQ(points.device_crossings[camera].crossings, 0U);
+    EXPECT_FALSE(points.device_crossings[camera].shift_px);
+  }
 }
 
 /// What is said where projectors a and b show each other's patterns.
