@@ -235,8 +235,13 @@ class BumpedCamera(unittest.TestCase):
         self.assertIn("from frame 000012: camera cam1 moved", finished.stderr)
         with open(f"{out}/sequence.json") as f:
             events = json.load(f)["events"]
-        self.assertEqual([(e["frame"], e["figure"], e["device"]) for e in events],
-                         [("000012", "crossings", "cam1")])
+        # The frames say it, too, without its name.
+        self.assertEqual(
+            [(e["frame"], e["last_frame"], e["figure"], e.get("device")) for e in events],
+            [("000012", "000015", "crossings", "cam1"), ("000012", "000015", "rig-is-off", None)])
+        with open(f"{out}/sequence.csv") as f:
+            for row in csv.DictReader(f):
+                self.assertGreater(float(row["proj1.line_height"]), 0)
 
     def check(self, rig, frames, code):
         run("rig", "check", "--rig", rig, "--frames", frames, "--json", self.at("fit.json"),

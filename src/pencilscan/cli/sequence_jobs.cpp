@@ -85,7 +85,7 @@ void report_sequence(const CommonOptions& common, const fs::path& out) {
   say_holes(summary);
   warn_of(strays_warning(out, read_run_inputs(out).frames));
   for (const SequenceEvent& event : summary.watch.events)
-    warn_of("from frame " + event.frame + ": " + event.text);
+    warn_of(when_text(event, summary.rows) + ": " + event.text);
   print_figures(common, summary_figures(out, summary));
   if (!summary.holes.empty()) {
     throw StageError(std::to_string(summary.holes.size()) + " of " +

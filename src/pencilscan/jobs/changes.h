@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -13,10 +14,18 @@ namespace pencilscan {
 /// from value to value of all of them. T is derived: of `values` independent Gaussian values, one
 /// is out by chance in 1 / chance sequences. From P(|z| > T) <= 2 exp(-T^2 / 2) follows T = sqrt(2
 /// ln(2 values / chance)): 5.6 for 36,000. So is one that differs by less than `smallest`, whatever
-/// the spread: no one would act on it. Three values out in a row on one side are a change, fewer
-/// are outliers. After a change the median starts anew. Until it is known, three values in a row
-/// that fit the values before the change and not those from there are a change back. A step among
-/// the first values is looked for backwards from the fifteenth: it needs three values before it.
+/// the spread: no one would act on it.
+///
+/// Three of four values out in a row, none of them nearer to what was before than half of T, are a
+/// change from the first of them on. It ends with the first value of a later change to what was
+/// before it. After a change the median starts anew. Until it is known, three values in a row that
+/// fit the values before the change and not those from there are its end, at the end of all values
+/// fewer. A step among the first values is looked for backwards from the fifteenth: it needs three
+/// values before it.
+///
+/// An outlier is one or two values in a row, each more than T spreads from the median of the
+/// kReference values next to it of its own level: those of before a change and after its end are of
+/// one level. At the end of all values nobody knows whether it is a change.
 struct ChangeOptions {
   double smallest = 0;  ///< difference that counts at all, in the unit of the values; > 0
   std::size_t values =
@@ -25,18 +34,20 @@ struct ChangeOptions {
 };
 
 struct Change {
-  std::size_t at = 0;  ///< index of the first value that is different
-  double before = 0;   ///< median of the values before
-  double after = 0;    ///< of the first ones from there
-  double spreads = 0;  ///< difference over the spread before
+  std::size_t at = 0;              ///< index of the first value that is different
+  std::optional<std::size_t> end;  ///< of the first one that is as before again; none: it stays so
+  double before = 0;               ///< median of the values before
+  double after = 0;                ///< of the first ones from there
+  double spreads = 0;              ///< difference over the spread before
 };
 
-/// So many values out in a row are a change; no single bad one is.
+/// So many values out are a change; no single bad one is.
 inline constexpr std::size_t kFramesOfChange = 3;
 
 struct ChangeReport {
   std::vector<Change> changes;
   std::vector<std::size_t> outliers;  ///< single values that differ
+  std::vector<std::size_t> at_end;    ///< the same of the last ones of all
 };
 
 /// Values that are not finite are unknown and passed over.

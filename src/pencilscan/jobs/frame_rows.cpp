@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <cstdlib>
+#include <functional>
 #include <nlohmann/json.hpp>
 #include <utility>
 
@@ -9,6 +10,7 @@
 #include "pencilscan/core/median.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/io/file.h"
+#include "pencilscan/jobs/device_light.h"
 #include "pencilscan/refinement/crossing_tracks.h"
 #include "pencilscan/report/labelled_share.h"
 
@@ -34,22 +36,28 @@ const json& named_entry(const json& object, const char* list, const std::string&
   return none;
 }
 
-/// The median disagreement of a device's crossings; unknown where they are too few.
-double device_crossing(const json& crossings, const std::string& name) {
+/// How far a device's crossings miss each other; unknown where they are too few.
+void add_device_crossing(const json& crossings, const std::string& name, FrameRow& row) {
   const json& entry = named_entry(crossings, "devices", name);
   CrossingDisagreement of_device;
   of_device.crossings = entry.value("crossings", std::size_t{0});
-  return are_enough(of_device) ? figure(entry, "median_px") : kUnknownFigure;
+  const bool is_known = are_enough(of_device);
+  row.device_crossing_px.push_back(is_known ? figure(entry, "median_px") : kUnknownFigure);
+  row.device_crossing_expected_px.push_back(is_known ? figure(entry, "expected_px")
+                                                     : kUnknownFigure);
 }
 
 double share(double part, double whole) { return whole > 0 ? part / whole : kUnknownFigure; }
 
-CameraRow camera_row(const json& entry) {
+CameraRow camera_row(const json& entry, const std::vector<std::string>& projectors) {
   CameraRow row;
   row.labelled_points = figure(entry, "labelled_curve_points");
   row.labelled_share = share(row.labelled_points, figure(entry, "curve_points"));
   row.line_width_px = figure(entry, "curve_width_median_px");
   row.line_height = figure(entry, "curve_height_median");
+  const json heights = entry.value("curve_height_by_projector", json::object());
+  for (const std::string& name : projectors)
+    row.height_of_projector.push_back(figure(heights, name.c_str()));
   row.image_level = figure(entry, "image_level");
   row.saturated_pixels = figure(entry, "saturated_pixels");
   row.time_offset_us = figure(entry, "time_offset_us");
@@ -60,10 +68,12 @@ CameraRow camera_row(const json& entry) {
   return row;
 }
 
-double median_of_known(const std::vector<CameraRow>& cameras, double CameraRow::*member) {
+double median_of_known(const std::vector<CameraRow>& cameras,
+                       const std::function<double(const CameraRow&)>& reading) {
   std::vector<double> known;
   for (const CameraRow& camera : cameras) {
-    if (std::isfinite(camera.*member)) known.push_back(camera.*member);
+    const double value = reading(camera);
+    if (std::isfinite(value)) known.push_back(value);
   }
   return known.empty() ? kUnknownFigure : upper_median(std::move(known));
 }
@@ -82,7 +92,7 @@ void read_report(const json& report, const SequenceDevices& devices, FrameRow& r
   double saturated = 0;
   for (const std::string& name : devices.cameras) {
     const json& entry = named_entry(report, "cameras", name);
-    row.cameras.push_back(camera_row(entry));
+    row.cameras.push_back(camera_row(entry, devices.projectors));
     const json shift = named_entry(crossings, "devices", name).value("shift_px", json());
     if (shift.is_array() && shift.size() == 2 && shift[0].is_number() && shift[1].is_number()) {
       row.cameras.back().shift_x_px = shift[0].get<double>();
@@ -90,19 +100,26 @@ void read_report(const json& report, const SequenceDevices& devices, FrameRow& r
     }
     const double pixels = figure(entry, "saturated_pixels");
     if (std::isfinite(pixels)) saturated += pixels;
-    row.device_crossing_px.push_back(device_crossing(crossings, name));
+    add_device_crossing(crossings, name, row);
   }
   const json by_projector = report.value("points_by_projector", json::object());
-  for (const std::string& name : devices.projectors) {
+  for (std::size_t p = 0; p < devices.projectors.size(); ++p) {
+    const std::string& name = devices.projectors[p];
     row.projector_points.push_back(figure(by_projector, name.c_str()));
-    row.device_crossing_px.push_back(device_crossing(crossings, name));
+    row.projector_height.push_back(median_of_known(
+        row.cameras, [p](const CameraRow& camera) { return camera.height_of_projector[p]; }));
+    add_device_crossing(crossings, name, row);
   }
   row.labelled_share = labelled_share(report).value_or(kUnknownFigure);
   row.saturated_pixels = saturated;
-  row.line_width_px = median_of_known(row.cameras, &CameraRow::line_width_px);
-  row.line_height = median_of_known(row.cameras, &CameraRow::line_height);
+  row.line_width_px = median_of_known(row.cameras, std::mem_fn(&CameraRow::line_width_px));
+  row.line_height = median_of_known(row.cameras, std::mem_fn(&CameraRow::line_height));
   for (const json& warning : report.value("warnings", json::array()))
     row.warnings.push_back(warning.get<std::string>());
+  for (const json& finding : report.value("findings", json::array())) {
+    row.findings.push_back(
+        {finding.value("code", ""), finding.value("device", ""), finding.value("text", "")});
+  }
 }
 
 /// The report's figures; a frame whose report cannot be read is as good as failed.
@@ -135,8 +152,11 @@ std::vector<FrameRow> read_frame_rows(const fs::path& out, const RunInputs& inpu
     row.cameras.resize(devices.cameras.size());
     row.device_crossing_px.resize(devices.cameras.size() + devices.projectors.size(),
                                   kUnknownFigure);
+    row.device_crossing_expected_px.resize(row.device_crossing_px.size(), kUnknownFigure);
     row.projector_points.resize(devices.projectors.size(), kUnknownFigure);
+    row.projector_height.resize(devices.projectors.size(), kUnknownFigure);
   });
+  find_device_light(rows, devices);
   return rows;
 }
 

@@ -219,6 +219,7 @@ class Finish : public Jobs {
     write_text(folder.path() / "report.json", R"({"points": 100, "points_by_projector":
       {"proj0": 60, "proj1": 40}, "time_spread_us": 12.5,
       "cameras": [{"name": "cam0", "curve_points": 200, "labelled_curve_points": 150,
+                   "curve_height_by_projector": {"proj0": 0.2},
                    "saturated_pixels": 3, "time_offset_us": -12.5, "late": true},
                   {"name": "cam1", "curve_points": 0, "labelled_curve_points": 0}],
       "crossing_disagreement": {"median_px": 0.1, "expected_px": 0.09,
@@ -226,7 +227,8 @@ class Finish : public Jobs {
                     {"name": "cam1", "crossings": 0, "median_px": 0.0},
                     {"name": "proj0", "crossings": 29, "median_px": 0.4},
                     {"name": "proj1", "crossings": 29, "median_px": null}]},
-      "surface": {"vertices": 10, "measured_share": 0.8}, "warnings": ["one, two"]})",
+      "surface": {"vertices": 10, "measured_share": 0.8}, "warnings": ["one, two"],
+      "findings": [{"code": "no-picture", "device": "cam1", "text": "one, two"}]})",
                Durability::kProcess);
     folder.publish();
   }
@@ -273,7 +275,11 @@ TEST_F(Finish, TheTableHasARowAFrame) {
   EXPECT_EQ(json["frames_done"], 116);
   EXPECT_EQ(json["table"][0]["cam0.crossing_px"], 0.11);
   EXPECT_EQ(json["table"][0]["late"][0], "cam0");
+  EXPECT_EQ(json["table"][0]["proj0.line_height"], 0.2);
+  EXPECT_FALSE(json["table"][0].contains("proj1.line_height"));
   EXPECT_EQ(json["holes"][2]["frame"], "f1060");
+  EXPECT_EQ(json["events"], nlohmann::json::parse(R"([{"frame": "f1000", "last_frame": "f1119",
+      "figure": "no-picture", "device": "cam1", "text": "one, two"}])"));
 }
 
 // Earlier results have a median of 0 px where there is no crossing.

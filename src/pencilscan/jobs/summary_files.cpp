@@ -68,6 +68,7 @@ Columns columns_of(const FrameRow& row, const SequenceDevices& devices) {
   for (std::size_t p = 0; p < devices.projectors.size(); ++p) {
     const std::string prefix = devices.projectors[p] + ".";
     columns.insert(columns.end(), {{prefix + "points", row.projector_points[p]},
+                                   {prefix + "line_height", row.projector_height[p]},
                                    {prefix + "crossing_px", row.device_crossing_px[cameras + p]}});
   }
   return columns;
@@ -92,6 +93,7 @@ FrameRow empty_row(const SequenceDevices& devices) {
   FrameRow row;
   row.cameras.resize(devices.cameras.size());
   row.projector_points.resize(devices.projectors.size());
+  row.projector_height.resize(devices.projectors.size());
   row.device_crossing_px.resize(devices.cameras.size() + devices.projectors.size());
   return row;
 }
@@ -127,11 +129,13 @@ ordered_json row_json(const FrameRow& row, const SequenceDevices& devices) {
   return entry;
 }
 
-ordered_json event_json(const SequenceEvent& event) {
-  ordered_json entry = {{"frame", event.frame}, {"figure", event.kind}};
+ordered_json event_json(const SequenceEvent& event, const std::vector<FrameRow>& rows) {
+  ordered_json entry = {{"frame", rows[event.first].name},
+                        {"last_frame", rows[event.last].name},
+                        {"figure", event.kind}};
   if (!event.device.empty()) entry["device"] = event.device;
-  entry["before"] = json_figure(event.before);
-  entry["after"] = json_figure(event.after);
+  if (std::isfinite(event.before)) entry["before"] = json_figure(event.before);
+  if (std::isfinite(event.after)) entry["after"] = json_figure(event.after);
   entry["text"] = event.text;
   return entry;
 }
@@ -154,7 +158,7 @@ void write_summary(const fs::path& out, const SequenceSummary& summary) {
   }
   object["events"] = ordered_json::array();
   for (const SequenceEvent& event : summary.watch.events)
-    object["events"].push_back(event_json(event));
+    object["events"].push_back(event_json(event, summary.rows));
   object["table"] = ordered_json::array();
   for (const FrameRow& row : summary.rows)
     object["table"].push_back(row_json(row, summary.devices));

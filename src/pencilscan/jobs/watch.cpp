@@ -7,9 +7,10 @@
 #include <set>
 #include <tuple>
 
-#include "pencilscan/core/formatted.h"
 #include "pencilscan/core/median.h"
+#include "pencilscan/jobs/change_words.h"
 #include "pencilscan/jobs/changes.h"
+#include "pencilscan/jobs/finding_events.h"
 #include "pencilscan/pipeline/repeated_pictures.h"
 
 namespace pencilscan {
@@ -25,6 +26,7 @@ struct Series {
   double smallest = 0;     ///< change that counts, of the logarithm where is_ratio
   Reading value;
   Reading beside = {};  ///< a change counts where this one's logarithm changes as much, too
+  Reading beyond = {};  ///< a rise counts where this is above `smallest` after it, a fall before
 };
 
 struct Found {
@@ -32,21 +34,19 @@ struct Found {
   Change change;  ///< of the figure itself
 };
 
+bool rises(const Found& found) { return found.change.after > found.change.before; }
+
 /// The smallest changes that count, each with what it does to the result.
 const double kLabelled = 0.05;          // a twentieth of the points lost or won
 const double kWidth = std::log(1.15);   // deviations of points grow with width^1.5: by a fifth
 const double kHeight = std::log(1.25);  // they grow with noise over height: by a quarter
 const double kLevel = std::log(1.25);   // as much more light without lines
+const double kLight = kHeight;          // of the lines of a projector: the same
 const double kPoints = std::log(4.0);   // a projector that lost three quarters of its points
 /// Half of what the rule of disagreeing crossings (crossing_tracks.h) allows beyond noise.
 constexpr double kCrossingsPx = 0.05;
 /// As rig check (moved_devices.h): a camera that is off by less is as calibrated.
 constexpr double kShiftPx = 0.2;
-
-constexpr const char* kDigits = "%.3g";
-
-/// Of crossings, as the kind "crossings"; its direction says nothing.
-constexpr const char* kShift = "shift";
 
 double finite_log(double value) { return value > 0 ? std::log(value) : kUnknownFigure; }
 
@@ -62,7 +62,6 @@ std::vector<Series> all_series(const SequenceDevices& devices) {
     // A share also falls where more is seen that is no line.
     all.back().beside = [c](const FrameRow& row) { return row.cameras[c].labelled_points; };
     of_camera("width", true, kWidth, &CameraRow::line_width_px);
-    of_camera("height", true, kHeight, &CameraRow::line_height);
     of_camera("level", true, kLevel, &CameraRow::image_level);
     of_camera(kShift, false, kShiftPx, &CameraRow::shift_x_px);
     of_camera(kShift, false, kShiftPx, &CameraRow::shift_y_px);
@@ -70,6 +69,12 @@ std::vector<Series> all_series(const SequenceDevices& devices) {
   for (std::size_t d = 0; d < devices.cameras.size() + devices.projectors.size(); ++d) {
     all.push_back({"crossings", d, false, kCrossingsPx,
                    [d](const FrameRow& row) { return row.device_crossing_px[d]; }});
+    all.back().beyond = [d](const FrameRow& row) {
+      return row.device_crossing_px[d] - row.device_crossing_expected_px[d];
+    };
+    const bool is_camera = d < devices.cameras.size();
+    all.push_back({is_camera ? "height" : "light", d, true, is_camera ? kHeight : kLight,
+                   [d](const FrameRow& row) { return row.device_light[d]; }});
   }
   for (std::size_t p = 0; p < devices.projectors.size(); ++p) {
     // One is added, so that none is a number too.
@@ -88,37 +93,6 @@ std::string name_of(const SequenceDevices& devices, std::size_t device) {
   return (device < devices.cameras.size() ? "camera " : "projector ") + bare_name(devices, device);
 }
 
-std::string from_to(const Change& change) {
-  return formatted(change.after, kDigits) + " from here, " + formatted(change.before, kDigits) +
-         " before";
-}
-
-std::string quantity(const std::string& kind) {
-  if (kind == "labelled") return "the share of its curves that has a line is ";
-  if (kind == "width") return "the width of its lines (px) is ";
-  if (kind == "height") return "the height of its lines above their surroundings is ";
-  if (kind == "level") return "the mean light of its picture is ";
-  if (kind == "projector") return "the number of points on its lines is ";
-  if (kind == kShift) return "the shift with which its crossings meet (px) is ";
-  return "its crossing lines miss each other by (px) ";
-}
-
-/// What a change of one figure of one device, or of that figure in all cameras, usually comes from.
-/// `lines_too`: the light on lines rose as well.
-std::string usual_cause(const std::string& kind, bool up, bool all, bool lines_too) {
-  if (kind == "width")
-    return up ? (all ? "motion, or a screen out of focus" : "out of focus") : "sharper";
-  if (kind == "height")
-    return up ? "more light on the lines"
-              : (all ? "less light of the projectors"
-                     : "less light: aperture, exposure, or something before it");
-  if (kind == "level" && lines_too) return "more light, the projectors' too";
-  if (kind == "level") return up ? "light from elsewhere: a lamp" : "less light";
-  if (kind == "labelled") return up ? "better again" : "lines are lost";
-  if (kind == "projector") return up ? "on again" : "off, covered or turned away";
-  return up ? "" : "agrees again";
-}
-
 /// Median over the known ones of `count` frames, from `first` on.
 template <class Row>
 double median_of_done(Row first, Row last, std::size_t count, const Reading& reading) {
@@ -131,32 +105,48 @@ double median_of_done(Row first, Row last, std::size_t count, const Reading& rea
   return values.empty() ? kUnknownFigure : upper_median(std::move(values));
 }
 
-/// Medians over the frames before row `at`, and over `frames_after` from there on.
+/// Medians over the frames before row `at`, and over `frames_after` from there on. Before the first
+/// ones nothing is known: then the first median is over the frames after these.
 std::pair<double, double> before_and_after(std::span<const FrameRow> rows, std::size_t at,
                                            std::size_t frames_after, const Reading& reading) {
   const auto here = rows.begin() + static_cast<std::ptrdiff_t>(at);
-  return {median_of_done(std::make_reverse_iterator(here), rows.rend(), kFramesOfChange, reading),
-          median_of_done(here, rows.end(), frames_after, reading)};
+  double before =
+      median_of_done(std::make_reverse_iterator(here), rows.rend(), kFramesOfChange, reading);
+  if (!std::isfinite(before)) {
+    const std::size_t next = std::min(at + frames_after, rows.size());
+    before = median_of_done(rows.begin() + static_cast<std::ptrdiff_t>(next), rows.end(),
+                            kFramesOfChange, reading);
+  }
+  return {before, median_of_done(here, rows.end(), frames_after, reading)};
 }
 
-/// True where a projector's points or the height of a camera's lines rose at row `at`: more light
-/// then came from the projectors.
+/// True where a projector's points or the light on lines rose at row `at`: more light then came
+/// from the projectors.
 bool lines_got_light(std::span<const FrameRow> rows, const SequenceDevices& devices,
                      std::size_t at) {
-  const auto rises = [&](double smallest, const Reading& reading) {
+  const auto got_more = [&](double smallest, const Reading& reading) {
     const auto [before, after] = before_and_after(
         rows, at, kFramesOfChange, [&](const FrameRow& row) { return finite_log(reading(row)); });
     return after - before > smallest;  // false where one is unknown
   };
-  for (std::size_t c = 0; c < devices.cameras.size(); ++c) {
-    if (rises(kHeight, [c](const FrameRow& row) { return row.cameras[c].line_height; }))
-      return true;
+  for (std::size_t d = 0; d < devices.cameras.size() + devices.projectors.size(); ++d) {
+    if (got_more(kLight, [d](const FrameRow& row) { return row.device_light[d]; })) return true;
   }
   for (std::size_t p = 0; p < devices.projectors.size(); ++p) {
-    if (rises(kPoints, [p](const FrameRow& row) { return row.projector_points[p] + 1; }))
+    if (got_more(kPoints, [p](const FrameRow& row) { return row.projector_points[p] + 1; }))
       return true;
   }
   return false;
+}
+
+/// What is said of a change, without its text.
+SequenceEvent event_from(std::span<const FrameRow> rows, const Found& found,
+                         const std::string& device) {
+  const Change& change = found.change;
+  return {change.at,    change.end.value_or(rows.size()) - 1,
+          !change.end,  found.series->kind,
+          device,       change.before,
+          change.after, ""};
 }
 
 SequenceEvent event_of(std::span<const FrameRow> rows, const SequenceDevices& devices,
@@ -165,36 +155,40 @@ SequenceEvent event_of(std::span<const FrameRow> rows, const SequenceDevices& de
   const std::string& kind = found.series->kind;
   const bool up = change.after > change.before;
   const bool lines_too = kind == "level" && up && lines_got_light(rows, devices, change.at);
+  SequenceEvent event = event_from(rows, found, bare_name(devices, found.series->device));
+  event.text =
+      name_of(devices, found.series->device) + ": " + quantity(kind) + from_to(kind, change);
   const std::string cause = usual_cause(kind, up, false, lines_too);
-  return {rows[change.at].name,
-          kind,
-          bare_name(devices, found.series->device),
-          change.before,
-          change.after,
-          name_of(devices, found.series->device) + ": " + quantity(kind) + from_to(change) + " (" +
-              cause + ")"};
+  if (!cause.empty()) event.text += " (" + cause + ")";
+  return event;
 }
 
-/// The same change in most cameras at once is one event, of none of them.
+/// The middle one of the places where changes end.
+std::optional<std::size_t> end_of_most(const std::vector<Found>& together, std::size_t rows) {
+  std::vector<std::size_t> ends;
+  for (const Found& f : together) ends.push_back(f.change.end.value_or(rows));
+  const std::size_t end = upper_median(std::move(ends));
+  return end < rows ? std::optional(end) : std::nullopt;
+}
+
+/// The same change in most cameras, or most projectors, at once is one event, of none of them.
 SequenceEvent event_of_all(std::span<const FrameRow> rows, const SequenceDevices& devices,
                            const std::vector<Found>& together) {
-  const Change& change = together[together.size() / 2].change;
-  const std::string& kind = together.front().series->kind;
+  Found middle = together[together.size() / 2];
+  const std::string& kind = middle.series->kind;
   const std::size_t first = together.front().change.at;
-  const bool up = change.after > change.before;
+  const bool up = rises(middle);
   const bool lines_too = kind == "level" && up && lines_got_light(rows, devices, first);
-  return {rows[first].name,
-          kind,
-          "",
-          change.before,
-          change.after,
-          std::to_string(together.size()) + " cameras: " + quantity(kind) + from_to(change) + " (" +
-              usual_cause(kind, up, true, lines_too) + ")"};
+  middle.change.at = first;
+  middle.change.end = end_of_most(together, rows.size());
+  SequenceEvent event = event_from(rows, middle, "");
+  event.text = std::to_string(together.size()) +
+               (kind == "light" ? " projectors: " : " cameras: ") + quantity(kind) +
+               from_to(kind, middle.change) + " (" + usual_cause(kind, up, true, lines_too) + ")";
+  return event;
 }
 
 bool is_shift(const Found& found) { return found.series->kind == kShift; }
-
-bool rises(const Found& found) { return found.change.after > found.change.before; }
 
 bool of_crossings(const Found& found) {
   return is_shift(found) || found.series->kind == "crossings";
@@ -206,6 +200,19 @@ bool agrees_again(const Found& found) {
 }
 
 double size_of(const Found& found) { return std::abs(found.change.after - found.change.before); }
+
+/// Whether a camera's crossings meet with its picture where it was, so that it did not turn away.
+bool is_steady(std::span<const FrameRow> rows, const Found& found) {
+  const std::size_t camera = found.series->device;
+  if (camera >= rows[0].cameras.size()) return false;
+  const auto change = [&](double CameraRow::*shift) {
+    const auto [before, after] =
+        before_and_after(rows, found.change.at, kFramesOfChange,
+                         [&](const FrameRow& row) { return row.cameras[camera].*shift; });
+    return after - before;
+  };
+  return std::hypot(change(&CameraRow::shift_x_px), change(&CameraRow::shift_y_px)) < kShiftPx;
+}
 
 /// Which device made crossings miss each other, or meet again. One camera alone, be it that its
 /// crossings miss or that its picture is shifted: that one, since a crossing's disagreement is that
@@ -238,34 +245,71 @@ SequenceEvent bump(std::span<const FrameRow> rows, const SequenceDevices& device
   const Found& most = one_camera      ? *of_camera
                       : one_projector ? *projectors.front()
                                       : together.front();
-  SequenceEvent event{rows[first].name, "crossings", "", most.change.before, most.change.after, ""};
+  Found whole = most;
+  whole.change.at = first;
+  whole.change.end = end_of_most(together, rows.size());
+  SequenceEvent event = event_from(rows, whole, "");
+  event.kind = "crossings";
   const bool is_back = std::all_of(together.begin(), together.end(), agrees_again);
   if (one_camera || one_projector) {
     event.device = bare_name(devices, most.series->device);
-    event.text = name_of(devices, most.series->device) +
-                 (is_back ? " is again where the rig has it" : " moved");
+    event.text = name_of(devices, most.series->device) + ' ';
+    if (std::none_of(together.begin(), together.end(), is_shift) && is_steady(rows, most)) {
+      event.text += "stands where it stood, its crossing lines miss each other by " +
+                    from_to(most.series->kind, most.change) +
+                    " (px; turned about its axis, focus, or motion within the exposure); rig check "
+                    "--frames says more";
+      return event;
+    }
+    event.text += is_back ? "is again where the rig has it" : "moved";
   } else {
     event.text = is_back ? "devices are again where the rig has them"
                          : "devices moved, which one these figures do not tell";
   }
   event.text += is_shift(most) ? ": crossing lines meet when its picture is shifted by "
                                : ": crossing lines miss each other by ";
-  event.text += from_to(most.change) + " (px)";
+  event.text += from_to(most.series->kind, most.change) + " (px)";
   if (!is_back)
     event.text += "; rig check --frames says more, --refine-rig corrects the frames from here";
   return event;
 }
 
-/// Whether what is watched beside a figure rose or fell with it at row `at`: from the frames before
-/// to so many from there on.
+/// Whether what tells of a change at row `at` bears it out: from the frames before to so many from
+/// there on.
 bool is_confirmed(std::span<const FrameRow> rows, const Series& series, std::size_t at,
                   std::size_t frames_after) {
-  if (!series.beside) return true;
+  if (!series.beside && !series.beyond) return true;
+  const auto [own_before, own_after] = before_and_after(rows, at, frames_after, series.value);
+  if (series.beyond) {
+    const auto [before, after] = before_and_after(rows, at, frames_after, series.beyond);
+    const double beyond = own_after > own_before ? after : before;
+    return !std::isfinite(beyond) || beyond > series.smallest;
+  }
   const auto [before, after] = before_and_after(
       rows, at, frames_after, [&](const FrameRow& row) { return finite_log(series.beside(row)); });
   if (!std::isfinite(before) || !std::isfinite(after)) return true;
-  const auto [own_before, own_after] = before_and_after(rows, at, frames_after, series.value);
   return (after > before) == (own_after > own_before) && std::abs(after - before) > series.smallest;
+}
+
+/// Changes of logarithms, or of numbers to which one was added, as those of the figure itself.
+Change of_figure(const Series& series, Change change) {
+  if (series.is_ratio) {
+    change.before = std::exp(change.before);
+    change.after = std::exp(change.after);
+  }
+  if (series.kind == "projector") {
+    change.before -= 1;
+    change.after -= 1;
+  }
+  return change;
+}
+
+/// The figure of one frame, as from_to() has it.
+std::string odd_figure(std::span<const FrameRow> rows, const Series& series, std::size_t at) {
+  const auto [before, after] = before_and_after(rows, at, 1, series.value);
+  if (is_of_light(series.kind)) return in_words(after / before) + " of that before";
+  return in_words(
+      of_figure(series, {at, {}, 0, series.is_ratio ? std::log(after) : after, 0}).after);
 }
 
 std::vector<Found> find_all(std::span<const FrameRow> rows, const SequenceDevices& devices,
@@ -278,21 +322,18 @@ std::vector<Found> find_all(std::span<const FrameRow> rows, const SequenceDevice
           row.status.state == FrameState::kDone ? series.value(row) : kUnknownFigure;
       values.push_back(series.is_ratio ? finite_log(value) : value);
     }
-    ChangeReport changes = find_changes(values, {series.smallest, all.size() * rows.size()});
-    for (Change& change : changes.changes) {
+    const ChangeReport changes = find_changes(values, {series.smallest, all.size() * rows.size()});
+    for (const Change& change : changes.changes) {
       if (!is_confirmed(rows, series, change.at, kFramesOfChange)) continue;
-      if (series.is_ratio) {
-        change.before = std::exp(change.before);
-        change.after = std::exp(change.after);
-      }
-      found.push_back({&series, change});
+      found.push_back({&series, of_figure(series, change)});
     }
-    for (const std::size_t at : changes.outliers) {
-      const double value = series.value(rows[at]);
-      if (!is_confirmed(rows, series, at, 1)) continue;
+    const auto say_odd = [&](std::size_t at, const char* where) {
+      if (!is_confirmed(rows, series, at, 1)) return;
       report.odd.push_back({at, name_of(devices, series.device) + ": " + quantity(series.kind) +
-                                    formatted(value, kDigits) + " in this frame alone"});
-    }
+                                    odd_figure(rows, series, at) + where});
+    };
+    for (const std::size_t at : changes.outliers) say_odd(at, " in this frame alone");
+    for (const std::size_t at : changes.at_end) say_odd(at, " at the end");
   }
   return found;
 }
@@ -332,7 +373,7 @@ std::vector<SequenceEvent> repetitions_of(std::span<const FrameRow> rows,
   std::vector<SequenceEvent> events;
   for (const RepeatedPicture& r : repeated_pictures(hashes)) {
     const std::string& camera = devices.cameras[r.camera];
-    events.push_back({rows[r.first + 1].name, "repeated", camera, 0,
+    events.push_back({r.first + 1, r.last, r.last + 1 == rows.size(), "repeated", camera, 0,
                       static_cast<double>(r.last - r.first),
                       describe_repeated(camera, rows[r.first].name, rows[r.last].name)});
   }
@@ -340,6 +381,13 @@ std::vector<SequenceEvent> repetitions_of(std::span<const FrameRow> rows,
 }
 
 }  // namespace
+
+std::string when_text(const SequenceEvent& event, std::span<const FrameRow> rows) {
+  const std::string& first = rows[event.first].name;
+  if (event.first == event.last) return "in frame " + first;
+  return event.lasts ? "from frame " + first
+                     : "in frames " + first + " to " + rows[event.last].name;
+}
 
 WatchReport watch_sequence(std::span<const FrameRow> rows, const SequenceDevices& devices) {
   WatchReport report;
@@ -356,14 +404,18 @@ WatchReport watch_sequence(std::span<const FrameRow> rows, const SequenceDevices
     if (moved) {
       report.events.push_back(bump(rows, devices, together));
     } else if (first.series->kind != "projector" && together.size() > 1 &&
-               2 * together.size() > devices.cameras.size()) {
+               2 * together.size() > (first.series->kind == "light" ? devices.projectors.size()
+                                                                    : devices.cameras.size())) {
       report.events.push_back(event_of_all(rows, devices, together));
     } else {
       for (const Found& f : together) report.events.push_back(event_of(rows, devices, f));
     }
   }
-  for (SequenceEvent& event : repetitions_of(rows, devices))
-    report.events.push_back(std::move(event));
+  std::ranges::move(finding_events(rows), std::back_inserter(report.events));
+  std::ranges::move(repetitions_of(rows, devices), std::back_inserter(report.events));
+  std::stable_sort(
+      report.events.begin(), report.events.end(),
+      [](const SequenceEvent& a, const SequenceEvent& b) { return a.first < b.first; });
   return report;
 }
 

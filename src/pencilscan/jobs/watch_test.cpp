@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "pencilscan/core/random.h"
+#include "pencilscan/jobs/device_light.h"
 
 namespace pencilscan {
 namespace {
@@ -31,18 +32,24 @@ class Watch : public ::testing::Test {
         CameraRow& camera = row.cameras.emplace_back();
         camera.labelled_share = about(0.9);
         camera.line_width_px = about(1.4);
-        camera.line_height = about(0.2);
+        for (std::size_t p = 0; p < 3; ++p) camera.height_of_projector.push_back(about(0.2));
         camera.image_level = about(0.1);
         row.projector_points.push_back(std::round(about(5000)));
       }
       for (std::size_t d = 0; d < 6; ++d) row.device_crossing_px.push_back(about(0.08));
+      row.device_crossing_expected_px.assign(6, kUnknownFigure);
     }
   }
-  std::vector<SequenceEvent> events() { return watch_sequence(rows_, devices_).events; }
+  WatchReport watch() {
+    find_device_light(rows_, devices_);
+    return watch_sequence(rows_, devices_);
+  }
+  std::vector<SequenceEvent> events() { return watch().events; }
   void expect_one_moved(const std::string& frame, const std::string& camera) {
     const auto found = events();
     ASSERT_THAT(found, SizeIs(1));
-    EXPECT_EQ(found[0].frame, frame);
+    EXPECT_EQ(rows_[found[0].first].name, frame);
+    EXPECT_TRUE(found[0].lasts);
     EXPECT_EQ(found[0].device, camera);
     EXPECT_THAT(found[0].text, HasSubstr("camera " + camera + " moved"));
   }
@@ -55,7 +62,7 @@ class Watch : public ::testing::Test {
 };
 
 TEST_F(Watch, NothingHappens) {
-  const WatchReport report = watch_sequence(rows_, devices_);
+  const WatchReport report = watch();
   EXPECT_THAT(report.events, IsEmpty());
   EXPECT_THAT(report.odd, IsEmpty());
 }
@@ -133,7 +140,7 @@ TEST_F(Watch, FocusLampAndProjectorAreToldApart) {
   EXPECT_EQ(found[0].device, "cam2");
   EXPECT_THAT(found[0].text, HasSubstr("out of focus"));
   EXPECT_EQ(found[1].device, "");
-  EXPECT_EQ(found[1].frame, "150");
+  EXPECT_EQ(found[1].first, 150U);
   EXPECT_THAT(found[1].text, HasSubstr("3 cameras"));
   EXPECT_THAT(found[1].text, HasSubstr("lamp"));
   EXPECT_EQ(found[2].device, "proj0");
@@ -144,11 +151,9 @@ TEST_F(Watch, ALampOfThreeFramesEnds) {
   for (const std::size_t k : {30U, 31U, 32U})
     for (CameraRow& camera : rows_[k].cameras) camera.image_level *= 2;
   const auto found = events();
-  ASSERT_THAT(found, SizeIs(2));
-  EXPECT_EQ(found[0].frame, "30");
+  ASSERT_THAT(found, SizeIs(1));
+  EXPECT_EQ(when_text(found[0], rows_), "in frames 30 to 32");
   EXPECT_THAT(found[0].text, HasSubstr("a lamp"));
-  EXPECT_EQ(found[1].frame, "33");
-  EXPECT_THAT(found[1].text, HasSubstr("less light"));
 }
 
 TEST_F(Watch, ACameraThatIsPutBackSoonIsBack) {
@@ -164,13 +169,21 @@ TEST_F(Watch, ACameraThatIsPutBackSoonIsBack) {
     rows_[k].cameras[1].shift_y_px -= 0.5;
     rows_[k].device_crossing_px[1] += 0.4;
   }
-  const auto found = events();
-  ASSERT_THAT(found, SizeIs(2));
-  EXPECT_EQ(found[0].frame, "30");
+  auto found = events();
+  ASSERT_THAT(found, SizeIs(1));
+  EXPECT_EQ(when_text(found[0], rows_), "in frames 30 to 33");
   EXPECT_THAT(found[0].text, HasSubstr("camera cam1 moved"));
-  EXPECT_EQ(found[1].frame, "34");
-  EXPECT_EQ(found[1].device, "cam1");
-  EXPECT_THAT(found[1].text, HasSubstr("is again where the rig has it"));
+  // It stood elsewhere from the beginning.
+  for (std::size_t k = 0; k < 30; ++k) {
+    rows_[k].cameras[1].shift_x_px += 0.5;
+    rows_[k].device_crossing_px[1] += 0.4;
+  }
+  for (std::size_t k = 30; k < 34; ++k) rows_[k].cameras[1].shift_y_px += 0.5;
+  found = events();
+  ASSERT_THAT(found, SizeIs(1));
+  EXPECT_EQ(when_text(found[0], rows_), "from frame 34");
+  EXPECT_EQ(found[0].device, "cam1");
+  EXPECT_THAT(found[0].text, HasSubstr("is again where the rig has it"));
 }
 
 TEST_F(Watch, AProjectorThatComesOnAgainIsNoLamp) {
@@ -178,12 +191,24 @@ TEST_F(Watch, AProjectorThatComesOnAgainIsNoLamp) {
     rows_[k].projector_points[0] = 2;
     for (CameraRow& camera : rows_[k].cameras) camera.image_level *= 0.7;
   }
-  const auto found = events();
-  ASSERT_THAT(found, SizeIs(4));
-  EXPECT_EQ(found[2].kind, "level");
-  EXPECT_EQ(found[2].frame, "150");
-  EXPECT_THAT(found[2].text, HasSubstr("more light, the projectors' too"));
-  EXPECT_EQ(found[3].device, "proj0");
+  auto found = events();
+  ASSERT_THAT(found, SizeIs(2));
+  EXPECT_EQ(found[0].kind, "level");
+  EXPECT_EQ(found[1].device, "proj0");
+  EXPECT_NEAR(found[1].after, 2, 1e-9);
+  for (const SequenceEvent& event : found)
+    EXPECT_EQ(when_text(event, rows_), "in frames 100 to 149");
+  // It was off from the beginning.
+  for (std::size_t k = 0; k < 100; ++k) {
+    rows_[k].projector_points[0] = 2;
+    for (CameraRow& camera : rows_[k].cameras) camera.image_level *= 0.7;
+  }
+  found = events();
+  ASSERT_THAT(found, SizeIs(2));
+  EXPECT_EQ(found[0].kind, "level");
+  EXPECT_EQ(when_text(found[0], rows_), "from frame 150");
+  EXPECT_THAT(found[0].text, HasSubstr("more light, the projectors' too"));
+  EXPECT_EQ(found[1].device, "proj0");
   for (const SequenceEvent& event : found) EXPECT_THAT(event.text, Not(HasSubstr("lamp")));
 }
 
@@ -200,7 +225,7 @@ TEST_F(Watch, ACameraThatHangsIsNamed) {
   for (const std::size_t k : {50U, 51U, 52U})
     rows_[k].cameras[1].picture = rows_[49].cameras[1].picture;
   ASSERT_THAT(events(), SizeIs(1));
-  EXPECT_EQ(events()[0].frame, "50");
+  EXPECT_EQ(when_text(events()[0], rows_), "in frames 50 to 52");
   EXPECT_EQ(events()[0].device, "cam1");
   EXPECT_EQ(events()[0].after, 3);
 }
@@ -208,7 +233,7 @@ TEST_F(Watch, ACameraThatHangsIsNamed) {
 TEST_F(Watch, OneBadFrameIsOddAndNoEvent) {
   rows_[50].cameras[0].labelled_share = 0.2;
   rows_[60].status.state = FrameState::kFailed;
-  const WatchReport report = watch_sequence(rows_, devices_);
+  const WatchReport report = watch();
   EXPECT_THAT(report.events, IsEmpty());
   ASSERT_THAT(report.odd, SizeIs(1));
   EXPECT_EQ(report.odd[0].row, 50U);
@@ -220,11 +245,109 @@ TEST_F(Watch, AFrameWithAsManyLabelsIsNotOdd) {
   Random random(6);
   for (FrameRow& row : rows_) row.cameras[0].labelled_points = 5000 + random.normal(0, 50);
   rows_[50].cameras[0].labelled_share = 0.7;
-  EXPECT_THAT(watch_sequence(rows_, devices_).odd, IsEmpty());
+  EXPECT_THAT(watch().odd, IsEmpty());
   rows_[50].cameras[0].labelled_points = 3900;
-  const WatchReport report = watch_sequence(rows_, devices_);
+  const WatchReport report = watch();
   ASSERT_THAT(report.odd, SizeIs(1));
   EXPECT_EQ(report.odd[0].row, 50U);
+}
+
+TEST_F(Watch, ADimProjectorIsNamedAndNoCamera) {
+  from(200, [](FrameRow& row) {
+    for (CameraRow& camera : row.cameras) camera.height_of_projector[1] *= 0.4;
+  });
+  const WatchReport report = watch();
+  EXPECT_THAT(report.odd, IsEmpty());
+  ASSERT_THAT(report.events, SizeIs(1));
+  EXPECT_EQ(when_text(report.events[0], rows_), "from frame 200");
+  EXPECT_EQ(report.events[0].kind, "light");
+  EXPECT_EQ(report.events[0].device, "proj1");
+  EXPECT_NEAR(report.events[0].after / report.events[0].before, 0.4, 0.02);
+  EXPECT_THAT(report.events[0].text, HasSubstr("of that before (dimmer"));
+}
+
+TEST_F(Watch, ACameraThatTakesInLessLightIsNamedAndNoProjector) {
+  from(200, [](FrameRow& row) {
+    for (double& height : row.cameras[2].height_of_projector) height *= 0.5;
+  });
+  const auto found = events();
+  ASSERT_THAT(found, SizeIs(1));
+  EXPECT_EQ(found[0].kind, "height");
+  EXPECT_EQ(found[0].device, "cam2");
+}
+
+TEST_F(Watch, AProjectorThatWasDarkAccusesNoFrameAfterIt) {
+  for (FrameRow& row : rows_) {
+    row.device_crossing_expected_px.assign(6, 0.25);
+    for (double& px : row.device_crossing_px) px += 0.1;
+  }
+  for (const std::size_t k : {8U, 9U, 10U}) {
+    rows_[k].projector_points[1] = k == 9 ? 5 : 0;
+    for (CameraRow& camera : rows_[k].cameras) camera.height_of_projector[1] = kUnknownFigure;
+    // Fewer lines cross, and the rest meets better.
+    for (double& px : rows_[k].device_crossing_px) px -= 0.1;
+  }
+  rows_.resize(13);
+  const WatchReport report = watch();
+  EXPECT_THAT(report.odd, IsEmpty());
+  ASSERT_THAT(report.events, SizeIs(1));
+  EXPECT_EQ(when_text(report.events[0], rows_), "in frames 8 to 10");
+  EXPECT_EQ(report.events[0].device, "proj1");
+  EXPECT_EQ(report.events[0].after, 0);
+  EXPECT_THAT(report.events[0].text, Not(HasSubstr("e+03")));
+}
+
+// Fewer lines cross in the first frame, and these meet better.
+TEST_F(Watch, CrossingsThatMeetBetterInTheFirstFrameAreNotOdd) {
+  for (FrameRow& row : rows_) row.device_crossing_expected_px.assign(6, 0.1);
+  rows_[0].device_crossing_px[1] = 0.01;
+  EXPECT_THAT(watch().odd, IsEmpty());
+  rows_[0].device_crossing_px[1] = 0.3;
+  ASSERT_THAT(watch().odd, SizeIs(1));
+  EXPECT_EQ(watch().odd[0].row, 0U);
+}
+
+// The object moves to where lines are less certain; the camera stands.
+TEST_F(Watch, MissesThatNoiseExplainsAreNoMotion) {
+  for (FrameRow& row : rows_) {
+    row.device_crossing_expected_px.assign(6, 0.09);
+    for (CameraRow& camera : row.cameras) camera.shift_x_px = camera.shift_y_px = 0.01;
+  }
+  from(120, [](FrameRow& row) {
+    row.device_crossing_px[1] += 0.08;
+    row.device_crossing_expected_px[1] += 0.08;
+  });
+  EXPECT_THAT(events(), IsEmpty());
+  from(120, [](FrameRow& row) { row.device_crossing_px[1] += 0.1; });
+  const auto found = events();
+  ASSERT_THAT(found, SizeIs(1));
+  EXPECT_EQ(found[0].device, "cam1");
+  EXPECT_THAT(found[0].text, HasSubstr("stands where it stood"));
+}
+
+TEST_F(Watch, FindingsAreEventsWithTheirFrames) {
+  const auto say = [&](std::size_t first, std::size_t last, const char* code, const char* device) {
+    for (std::size_t k = first; k <= last; ++k)
+      rows_[k].findings.push_back({code, device, "words"});
+  };
+  say(0, kFrames - 1, "little-measured", "");
+  EXPECT_THAT(events(), IsEmpty());
+  say(0, kFrames - 1, "saturated", "cam0");
+  say(8, 10, "no-picture", "cam2");
+  say(13, 13, "no-picture", "cam2");
+  rows_[30].findings.push_back({"no-picture", "cam2", "nothing in frame 30: without it"});
+  say(280, kFrames - 1, "wrong-picture", "cam1");
+  rows_[285].status.state = FrameState::kFailed;
+  const auto found = events();
+  std::vector<std::string> said;
+  for (const SequenceEvent& event : found)
+    said.push_back(when_text(event, rows_) + " " + event.kind + " " + event.device + " " +
+                   event.text);
+  EXPECT_THAT(said, ::testing::ElementsAre("from frame 0 saturated cam0 words",
+                                           "in frames 8 to 13 no-picture cam2 words (in 4 of these "
+                                           "6 frames)",
+                                           "in frame 30 no-picture cam2 nothing: without it",
+                                           "from frame 280 wrong-picture cam1 words"));
 }
 
 }  // namespace

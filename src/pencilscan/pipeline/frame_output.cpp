@@ -53,6 +53,28 @@ ordered_json device_reports(const Rig& rig, const std::vector<CrossingDisagreeme
   return reports;
 }
 
+/// Median height of the lines of each projector above their surroundings, in one camera; only where
+/// the median is no chance. Which of two is dimmer, projector or camera, the height of all does not
+/// tell.
+ordered_json heights_by_projector(const Rig& rig, const GridGraph& graph,
+                                  const std::vector<LabeledRun>& runs) {
+  constexpr std::size_t kFewest = 30;  // points, as crossings in are_enough()
+  std::vector<std::vector<float>> heights(rig.projectors.size());
+  for (const LabeledRun& run : runs) {
+    const auto& points = graph.curves[static_cast<std::size_t>(run.curve)].points;
+    for (int i = run.begin; i < run.end; ++i) {
+      heights[static_cast<std::size_t>(run.label.pattern.projector)].push_back(
+          points[static_cast<std::size_t>(i)].amplitude);
+    }
+  }
+  ordered_json report = ordered_json::object();
+  for (std::size_t p = 0; p < heights.size(); ++p) {
+    if (heights[p].size() >= kFewest)
+      report[rig.projectors[p].name] = number(upper_median(std::move(heights[p])));
+  }
+  return report;
+}
+
 ordered_json camera_report(const Rig& rig, const Frame& frame, const PointResult& result,
                            std::size_t c) {
   const GridGraph& graph = result.graphs[c];
@@ -82,6 +104,7 @@ ordered_json camera_report(const Rig& rig, const Frame& frame, const PointResult
     report["curve_sigma_median_px"] = number(upper_median(std::move(sigmas)));
     report["curve_width_median_px"] = number(upper_median(std::move(widths)));
     report["curve_height_median"] = number(upper_median(std::move(heights)));
+    report["curve_height_by_projector"] = heights_by_projector(rig, graph, result.labeling.runs[c]);
   }
   if (!frame.images[c].empty())
     report["image_level"] = number(level_of(rig.cameras[c], frame.images[c]));
