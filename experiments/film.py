@@ -126,7 +126,7 @@ def evaluated(args, program, rig, frame, result):
 
 
 def events(program, result):
-    """What `sequence finish` says has changed, and how many figures of single frames it calls odd."""
+    """What `sequence finish` says has changed, and how many single frames it calls odd."""
     figures = program("sequence", "finish", "--out", result)
     changes = json.loads((result / "sequence.json").read_text())["events"]
     return {"changes": changes, "odd": figures["odd_frames"]}

@@ -73,7 +73,7 @@ Json summary_figures(const fs::path& out, const SequenceSummary& summary) {
   figures["frames_failed"] = count("failed");
   figures["frames_missing"] = count("missing") + count("other");
   figures["events"] = summary.watch.events.size();
-  figures["odd_frames"] = summary.watch.odd.size();
+  figures["odd_frames"] = summary.odd_frames();
   figures["table"] = (out / "sequence.csv").string();
   return figures;
 }

@@ -1,6 +1,7 @@
 #include "pencilscan/jobs/finish.h"
 
 #include <algorithm>
+#include <set>
 
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/name_list.h"
@@ -63,6 +64,12 @@ std::vector<Hole> holes_of(const fs::path& out, const std::vector<FrameRow>& row
 }
 
 }  // namespace
+
+std::size_t SequenceSummary::odd_frames() const {
+  std::set<std::size_t> frames;
+  for (const OddFrame& odd : watch.odd) frames.insert(odd.row);
+  return frames.size();
+}
 
 SequenceSummary summarize_sequence(const fs::path& out) {
   if (!has_run_inputs(out))

@@ -24,6 +24,8 @@ struct SequenceSummary {
   WatchReport watch;
 
   [[nodiscard]] std::size_t done() const { return rows.size() - holes.size(); }
+  /// Frames of which some figure is odd.
+  [[nodiscard]] std::size_t odd_frames() const;
 };
 
 /// What the output folder of a sequence holds and lacks. InputError when it is none.

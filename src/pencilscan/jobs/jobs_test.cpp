@@ -282,6 +282,12 @@ TEST_F(Finish, TheTableHasARowAFrame) {
       "figure": "no-picture", "device": "cam1", "text": "one, two"}])"));
 }
 
+TEST_F(Finish, AFrameWithTwoOddFiguresIsOneFrame) {
+  SequenceSummary summary;
+  summary.watch.odd = {{3, "one"}, {5, "two"}, {3, "three"}};
+  EXPECT_EQ(summary.odd_frames(), 2U);
+}
+
 // Earlier results have a median of 0 px where there is no crossing.
 TEST_F(Finish, FewCrossingsSayNothingOfADevice) {
   const std::vector<double> px = summarize_sequence(out()).rows[0].device_crossing_px;
