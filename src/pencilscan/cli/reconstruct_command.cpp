@@ -146,8 +146,9 @@ void add_reconstruct_options(CLI::App& command, ReconstructOptions& options) {
       ->excludes(no_mesh);
   command.add_flag("--refine-rig", options.refine_rig,
                    "correct the poses of the devices from the lines that cross in the frames");
-  command.add_flag("--independent", options.independent,
-                   "every frame from itself alone, not from the surface of the frame before");
+  command.add_flag(
+      "--independent", options.independent,
+      "every frame from itself alone: what rests takes no mean over the frames before");
   command.add_flag("--no-pictures", options.no_pictures, "leave overlays and views out");
   command.add_flag("--overwrite", options.overwrite, "replace output of other inputs or options");
 }

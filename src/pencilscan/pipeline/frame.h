@@ -118,10 +118,12 @@ struct ShapeResult {
   DepthResult depth;  ///< empty where it is off
   HoleReport holes;   ///< empty without dense depth
   SurfaceResult surface;
+  /// Of surface.mesh, the mean over moments where it rests: finish_shape() moves the vertices
+  /// there. Empty where no moment comes before.
+  std::vector<Vec3> steadied;
   std::shared_ptr<const RayScene>
       scene;              ///< of surface.mesh before its colours; null without dense depth
   ExposureMotion motion;  ///< within the exposure; not judged without dense depth
-  int carried_since = 0;  ///< moments since the closed surface was made from nothing
 };
 
 /// All its lengths times `factor`, without `scene`.
@@ -206,7 +208,8 @@ void forget_camera(std::size_t camera, PointResult& result);
                                            const StageClock& clock = {});
 
 /// What of the surface was measured, and what it is worth. Where lines were matched on the surface,
-/// what none of the points lies near was not measured after all (surface/supported.h).
+/// what none of the points lies near was not measured after all (surface/supported.h). In a
+/// sequence, vertices that rest take their mean over moments: nothing else rests on that.
 [[nodiscard]] FrameResult finish_shape(const Rig& rig, FrameResult result,
                                        const FusionOptions& options = {});
 

@@ -284,8 +284,7 @@ nlohmann::ordered_json frame_report(const Rig& rig, const Frame& frame, const Po
                        {"boundary_edges", s.edges.boundary},
                        {"non_manifold_edges", s.edges.non_manifold},
                        {"self_intersections", s.self_intersections},
-                       {"measured_share", number(s.measured_share)},
-                       {"carried_since", shape.carried_since}};
+                       {"measured_share", number(s.measured_share)}};
   if (!shape.holes.vertices.empty()) {
     ordered_json& area = report["surface"]["area_mm2"];
     for (std::size_t k = 1; k < kHoleReasons; ++k)

@@ -1,8 +1,11 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
+#include <memory>
 #include <opencv2/core/eigen.hpp>
-#include <span>
+#include <utility>
+#include <vector>
 
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/io/image.h"
@@ -12,7 +15,6 @@
 #include "pencilscan/surface/supported.h"
 #include "pencilscan/surface/untangle.h"
 #include "pencilscan/surface/vertex_color.h"
-#include "pencilscan/tracking/carried_surface.h"
 #include "pencilscan/tracking/steady.h"
 
 namespace pencilscan {
@@ -108,45 +110,27 @@ DepthResult depth_of(const Rig& rig, const Frame& frame, const PointResult& poin
                        options, points.background);
 }
 
-/// One closed surface of the depth maps: that of the moment before, moved, where it fits. `next`
-/// takes what stays the same until the surface is made from nothing again. Returns how far the
-/// vertices have come; nothing where the surface is new.
-std::vector<float> close_surface(const Rig& rig, const std::vector<ColorView>& views,
-                                 const ShapeOptions& options, bool is_handed_on,
-                                 const TrackedSurface* before, ShapeResult& result,
-                                 TrackedSurface& next) {
-  const std::vector<Silhouette> silhouettes = silhouettes_of(rig, views);
-  if (before != nullptr) {
-    if (auto carried =
-            carry_surface(rig, result.depth.maps, *before, options.fusion, silhouettes)) {
-      result.surface = std::move(carried->surface);
-      next.motion = carried->motion;
-      next.fit = before->fit;
-      next.age = before->age + 1;
-      return std::move(carried->traveled);
-    }
-  }
-  result.surface = close_depth(rig, result.depth.maps, options.fusion, silhouettes);
-  if (is_handed_on && !result.surface.mesh.faces.empty())
-    next.fit = surface_fit(rig, result.depth.maps, result.surface.mesh);
-  return {};
-}
-
-/// What rests is held still; the surface goes on to the next moment.
-void hand_on(const FrameLinks& links, const TrackedSurface* before, std::span<const float> traveled,
-             TrackedSurface next, SurfaceResult& surface) {
-  TriangleMesh& mesh = surface.mesh;
-  if (!traveled.empty()) {
-    const std::vector<Vec3> followed = mesh.vertices;
-    next.variance = steady_surface(*before, traveled, mesh);
-    surface.report.self_intersections = untangle(followed, mesh);
+/// The surface goes on to the next moment: where it rests, as the mean over moments has it. The
+/// frame's own result takes these vertices at its end (finish_shape()).
+void hand_on(const FrameLinks& links, std::vector<std::array<int, 3>> coarse_faces,
+             ShapeResult& result) {
+  const TriangleMesh& measured = result.surface.mesh;
+  TrackedSurface next;
+  next.coarse_faces = std::move(coarse_faces);
+  next.mesh.vertices = measured.vertices;
+  next.mesh.faces = measured.faces;
+  next.mesh.sigma = measured.sigma;
+  next.mesh.confidence = measured.confidence;
+  if (const auto before = links.before ? links.before() : nullptr) {
+    Steadied steadied =
+        steady_surface(*before, result.surface.report.spacing_mm, next.coarse_faces, next.mesh);
+    next.variance = std::move(steadied.variance);
+    next.motion = steadied.motion;
+    result.surface.report.self_intersections = untangle(measured.vertices, next.mesh);
+    result.steadied = next.mesh.vertices;
   } else {
-    next.variance = first_variance(mesh);
+    next.variance = first_variance(next.mesh);
   }
-  next.mesh.vertices = mesh.vertices;
-  next.mesh.faces = mesh.faces;
-  next.mesh.sigma = mesh.sigma;
-  next.mesh.confidence = mesh.confidence;
   links.hand_on(std::make_shared<const TrackedSurface>(std::move(next)));
 }
 
@@ -154,18 +138,13 @@ void hand_on(const FrameLinks& links, const TrackedSurface* before, std::span<co
 /// then follows it.
 void fuse(const Rig& rig, const PointResult& points, const std::vector<ColorView>& views,
           const ShapeOptions& options, const FrameLinks& links, ShapeResult& result) {
-  const std::shared_ptr<const TrackedSurface> before = links.before ? links.before() : nullptr;
   SurfaceResult& surface = result.surface;
-  TrackedSurface next;
-  const std::vector<float> traveled = close_surface(
-      rig, views, options, static_cast<bool>(links.hand_on), before.get(), result, next);
-  next.coarse_faces = surface.mesh.faces;
-  result.carried_since = next.age;
+  surface = close_depth(rig, result.depth.maps, options.fusion, silhouettes_of(rig, views));
+  std::vector<std::array<int, 3>> coarse_faces = surface.mesh.faces;
   guided_depth(rig, RayScene(surface.mesh), options.depth, points.background, result.depth);
   result.depth.lights.clear();
   follow_depth(rig, result.depth.maps, options.fusion, surface);
-  if (links.hand_on && !surface.mesh.faces.empty())
-    hand_on(links, before.get(), traveled, std::move(next), surface);
+  if (links.hand_on && !surface.mesh.faces.empty()) hand_on(links, std::move(coarse_faces), result);
   note_points_used(rig, points.points, result.depth.maps, surface);
 }
 
@@ -240,6 +219,7 @@ FrameResult finish_shape(const Rig& rig, FrameResult result, const FusionOptions
   ShapeResult& shape = result.shape;
   if (!shape.scene) return result;  // a surface of curves alone is finished
   if (result.points.is_on_surface) leave_unsupported(rig, result.points, shape);
+  if (!shape.steadied.empty()) shape.surface.mesh.vertices = std::move(shape.steadied);
   finish_surface(options, shape.surface);
   return result;
 }

@@ -18,7 +18,7 @@ namespace pencilscan {
 struct OutputOptions {
   FrameOptions frame;       ///< without meshes: points.ply and curves.ply alone, much faster
   bool refine_rig = false;  ///< correct the poses of the devices from the frames first
-  bool tracks = false;      ///< each frame's surface starts from that of the frame before
+  bool tracks = false;      ///< where a surface rests, it takes the mean over the frames before
   bool pictures = true;
   bool depth_maps = false;                ///< depth/ and sigma/ of every camera
   std::vector<std::string> mesh_formats;  ///< of obj, stl, glb: the closed mesh once more

@@ -33,8 +33,8 @@ struct ChainBroken : StageError {
 /// empty where nobody asks.
 [[nodiscard]] std::vector<std::string> chain_keys(const std::vector<std::string>& hashes);
 
-/// Frames of a sequence of which each starts from the surface of the one before. Chunks
-/// (shard.h) start from nothing, some frames before their first (kMemoryMoments). Surfaces are
+/// Frames of a sequence of which each is steadied by the surface of the one before. Chunks
+/// (shard.h) start anew, some frames before their first (kMemoryMoments). Surfaces are
 /// handed on between the threads that make frames, and lie in files, too, as long as a program that
 /// is killed would need them to go on where it was.
 class SurfaceChain {

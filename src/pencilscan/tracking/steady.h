@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <span>
 #include <vector>
 
@@ -12,17 +13,24 @@ namespace pencilscan {
 /// of a chunk, so that the mean is the same on both sides of its border.
 constexpr int kMemoryMoments = 4;
 
+/// What a moment's surface learns from the one before.
+struct Steadied {
+  std::vector<float> variance;  ///< per vertex: of its place along the normal; 0: not measured
+  RigidTransform motion;        ///< of the whole since the moment before
+};
+
 /// Removes the flicker of a surface that rests: there, noise differs from moment to moment while
 /// the surface does not. Each measured vertex moves along its normal towards the surface of the
 /// moment before, by a Kalman filter whose one state is its place (R. Kalman, A new approach to
-/// linear filtering and prediction problems, 1960). The process noise has two parts: how far the
-/// vertex has come, along the surface too (`traveled`, of the first vertices; those between them
-/// have come as far as these), and how far the vertices around it moved together beyond their
-/// noise. Parts that move stay as measured. Returns, for the next moment, the variance of each
-/// vertex's place (0: not measured).
-[[nodiscard]] std::vector<float> steady_surface(const TrackedSurface& before,
-                                                std::span<const float> traveled,
-                                                TriangleMesh& mesh);
+/// linear filtering and prediction problems, 1960). The process noise is the larger of how far
+/// the surface there has come, along itself too, as registration says (registration.h), and how far
+/// the vertices around it moved together, beyond their noise. Parts that move stay as measured, and
+/// so do vertices that lie farther than `spacing` from the registered surface: they are new.
+/// `spacing`: of the depth maps' nodes on the surface; same unit as the mesh. `coarse_faces`: of
+/// the mesh's first vertices, before its triangles were cut finer.
+[[nodiscard]] Steadied steady_surface(const TrackedSurface& before, double spacing,
+                                      std::span<const std::array<int, 3>> coarse_faces,
+                                      TriangleMesh& mesh);
 
 /// The variances of a surface without a moment before.
 [[nodiscard]] std::vector<float> first_variance(const TriangleMesh& mesh);

@@ -76,8 +76,6 @@ void write_tracked_surface(const std::filesystem::path& path, const TrackedSurfa
   file["variance"] = packed(surface.variance);
   file["rotation"] = std::vector<double>(R.data(), R.data() + R.size());
   file["translation"] = std::vector<double>(t.data(), t.data() + t.size());
-  file["fit"] = {surface.fit.unexplained, surface.fit.invented, surface.fit.slivers};
-  file["age"] = surface.age;
   const std::vector<std::uint8_t> bytes = json::to_cbor(file);
   write_atomically(
       path,
@@ -105,9 +103,6 @@ std::optional<TrackedSurface> read_tracked_surface(const std::filesystem::path& 
     const auto R = file.at("rotation").get<std::array<double, 9>>();
     const auto t = file.at("translation").get<std::array<double, 3>>();
     surface.motion = {Eigen::Map<const Mat3>(R.data()), Eigen::Map<const Vec3>(t.data())};
-    const auto fit = file.at("fit").get<std::array<double, 3>>();
-    surface.fit = {fit[0], fit[1], fit[2]};
-    surface.age = file.at("age").get<int>();
     return is_whole(surface) ? std::optional(std::move(surface)) : std::nullopt;
   } catch (const json::exception&) {
     return std::nullopt;

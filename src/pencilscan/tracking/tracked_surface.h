@@ -10,14 +10,6 @@
 
 namespace pencilscan {
 
-/// How well a closed surface fits the depth that it was made from. What it is when a surface is
-/// made from nothing is what a carried one is measured against.
-struct SurfaceFit {
-  double unexplained = 0;  ///< nodes that lie off the surface together with most around them
-  double invented = 0;     ///< share of the vertices that nothing measured
-  double slivers = 0;      ///< share of triangles that are nearly flat
-};
-
 /// What the surface of one moment hands on to the next. Lengths in footprints; coordinates are
 /// floats, so that a file gives back the same.
 struct TrackedSurface {
@@ -25,8 +17,6 @@ struct TrackedSurface {
   std::vector<std::array<int, 3>> coarse_faces;  ///< of its first vertices, before they were cut
   std::vector<float> variance;  ///< per vertex: of its place along the normal; 0: not measured
   RigidTransform motion;        ///< since the moment before
-  SurfaceFit fit;               ///< when it was last made from nothing
-  int age = 0;                  ///< moments since
 
   /// The mesh before its triangles were cut finer, where it is now.
   [[nodiscard]] TriangleMesh coarse() const;
