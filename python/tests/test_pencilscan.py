@@ -131,7 +131,9 @@ class PackageTest(unittest.TestCase):
 
         tenths = matplotlib.image.imread(self.scene.folder / "out/000000/depth/cam1.png") * 65535
         theirs = np.round(tenths).astype(int)
-        self.assertTrue((np.round(10 * np.nan_to_num(z)).astype(int) == theirs).mean() > 0.9999)
+        # Tenths of a millimetre; what lies between two of them to a float's rounding may be either.
+        tenths_off = np.abs(10 * np.nan_to_num(z).astype(float) - theirs)
+        self.assertLessEqual(tenths_off.max(), 0.5 + 1e-3)
         self.assertTrue((np.isfinite(z) == (theirs > 0)).all())
         self.assertGreater(np.isfinite(z).sum(), 10000)
         self.assertTrue((self.scene.result.depth["cam1"].sigma[np.isfinite(z)] > 0).all())
