@@ -8,7 +8,7 @@ interface SequenceJson {
   states: string[];
   columns: Record<string, (number | null)[]>;
   remarks: [number, string][];
-  events: {frame?: string; text?: string}[];
+  events: {frame?: string; last_frame?: string; text?: string}[];
   holes: {frame?: string; state?: string; reason?: string}[];
   cameras: string[];
   projectors: string[];
@@ -59,9 +59,9 @@ export class Sequence {
         const row = rows.get(frame ?? '') ?? -1;
         return {kind: 'hole', first: row, last: row, text: [state, reason].filter(Boolean).join(': ')};
       }),
-      ...json.events.map(({frame, text}): TimeMark => {
+      ...json.events.map(({frame, last_frame: lastFrame, text}): TimeMark => {
         const row = rows.get(frame ?? '') ?? -1;
-        return {kind: 'event', first: row, last: row, text: text ?? ''};
+        return {kind: 'event', first: row, last: rows.get(lastFrame ?? '') ?? row, text: text ?? ''};
       }),
     ].filter(({first}) => first >= 0));
   }

@@ -20,7 +20,7 @@ before(async () => {
   const sequence = JSON.parse(readFileSync(file));
   sequence.table[3] = {frame: '000003', state: 'failed'};
   sequence.holes = [{frame: '000003', state: 'failed', reason: 'cam1: black'}];
-  sequence.events = [{frame: '000002', text: 'from frame 000002: camera cam1 moved'}];
+  sequence.events = [{frame: '000002', last_frame: '000004', text: 'from frame 000002: camera cam1 moved'}];
   for (const row of sequence.table) delete row.warnings;
   sequence.table[1].warnings = sequence.table[2].warnings = ['too <b>dark</b>'];
   writeFileSync(file, JSON.stringify(sequence));
@@ -72,7 +72,7 @@ test('events, warnings and frames without a result are marks that lead to their 
   assert.equal(marks.length, 3, String(marks));
   const text = marks.join('\n');
   assert.match(text, /000001 – 000002\s+warning too <b>dark<\/b>/); // two neighbours, one mark
-  assert.match(text, /000002\s+event from frame 000002: camera cam1 moved/);
+  assert.match(text, /000002 – 000004\s+event from frame 000002: camera cam1 moved/);
   assert.match(text, /000003\s+no result failed: cam1: black/);
   assert.equal(await page.locator('.mark-track i').count(), 3);
   await page.click('.mark-list .event button');
