@@ -25,20 +25,11 @@
 namespace pencilscan {
 namespace {
 
-using ShownPoint = std::pair<const CurvePoint*, int>;  ///< and its family
-
-/// True where a curve of the family runs along a point within `reach`, px.
-bool is_beside(const CurvePoint& point, int family, float reach, const Places<ShownPoint>& curves) {
-  constexpr float kSameDirection = 0.9F;  // cosine, as of a predicted line (predicted_places.h)
-  bool found = false;
-  curves.around(point.position, reach, [&](const ShownPoint& shown) {
-    const CurvePoint& other = *shown.first;
-    found = found || (shown.second == family &&
-                      (other.position - point.position).squaredNorm() < reach * reach &&
-                      std::abs(other.normal.dot(point.normal)) > kSameDirection);
-  });
-  return found;
-}
+/// A point of a curve.
+struct CurvePlace {
+  std::size_t curve;
+  std::size_t point;
+};
 
 /// Guided matching in one camera.
 class CameraMatching {
@@ -95,7 +86,10 @@ class CameraMatching {
   }
   [[nodiscard]] std::vector<LineChain> still_missing();
   [[nodiscard]] Curve guess_of(const LineChain& chain) const;
-  [[nodiscard]] Places<ShownPoint> undecided_places() const;
+  [[nodiscard]] Places<CurvePlace> undecided_places() const;
+  [[nodiscard]] bool is_of_other(const CurvePlace& place, const LineName& name) const;
+  [[nodiscard]] bool is_rest_of_other(const CurvePoint& point, const LineName& name, float reach,
+                                      const Places<CurvePlace>& undecided) const;
   [[nodiscard]] std::size_t color_of(const LineName& name, int family) const;
 
   const Rig& rig_;
@@ -111,6 +105,7 @@ class CameraMatching {
   ObjectSpace space_;
   LocalSurface surface_;
   std::vector<char> shows_object_;          ///< per patch, 0: floors and walls
+  bool shows_background_ = false;           ///< some patch did
   bool has_dense_;                          ///< the surface does not rest on labels alone
   std::vector<MeasuredPoint> dense_;        ///< more points, not on the surface yet
   std::vector<LabeledRun> not_on_surface_;  ///< runs whose points it does not hold yet
@@ -190,6 +185,7 @@ void CameraMatching::grow_surface() {
     const double depth = 1 / static_cast<double>(patch.inverse_depth(patch.pixel));
     const Vec3 place = camera_.point_at_depth(patch.pixel.cast<double>(), depth);
     shows_object_[k] = space_.holds(place) ? 1 : 0;
+    shows_background_ = shows_background_ || shows_object_[k] == 0;
   }
 }
 
@@ -439,22 +435,50 @@ Curve CameraMatching::guess_of(const LineChain& chain) const {
 }
 
 /// The points of curves that have no name.
-Places<ShownPoint> CameraMatching::undecided_places() const {
+Places<CurvePlace> CameraMatching::undecided_places() const {
   const auto decided = decided_points();
-  Places<ShownPoint> places(camera_.width, camera_.height, 3);
+  Places<CurvePlace> places(camera_.width, camera_.height, 3);
   for (std::size_t c = 0; c < graph_.curves.size(); ++c) {
     const Curve& curve = graph_.curves[c];
     for (std::size_t i = 0; i < curve.points.size(); ++i) {
-      if (decided[c][i] == 0)
-        places.add(curve.points[i].position, {&curve.points[i], curve.family});
+      if (decided[c][i] == 0) places.add(curve.points[i].position, {c, i});
     }
   }
   return places;
 }
 
+/// True where a curve without a name may be of another line than the named one, on which it lies:
+/// its colour says so, or it may be of a wall, whose lines have all colours.
+bool CameraMatching::is_of_other(const CurvePlace& place, const LineName& name) const {
+  const Curve& curve = graph_.curves[place.curve];
+  const auto middle = static_cast<int>(place.point);
+  const int begin = std::max(0, middle - kPointsPerMeasurement / 2);
+  const int end =
+      std::min(static_cast<int>(curve.points.size()), middle + kPointsPerMeasurement / 2 + 1);
+  return shows_background_ || color_margin(curve, begin, end, name) < 0;
+}
+
+/// True where what the curves leave of the light may be left of a curve of another line, within
+/// `reach` px of a point.
+bool CameraMatching::is_rest_of_other(const CurvePoint& point, const LineName& name, float reach,
+                                      const Places<CurvePlace>& undecided) const {
+  constexpr float kSameDirection = 0.9F;  // cosine, as of a predicted line (predicted_places.h)
+  const int family = family_of(families_, name.pattern);
+  bool found = false;
+  undecided.around(point.position, reach, [&](const CurvePlace& place) {
+    const Curve& curve = graph_.curves[place.curve];
+    const CurvePoint& other = curve.points[place.point];
+    found = found ||
+            (curve.family == family &&
+             (other.position - point.position).squaredNorm() < reach * reach &&
+             std::abs(other.normal.dot(point.normal)) > kSameDirection && is_of_other(place, name));
+  });
+  return found;
+}
+
 void CameraMatching::find_missing() {
   if (unexplained_.empty()) return;
-  const Places<ShownPoint> undecided = undecided_places();
+  const Places<CurvePlace> undecided = undecided_places();
   RefineOptions fitting;
   fitting.min_points = options_.min_points;
   News news;
@@ -477,9 +501,8 @@ void CameraMatching::find_missing() {
                  options_.max_offset_lines * static_cast<double>(chain.front().spacing_px)));
     for (Curve& curve : fit_guess(image, std::move(guess), fitting)) {
       std::vector<char> good;
-      // On a curve that has no name, what is left of the image is left of that curve.
       for (const CurvePoint& p : curve.points)
-        good.push_back(!is_beside(p, family, reach, undecided) && fits(p, name, family));
+        good.push_back(fits(p, name, family) && !is_rest_of_other(p, name, reach, undecided));
       add_good(std::move(curve), good, name, news);
     }
   }

@@ -40,7 +40,8 @@ struct GuidedMatchingOptions {
 ///      support it,
 ///   3. fits a new curve where a line is predicted and no curve was found. The fit is to the image
 ///      that remains once the known curves are subtracted. What remains on a curve without a name
-///      is no line,
+///      is no line where that has another line's colour, or where a floor or wall is in the
+///      picture,
 ///   4. on a dense surface, tells lines apart that made one curve (merged_lines.h), and names
 ///      predicted lines that lie on curves of other projectors too (shared_curves.h).
 /// New curves are appended to `graphs`, new runs to `labeling`. The function returns, per graph,
