@@ -462,16 +462,15 @@ bool CameraMatching::is_of_other(const CurvePlace& place, const LineName& name) 
 /// `reach` px of a point.
 bool CameraMatching::is_rest_of_other(const CurvePoint& point, const LineName& name, float reach,
                                       const Places<CurvePlace>& undecided) const {
-  constexpr float kSameDirection = 0.9F;  // cosine, as of a predicted line (predicted_places.h)
   const int family = family_of(families_, name.pattern);
   bool found = false;
   undecided.around(point.position, reach, [&](const CurvePlace& place) {
     const Curve& curve = graph_.curves[place.curve];
     const CurvePoint& other = curve.points[place.point];
-    found = found ||
-            (curve.family == family &&
-             (other.position - point.position).squaredNorm() < reach * reach &&
-             std::abs(other.normal.dot(point.normal)) > kSameDirection && is_of_other(place, name));
+    found = found || (curve.family == family &&
+                      (other.position - point.position).squaredNorm() < reach * reach &&
+                      PredictedPlaces::have_same_direction(other.normal, point.normal) &&
+                      is_of_other(place, name));
   });
   return found;
 }

@@ -3,7 +3,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
-#include <map>
+#include <set>
 
 #include "pencilscan/detection/curve_rendering.h"
 #include "pencilscan/detection/profile_fit.h"
@@ -137,7 +137,7 @@ const PredictedPoint* MergedLines::expected_at(const CurvePoint& p, const LineNa
 std::vector<MergedLines::Neighbour> MergedLines::neighbours_of(const Curve& guess,
                                                                const LineName& name, float reach,
                                                                std::size_t& beside) const {
-  std::map<std::pair<std::size_t, int>, bool> points;  // in the order of their curves
+  std::set<std::pair<std::size_t, int>> points;  // of runs and their curves, in order
   for (const CurvePoint& g : guess.points) {
     bool any = false;
     named_.around(g.position, reach, [&](const NamedPoint& n) {
@@ -148,14 +148,14 @@ std::vector<MergedLines::Neighbour> MergedLines::neighbours_of(const Curve& gues
           (p.position - g.position).squaredNorm() > reach * reach ||
           std::abs(p.normal.dot(g.normal)) < kSideBySide)
         return;
-      points[{n.run, n.point}] = true;
+      points.insert({n.run, n.point});
       any = true;
     });
     beside += any ? 1 : 0;
   }
   std::vector<Neighbour> neighbours;
   std::pair<std::size_t, int> last{runs_.size(), 0};
-  for (const auto& [at, is_there] : points) {
+  for (const auto& at : points) {
     const LabeledRun& run = runs_[at.first];
     const Curve& curve = curves_[static_cast<std::size_t>(run.curve)];
     const CurvePoint& p = curve.points[static_cast<std::size_t>(at.second)];
@@ -203,13 +203,11 @@ MergedLines::Fit MergedLines::fit(const Curve& guess, const LineName& name) cons
     add_curve(moved(std::move(n.fitted), -corner), light);
   }
   const std::vector<VectorXf> amplitudes = amplitudes_along(light, line, expected);
-  std::vector<std::vector<Curve>> beside;
   for (std::size_t k = 0; k < neighbours.size(); ++k) {
     for (CurvePoint& q : neighbours[k].expected.points) {
       const VectorXf& there = amplitudes[nearest_to(q.position, line.points)];
       q.amplitude = std::max(0.F, there[static_cast<Index>(k) + 2]);
     }
-    beside.push_back({neighbours[k].expected});
     subtract_curve(neighbours[k].expected, light);
   }
   RefineOptions fitting;
@@ -218,11 +216,11 @@ MergedLines::Fit MergedLines::fit(const Curve& guess, const LineName& name) cons
   if (pieces.empty()) return result;
   // The curve pulled the surface, too: its line is not quite where it is expected.
   for (const Curve& piece : pieces) subtract_curve(piece, light);
-  for (std::size_t k = 0; k < neighbours.size(); ++k) {
-    add_curve(neighbours[k].expected, light);
-    std::vector<Curve> again = fit_guess(light, neighbours[k].expected, fitting);
-    if (!again.empty()) beside[k] = std::move(again);
-    for (const Curve& piece : beside[k]) subtract_curve(piece, light);
+  for (const Neighbour& n : neighbours) {
+    add_curve(n.expected, light);
+    std::vector<Curve> again = fit_guess(light, n.expected, fitting);
+    if (again.empty()) again.push_back(n.expected);
+    for (const Curve& piece : again) subtract_curve(piece, light);
   }
   for (const Curve& piece : pieces) add_curve(piece, light);
   for (Curve& piece : fit_guess(light, std::move(line), fitting))

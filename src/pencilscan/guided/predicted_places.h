@@ -41,16 +41,18 @@ class PredictedPlaces {
     places_.around(point.position, reach, [&](const PredictedPoint& p) {
       const Eigen::Vector2f way = point.position - p.position;
       const float along = std::abs(way.x() * p.normal.y() - way.y() * p.normal.x());
-      if (along > kAlong || !have_same_direction(point, p) ||
+      if (along > kAlong || !have_same_direction(point.normal, p.normal) ||
           point.width_px > kWidest * expected_width(p))
         return;
       visit(p, std::abs(way.dot(p.normal)));
     });
   }
 
-  [[nodiscard]] static bool have_same_direction(const CurvePoint& point, const PredictedPoint& p) {
+  /// Of curves or lines with such normals.
+  [[nodiscard]] static bool have_same_direction(const Eigen::Vector2f& normal,
+                                                const Eigen::Vector2f& other) {
     constexpr float kSameDirection = 0.9F;  // cosine
-    return std::abs(p.normal.dot(point.normal)) >= kSameDirection;
+    return std::abs(normal.dot(other)) >= kSameDirection;
   }
   /// The family's only line at a point of a curve; nothing where there is none, or more than one.
   [[nodiscard]] std::optional<LineAt> line_at(const CurvePoint& point, int family) const;

@@ -60,7 +60,7 @@ const CurvePoint* SharedLight::shown_at(const PredictedPoint& p, int family) con
     const float apart2 = (s.point->position - p.position).squaredNorm();
     if (s.family != family || apart2 >= best || !predicted_.is_near(std::sqrt(apart2), p) ||
         s.point->sigma_px > options_.max_sigma_px ||
-        !PredictedPlaces::have_same_direction(*s.point, p))
+        !PredictedPlaces::have_same_direction(s.point->normal, p.normal))
       return;
     best = apart2;
     nearest = s.point;
