@@ -6,6 +6,8 @@
 
 namespace pencilscan {
 
+inline constexpr double kLeastAngle = 0.02;  ///< rad between rays of a point that is used
+
 /// Point nearest to the rays of the present devices; nothing when they are parallel or it lies
 /// behind one.
 [[nodiscard]] std::optional<Vec3> triangulate(const BundleProblem& problem, const Track& track,

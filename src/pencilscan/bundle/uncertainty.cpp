@@ -144,8 +144,6 @@ std::vector<BundleDevice> drawn_devices(const BundleProblem& problem, const Cova
   return devices;
 }
 
-constexpr double kLeastAngle = 0.02;  ///< rad between the rays of a point of the volume
-
 /// Some points of the volume, seen without error by the rig as found.
 BundleProblem exact_points(const BundleProblem& problem) {
   constexpr std::size_t kPoints = 200;

@@ -130,7 +130,6 @@ class PoseInCapture {
 /// Each by itself; none of a device with few views.
 std::vector<CaptureMove> moves_in(const CalibrationResult& result, std::size_t capture,
                                   const std::vector<Track>& tracks) {
-  constexpr double kLeastAngle = 0.02;      // rad between rays of a point
   constexpr std::size_t kMostTracks = 300;  // know a pose to some hundredths of a pixel
   constexpr std::size_t kFewestTracks = 24;
   std::vector<CaptureMove> moves;

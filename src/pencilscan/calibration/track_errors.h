@@ -4,10 +4,9 @@
 #include <vector>
 
 #include "pencilscan/bundle/bundle.h"
+#include "pencilscan/bundle/triangulation.h"
 
 namespace pencilscan {
-
-inline constexpr double kLeastAngle = 0.02;  ///< rad between rays of a point that is used
 
 /// Errors of all views of a track but the hub at the point that fits them best.
 [[nodiscard]] std::vector<double> track_errors(const BundleProblem& problem, const Track& track,
