@@ -12,6 +12,10 @@ const char* to_string(WarningCode code) {
       return "wrong-picture";
     case WarningCode::kNoLines:
       return "no-lines";
+    case WarningCode::kLittleLight:
+      return "little-light";
+    case WarningCode::kLinesTooClose:
+      return "lines-too-close";
     case WarningCode::kSaturated:
       return "saturated";
     case WarningCode::kColorsFilledIn:

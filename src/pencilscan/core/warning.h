@@ -12,6 +12,8 @@ enum class WarningCode {
   kNoPicture,       ///< of a camera
   kWrongPicture,    ///< it was left out (pipeline/picture_check.h)
   kNoLines,         ///< a camera's picture shows none
+  kLittleLight,     ///< figure "signal_to_noise": of the lines that were found
+  kLinesTooClose,   ///< figure "line_spacing_px": at the volume's centre
   kSaturated,       ///< figure "share": of a camera's pixels
   kColorsFilledIn,  ///< pictures went through a mosaic and an interpolation
   kGamma,           ///< pictures are not coded as the rig says; figure "gamma" of the first camera

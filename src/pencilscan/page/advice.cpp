@@ -19,7 +19,7 @@ struct Known {
 };
 
 /// What to do about warnings, by their code (core/warning.h).
-constexpr std::array<Known, 18> kKnown = {{
+constexpr std::array<Known, 20> kKnown = {{
     {"saturated",
      "Close the aperture or shorten the exposure until the brightest lines stay below "
      "full scale, and capture again."},
@@ -29,6 +29,10 @@ constexpr std::array<Known, 18> kKnown = {{
     {"no-lines",
      "Check that the camera sees the object, that the projectors were on, and that there is light "
      "enough (exposure, aperture); compare its picture with the others below."},
+    {"little-light",
+     "Expose longer, open the aperture, or use brighter projectors; gain adds noise as well."},
+    {"lines-too-close",
+     "Join fewer pixels, take cameras of more pixels, or state a wider pitch in the rig."},
     {"colors-mix",
      "Give projectors whose lines overlap colours of different channels "
      "(blue/cyan against red/yellow), or state color_matrix in the rig."},
@@ -49,7 +53,7 @@ constexpr std::array<Known, 18> kKnown = {{
      "--frames says how far; put it back, or run reconstruct with --refine-rig."},
     {"views-disagree",
      "Compare the cameras' pictures below with where the cameras stand; if they are right, check "
-     "the calibration (rig check)."},
+     "the calibration (rig check). Of paint or ribs as fine as the lines, denser lines tell more."},
     {"curves-only",
      "Look at the hole map of each camera below: it says what kept "
      "depth from being found between the curves."},

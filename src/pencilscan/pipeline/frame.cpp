@@ -118,6 +118,9 @@ FrameResult measure_frame(const Rig& rig, const Frame& frame, PointResult lines,
   end_points(rig, frame, result.points);
   if (auto warning = little_light_warning(rig, result.points))
     result.points.warnings.push_back(std::move(*warning));
+  if (auto warning =
+          depth_warning(result.shape.depth.report.consistency.sigma_scale, result.points.warnings))
+    result.points.warnings.push_back(std::move(*warning));
   return count_motion(rig, std::move(result));
 }
 

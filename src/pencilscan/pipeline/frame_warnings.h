@@ -70,6 +70,11 @@ namespace pencilscan {
 /// That depths of different cameras are not those of one surface, by so many deviations.
 [[nodiscard]] Warning views_warning(double deviations);
 
+/// That depth maps of different cameras do not fit each other (ConsistencyReport::sigma_scale),
+/// where nothing that was `said` explains it.
+[[nodiscard]] std::optional<Warning> depth_warning(double deviations,
+                                                   std::span<const Warning> said);
+
 /// That the object moved while the shutters were open; lengths in the rig's unit.
 [[nodiscard]] Warning motion_warning(const Rig& rig, const ExposureMotion& motion);
 

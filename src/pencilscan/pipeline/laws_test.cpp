@@ -175,10 +175,10 @@ TEST_F(Laws, FilledInColoursGiveWhatTheirSamplesGive) {
 
 constexpr double kGamma = 2.2;
 
-Frame coded(const Frame& frame) {
+Frame coded(const Frame& frame, double gamma = kGamma) {
   Frame coded;
   coded.name = frame.name;
-  for (const cv::Mat& image : frame.images) cv::pow(image, 1 / kGamma, coded.images.emplace_back());
+  for (const cv::Mat& image : frame.images) cv::pow(image, 1 / gamma, coded.images.emplace_back());
   return coded;
 }
 
@@ -237,6 +237,21 @@ TEST_F(Laws, AGammaIsNamedByFewCrossingsOfManyCameras) {
       EXPECT_NEAR(warning->figures.front().second, kGamma, 0.3);
     }
   }
+}
+
+/// No camera codes light with a gamma below one: paint beside the crossings may look like that.
+TEST_F(Laws, NoGammaBelowOneIsNamed) {
+  const Frame frame = coded(*frame_, 0.55);
+  const PointResult points = sample::labelled_points(*rig_, frame);
+  std::vector<double> logs;
+  for (std::size_t c = 0; c < points.graphs.size(); ++c) {
+    const auto more = log_gammas_at_crossings(points.graphs[c], frame.images[c]);
+    logs.insert(logs.end(), more.begin(), more.end());
+  }
+  const auto trace = gamma_of_crossings(logs);
+  ASSERT_TRUE(trace);
+  ASSERT_LT(trace->gamma, 0.75);
+  EXPECT_FALSE(gamma_warning(*rig_, frame, points.detections, points.graphs));
 }
 
 TEST_F(Laws, ABlackLevelAboveThePictureIsNamed) {

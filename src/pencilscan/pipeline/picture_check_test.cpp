@@ -264,8 +264,7 @@ TEST_F(PictureCheck, LightThatIsTooLittleIsNamed) {
   };
   const auto light = [&](const Frame& of) {
     for (const Warning& warning : reconstruct_frame(*rig_, of).points.warnings)
-      if (warning.code == WarningCode::kNoLines && warning.device.empty())
-        return warning.figures.at(0).second;
+      if (warning.code == WarningCode::kLittleLight) return warning.figures.at(0).second;
     return 0.0;
   };
   EXPECT_EQ(light(*frame_), 0);
@@ -285,9 +284,10 @@ TEST_F(PictureCheck, LightThatIsTooLittleIsNamed) {
 }
 
 TEST_F(PictureCheck, LightIsJudgedByLinesThatDoNotOverlap) {
-  const auto said = [](const Rig& rig, double ratio, double width_px) {
+  const auto said = [](const Rig& rig, double ratio, double width_px, float amplitude = 0.03F) {
     PointResult result;
     CurvePoint point;
+    point.amplitude = amplitude;
     point.width_px = static_cast<float>(width_px);
     point.sigma_px = static_cast<float>(std::sqrt(2 * width_px * std::numbers::inv_sqrtpi) / ratio);
     Curve curve;
@@ -300,6 +300,7 @@ TEST_F(PictureCheck, LightIsJudgedByLinesThatDoNotOverlap) {
   EXPECT_THAT(said(*rig_, 6, 1.1), HasSubstr("light is too little"));
   EXPECT_THAT(said(*rig_, 9, 1.1), IsEmpty());
   EXPECT_THAT(said(*rig_, 6, 4), IsEmpty());
+  EXPECT_THAT(said(*rig_, 6, 1.1, 0.3F), IsEmpty());  // no sensor has such noise
   Rig dense = *rig_;
   for (Projector& projector : dense.projectors)
     for (LinePattern& pattern : projector.patterns) pattern.pitch_px /= 4;
@@ -365,6 +366,21 @@ TEST_F(PictureCheck, ACameraThatIsLeftOutGivesNoColor) {
   ASSERT_FALSE(colors.empty());
   const auto is_green = [](const std::array<float, 3>& c) { return c[1] > 1.05F * c[0]; };
   EXPECT_EQ(std::count_if(colors.begin(), colors.end(), is_green), 0);
+}
+
+TEST(DepthWarning, IsSaidWhereNothingElseExplainsIt) {
+  EXPECT_FALSE(depth_warning(2.4, {}));
+  const auto warning = depth_warning(4.3, {});
+  ASSERT_TRUE(warning);
+  EXPECT_EQ(warning->code, WarningCode::kViewsDisagree);
+  EXPECT_THAT(warning->text, HasSubstr("lie apart by 4.3 times"));
+  std::vector<Warning> said(1);
+  said[0].code = WarningCode::kSaturated;
+  EXPECT_TRUE(depth_warning(4.3, said));
+  for (const WarningCode code : {WarningCode::kRigIsOff, WarningCode::kViewsDisagree}) {
+    said[0].code = code;
+    EXPECT_FALSE(depth_warning(4.3, said));
+  }
 }
 
 TEST(FewNames, IsSaidBelowATenthOfTheLines) {
