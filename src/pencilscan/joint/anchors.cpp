@@ -86,26 +86,26 @@ bool is_ambiguous_group(const LabelledPieces& pieces, const std::vector<Decision
   return false;
 }
 
-void leave_unanchored(const LabelledPieces& pieces, std::span<const NextPiece> beside,
-                      const JointOptions& options, std::vector<Decision>& decisions) {
-  constexpr float kPerNeighbor = 3;  // what one adds to the margin, about
+Anchors find_anchors(const LabelledPieces& pieces, std::span<const NextPiece> beside,
+                     const JointOptions& options, const std::vector<Decision>& decisions) {
   const auto label_of = [&](int p) -> const PieceLabel* {
     const auto k = static_cast<std::size_t>(p);
     return decisions[k].label < 0 ? nullptr
                                   : &pieces.labels[k][static_cast<std::size_t>(decisions[k].label)];
   };
-  std::vector<std::vector<int>> linked(decisions.size());
-  std::vector<int> neighbors(decisions.size(), 0);
+  Anchors anchors;
+  anchors.linked.resize(decisions.size());
+  anchors.neighbors.resize(decisions.size(), 0);
   const auto link = [&](int a, int b, int lines_apart) {
     const PieceLabel* la = label_of(a);
     const PieceLabel* lb = label_of(b);
     if (la == nullptr || lb == nullptr || !(la->pattern == lb->pattern) ||
         std::abs(la->line - lb->line) != lines_apart)
       return;
-    linked[static_cast<std::size_t>(a)].push_back(b);
-    linked[static_cast<std::size_t>(b)].push_back(a);
-    neighbors[static_cast<std::size_t>(a)] += lines_apart;
-    neighbors[static_cast<std::size_t>(b)] += lines_apart;
+    anchors.linked[static_cast<std::size_t>(a)].push_back(b);
+    anchors.linked[static_cast<std::size_t>(b)].push_back(a);
+    anchors.neighbors[static_cast<std::size_t>(a)] += lines_apart;
+    anchors.neighbors[static_cast<std::size_t>(b)] += lines_apart;
   };
   for (const NextPiece& next : beside) link(next.a, next.b, 1);
   for (const auto& [a, b] : pieces.graph.continuations) link(a, b, 0);
@@ -118,12 +118,18 @@ void leave_unanchored(const LabelledPieces& pieces, std::span<const NextPiece> b
     if (la == nullptr || lb == nullptr || crossing_cost(*la, *lb, x) >= 0) continue;
     is_crossed[static_cast<std::size_t>(x.a)] = is_crossed[static_cast<std::size_t>(x.b)] = 1;
   }
-  const std::vector<char> is_held =
-      held_pieces(pieces.graph, linked, std::move(is_crossed), [&](std::span<const int> group) {
-        return is_ambiguous_group(pieces, decisions, options, group);
-      });
+  anchors.is_held = held_pieces(pieces.graph, anchors.linked, std::move(is_crossed),
+                                [&](std::span<const int> group) {
+                                  return is_ambiguous_group(pieces, decisions, options, group);
+                                });
+  return anchors;
+}
+
+void leave_unanchored(const Anchors& anchors, std::vector<Decision>& decisions) {
+  constexpr float kPerNeighbor = 3;  // what one adds to the margin, about
   for (std::size_t p = 0; p < decisions.size(); ++p) {
-    if (is_held[p] == 0) decisions[p].margin -= kPerNeighbor * static_cast<float>(neighbors[p]);
+    if (anchors.is_held[p] == 0)
+      decisions[p].margin -= kPerNeighbor * static_cast<float>(anchors.neighbors[p]);
   }
 }
 

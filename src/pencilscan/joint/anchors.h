@@ -30,10 +30,20 @@ namespace pencilscan {
                                       const std::vector<Decision>& decisions,
                                       const JointOptions& options, std::span<const int> group);
 
+/// What holds the lines of pieces.
+struct Anchors {
+  std::vector<std::vector<int>> linked;  ///< per piece: as held_pieces() takes them
+  std::vector<int> neighbors;            ///< per piece: how many beside it vouch for its line
+  std::vector<char> is_held;             ///< per piece
+};
+
+/// `beside`: the neighbours, as next_pieces() gives them.
+[[nodiscard]] Anchors find_anchors(const LabelledPieces& pieces, std::span<const NextPiece> beside,
+                                   const JointOptions& options,
+                                   const std::vector<Decision>& decisions);
+
 /// Takes what neighbours said off the margins of pieces that no crossings hold. Pieces side by side
-/// vouch for each other, and they do so for the lines of a wrong projector, too. `beside`: the
-/// neighbours, as next_pieces() gives them.
-void leave_unanchored(const LabelledPieces& pieces, std::span<const NextPiece> beside,
-                      const JointOptions& options, std::vector<Decision>& decisions);
+/// vouch for each other, and they do so for the lines of a wrong projector, too.
+void leave_unanchored(const Anchors& anchors, std::vector<Decision>& decisions);
 
 }  // namespace pencilscan

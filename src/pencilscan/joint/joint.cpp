@@ -13,6 +13,7 @@
 #include "pencilscan/joint/next_lines.h"
 #include "pencilscan/joint/other_views.h"
 #include "pencilscan/joint/piece_labels.h"
+#include "pencilscan/joint/room_readings.h"
 #include "pencilscan/joint/stretches.h"
 #include "pencilscan/joint/surroundings.h"
 
@@ -287,10 +288,12 @@ Labeling solve_joint(const Rig& rig, const std::vector<ColorFamily>& families,
   });
   std::vector<std::vector<Decision>> decisions(graphs.size());
   std::vector<PieceBeliefs> beliefs(graphs.size());
+  std::vector<std::vector<std::vector<float>>> views(graphs.size());  // of cameras with a room
   for (int pass = 0; pass < options.passes; ++pass) {
     std::vector<PieceBeliefs> next(graphs.size());
     parallel_for(graphs.size(), [&](std::size_t g) {
       auto evidence = others.costs(g, beliefs);
+      if (pieces[g].shows_room) views[g] = evidence;
       if (surroundings[g]) add(surroundings[g]->costs(beliefs[g]), evidence);
       set_unary(pieces[g], evidence, energies[g]);
       // Order and code reach a piece over as many neighbours as the code is long, and more.
@@ -305,13 +308,17 @@ Labeling solve_joint(const Rig& rig, const std::vector<ColorFamily>& families,
   }
   const ObjectSpace space(rig);
   parallel_for(graphs.size(), [&](std::size_t g) {
+    const Camera& camera = rig.camera(graphs[g].camera);
     if (lacks_crossings(pieces[g].graph)) {
       ask_stretches(rig, graphs[g], pieces[g], beside[g], options, energies[g], decisions[g]);
       leave_periodic(rig, pieces[g], energies[g], decisions[g]);
     } else {
-      leave_unanchored(pieces[g], beside[g], options, decisions[g]);
+      const Anchors anchors = find_anchors(pieces[g], beside[g], options, decisions[g]);
+      leave_unanchored(anchors, decisions[g]);
+      if (pieces[g].shows_room)
+        give_to_room(camera, pieces[g], anchors, views[g], space, options, decisions[g]);
     }
-    leave_ghosts_before_room(rig.camera(graphs[g].camera), pieces[g], space, options, decisions[g]);
+    leave_ghosts_before_room(camera, pieces[g], space, options, decisions[g]);
   });
   Labeling labeling;
   labeling.runs.resize(rig.cameras.size());

@@ -356,7 +356,8 @@ LabelledPieces possible_labels(const Rig& rig, const std::vector<ColorFamily>& f
     }
   }
   result.meets_volume = meets_volume(camera, volume, graph, result.graph);
-  const LabelReach reach(camera, volume, shows_room(camera, graph, result));
+  result.shows_room = shows_room(camera, graph, result);
+  const LabelReach reach(camera, volume, result.shows_room);
   result.inverse_depth_range = static_cast<float>(reach.inverse_depth_range());
   for (const Projector& projector : rig.projectors) {
     const Vec3 light = camera.device_from_world * projector.center();

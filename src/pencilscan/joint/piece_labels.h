@@ -49,6 +49,7 @@ struct LabelledPieces {
   /// free to choose.
   std::vector<std::vector<float>> scores;
   std::vector<char> meets_volume;       ///< per piece, whether the ray through its middle does
+  bool shows_room = false;              ///< the camera does, around the object
   float inverse_depth_range = 1;        ///< of where labels are sought
   std::vector<Eigen::Vector3f> lights;  ///< per projector: its centre in the camera's frame
 };
