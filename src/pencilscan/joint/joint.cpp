@@ -213,6 +213,14 @@ void ask_stretches(const Rig& rig, const GridGraph& graph, const LabelledPieces&
   }
 }
 
+/// What is believed of pieces that something holds; nothing of the others.
+PieceBeliefs of_held(PieceBeliefs beliefs, const Anchors& anchors) {
+  for (std::size_t p = 0; p < beliefs.size(); ++p) {
+    if (anchors.is_held[p] == 0) std::fill(beliefs[p].begin(), beliefs[p].end(), 0.F);
+  }
+  return beliefs;
+}
+
 /// Share of points that are right at this margin: a logistic fit over five rendered scenes (bunny
 /// with and without texture, hand, two balls, cube); benchmarks/accuracy prints the comparison.
 float confidence_of(float margin) { return 1 / (1 + std::exp(0.13F - 0.52F * margin)); }
@@ -315,8 +323,10 @@ Labeling solve_joint(const Rig& rig, const std::vector<ColorFamily>& families,
     } else {
       const Anchors anchors = find_anchors(pieces[g], beside[g], options, decisions[g]);
       leave_unanchored(anchors, decisions[g]);
-      if (pieces[g].shows_room)
+      if (pieces[g].shows_room) {
+        add(surroundings[g]->costs(of_held(beliefs[g], anchors)), views[g]);
         give_to_room(camera, pieces[g], anchors, views[g], space, options, decisions[g]);
+      }
     }
     leave_ghosts_before_room(camera, pieces[g], space, options, decisions[g]);
   });

@@ -29,11 +29,11 @@ struct ReadingCost {
 class RoomReadings {
  public:
   RoomReadings(const Camera& camera, const LabelledPieces& pieces,
-               const std::vector<std::vector<float>>& views, const ObjectSpace& space,
+               const std::vector<std::vector<float>>& known, const ObjectSpace& space,
                const JointOptions& options, std::vector<Decision>& decisions)
       : world_from_camera_(camera.device_from_world.inverse()),
         pieces_(pieces),
-        views_(views),
+        known_(known),
         space_(space),
         wrong_color_(static_cast<float>(options.max_color_cost)),
         decisions_(decisions) {}
@@ -76,7 +76,7 @@ class RoomReadings {
     return pieces_.labels[index(p)][k];
   }
   [[nodiscard]] float cost(int p, std::size_t k) const {
-    return label(p, k).cost + views_[index(p)][k];
+    return label(p, k).cost + known_[index(p)][k];
   }
   [[nodiscard]] bool holds(int p, const PieceLabel& label) const {
     return space_.holds(world_from_camera_ * label.place(pieces_.graph.pieces[index(p)].middle));
@@ -109,7 +109,7 @@ class RoomReadings {
 
   RigidTransform world_from_camera_;
   const LabelledPieces& pieces_;
-  const std::vector<std::vector<float>>& views_;
+  const std::vector<std::vector<float>>& known_;
   const ObjectSpace& space_;
   float wrong_color_;
   std::vector<Decision>& decisions_;
@@ -118,9 +118,9 @@ class RoomReadings {
 }  // namespace
 
 void give_to_room(const Camera& camera, const LabelledPieces& pieces, const Anchors& anchors,
-                  const std::vector<std::vector<float>>& views, const ObjectSpace& space,
+                  const std::vector<std::vector<float>>& known, const ObjectSpace& space,
                   const JointOptions& options, std::vector<Decision>& decisions) {
-  RoomReadings readings(camera, pieces, views, space, options, decisions);
+  RoomReadings readings(camera, pieces, known, space, options, decisions);
   std::vector<char> is_seen = anchors.is_held;
   for (std::size_t first = 0; first < decisions.size(); ++first) {
     if (is_seen[first] != 0 || decisions[first].label < 0) continue;

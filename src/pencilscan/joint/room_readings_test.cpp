@@ -32,7 +32,7 @@ struct LinesBeforeRoom {
         label.q = {0, 0, 1 / (distance * static_cast<float>(1 + k))};
       }
       pieces.labels.push_back(labels);
-      views.emplace_back(2, 0.F);
+      known.emplace_back(2, 0.F);
     }
     decisions.assign(4, Decision{0, kMargin});
     anchors.linked = {{1}, {0, 2}, {1, 3}, {2}};
@@ -42,7 +42,7 @@ struct LinesBeforeRoom {
 
   [[nodiscard]] std::vector<Decision> decided() const {
     std::vector<Decision> result = decisions;
-    give_to_room(rig.camera(0), pieces, anchors, views, ObjectSpace(rig), {}, result);
+    give_to_room(rig.camera(0), pieces, anchors, known, ObjectSpace(rig), {}, result);
     return result;
   }
   [[nodiscard]] std::vector<int> labels() const {
@@ -53,7 +53,7 @@ struct LinesBeforeRoom {
 
   Rig rig = sample::small_rig(240, 200, 110);
   LabelledPieces pieces;
-  std::vector<std::vector<float>> views;
+  std::vector<std::vector<float>> known;
   std::vector<Decision> decisions;
   Anchors anchors;
 };
@@ -64,10 +64,10 @@ TEST(RoomReadings, LinesThatNothingHoldsAreTheRooms) {
   for (const Decision& decision : lines.decided()) EXPECT_EQ(decision.margin, kMargin);
   // A piece that cannot lie in the room costs too much.
   lines.pieces.labels[2].pop_back();
-  lines.views[2].pop_back();
+  lines.known[2].pop_back();
   EXPECT_EQ(lines.labels(), std::vector<int>({0, 0, 0, 0}));
   // It does not where others prefer the room. It is no longer sure then.
-  lines.views[0][1] = -3;
+  lines.known[0][1] = -3;
   EXPECT_EQ(lines.labels(), std::vector<int>({1, 1, 0, 1}));
   EXPECT_EQ(lines.decided()[2].margin, 1);
 }
@@ -79,14 +79,14 @@ TEST(RoomReadings, LinesThatCrossingsHoldAreNot) {
   EXPECT_EQ(lines.decided()[1].margin, kMargin);
 }
 
-TEST(RoomReadings, AreAsSureAsOtherCamerasSay) {
+TEST(RoomReadings, AreAsSureAsOthersSay) {
   LinesBeforeRoom lines;
-  lines.views[1][0] = -3;
+  lines.known[1][0] = -3;
   for (const Decision& decision : lines.decided()) {
     EXPECT_EQ(decision.label, 0);
     EXPECT_EQ(decision.margin, 3);
   }
-  for (auto& of_piece : lines.views) of_piece[0] = -3;
+  for (auto& of_piece : lines.known) of_piece[0] = -3;
   EXPECT_EQ(lines.decided()[1].margin, kMargin);
 }
 
