@@ -217,6 +217,25 @@ TEST(FindRidgels, LinesThatTheRigSaysAreWideAreNotCutBetweenTwoSizes) {
   EXPECT_GT(share_of_half_size(7.6), 0.9);
 }
 
+TEST(FindRidgels, ALineGoesOnWhereTheSurfaceTurnsAwayAndItIsWiderAndDimmer) {
+  const cv::Size size(200, 240);
+  const int turn = size.height / 2;  // the row
+  cv::Mat image = blurred_box(12, 1, 0, size, 0.005);
+  cv::Mat turned = 0.4 * blurred_box(26, 1, 0, size, 0.005);
+  turned.rowRange(turn, size.height).copyTo(image.rowRange(turn, size.height));
+  RidgeOptions options;
+  options.usual_px = 12;
+  int middle = 0;
+  int edge = 0;
+  for (const Ridgel& r : find_ridgels(image, options)) {
+    if (r.y < static_cast<float>(turn + 8) || r.y > static_cast<float>(turn + 48)) continue;
+    (std::abs(r.x - 0.5F * static_cast<float>(size.width)) < 4 ? middle : edge) +=
+        static_cast<int>(r.scale);
+  }
+  EXPECT_GT(middle, 30);  // of 40 rows
+  EXPECT_LT(edge, 5);
+}
+
 // From lines that are as narrow as a picture can show them to those that are ten times as wide as
 // usual, sharp or without any flat top.
 TEST(RefineCurves, ALineOfAnyWidthIsOneCurveInItsMiddle) {

@@ -22,6 +22,10 @@ constexpr float kBeyondEnd = 10;
 constexpr float kParallelCosine = 0.94F;
 /// A wide line is about as bright in its middle as at its edges; between two lines it is dark.
 constexpr float kFlatTop = 0.88F;
+/// Of the height of a line that is 1.7 to 2.4 s wide, the filter answers .28 (2 a phi(a) / s^2, a
+/// half the width in s = 1.3 px; of wider ones less). Chosen: half of the height that this tells
+/// of.
+constexpr float kHeightPerResponse = 0.5F / 0.28F;
 /// Of the contrast: a finer ridgel that is weaker is noise. Where two neighbouring sizes show a
 /// line equally well, the finer one has .7 of the coarser one's contrast; three sizes apart a
 /// third.
@@ -76,10 +80,13 @@ class FinerLook {
     around(wide, kBeyondEnd, [&](const Ridgel& f, std::size_t, float across, float along) {
       if (is_noise(f, wide)) return true;
       // The edges of a wide line have half its contrast. What has more is a line of its own, and
-      // this one what the coarser filter sees of it, or of its end.
+      // this one what the coarser filter sees of it, or of its end; but a line that has light here
+      // goes on, wider and dimmer.
       const bool is_parallel = are_parallel(f, wide);
-      if (is_parallel && f.response >= wide.response) return result = false;
-      if (along > kAlong * unit_) return true;
+      const bool is_beside = along <= kAlong * unit_;
+      if (is_parallel && f.response >= wide.response && (is_beside || !has_light(wide, middle)))
+        return result = false;
+      if (!is_beside) return true;
       const bool is_near = across < kSameLine * unit_;
       if (is_parallel) {
         result = (!is_near || strength(f) < strength(wide)) &&
@@ -107,6 +114,19 @@ class FinerLook {
   [[nodiscard]] bool is_spent(std::size_t i) const { return is_spent_[i] != 0; }
 
  private:
+  /// Whether the light at a wide ridgel, `middle`, exceeds that beside its line as its response
+  /// says. Beyond the end of a line there is none.
+  [[nodiscard]] bool has_light(const Ridgel& wide, float middle) const {
+    float beside = 0;
+    for (const float side : {-kLineReach, kLineReach}) {
+      Ridgel at = wide;
+      at.x += side * unit_ * wide.nx;
+      at.y += side * unit_ * wide.ny;
+      beside += 0.5F * value_at(image_, unit_, at);
+    }
+    return middle - beside >= kHeightPerResponse * wide.response;
+  }
+
   static bool is_noise(const Ridgel& f, const Ridgel& wide) {
     return f.response < kNoiseShare * wide.response;
   }
