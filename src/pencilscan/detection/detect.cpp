@@ -65,6 +65,9 @@ CameraDetection detect_curves(const Camera& camera, const Rig& rig,
     refine.sizes = std::max(refine.sizes, sizes_of(ridgels));
     curves = refine_curves(presence, std::move(curves), refine);
     curves_of[f] = without_ghosts(presence, std::move(curves), refine.min_points);
+    const cv::Mat samples = presence_samples(camera, result.unmixing, families[f]);
+    if (!samples.empty())
+      curves_of[f] = refit_to_samples(presence, samples(area), std::move(curves_of[f]), refine);
     // Dark outside the lit area.
     result.presence[f] = cv::Mat(image.size(), CV_32F, cv::Scalar(0));
     presence.copyTo(result.presence[f](area));

@@ -13,6 +13,12 @@ constexpr float kEdge = 0.5F;        ///< px: pixel, lens and projector blur tog
 constexpr float kBluntest = 0.5F;    ///< edge, of the width: beyond, no box is left
 constexpr float kPi2 = 9.8696F;
 
+constexpr int kMaxIterations = 8;  ///< most fits need two, those of dense lines all
+constexpr float kSmallMove = 0.01F;
+constexpr float kSmallWidening = 0.05F;
+constexpr float kMinHeight = 1e-5F;
+constexpr float kMaxOffset = 1.6F;
+
 PENCILSCAN_INLINE void select(const IntLanes& mask, const Lanes& value, Lanes& result) {
   result = mask ? value : result;
 }
@@ -272,10 +278,6 @@ void add_line_profile(float amplitude, float width, float first, float step, int
 
 PENCILSCAN_CLONES
 void fit_profiles(const ProfileBatch& batch, ProfileFits& fits) {
-  constexpr int kMaxIterations = 8;  // most need two, those of dense lines all
-  constexpr float kSmallMove = 0.01F;
-  constexpr float kSmallWidening = 0.05F;
-  constexpr float kMinHeight = 1e-5F;
   const Lanes zero{};
   const Background background(batch.half);
   std::array<Lanes, kProfileSize> measured = batch.value;
@@ -322,12 +324,110 @@ void fit_profiles(const ProfileBatch& batch, ProfileFits& fits) {
                               (widened * widened < kSmallWidening * kSmallWidening);
     is_open &= ~is_small & fits.good;
   }
-  constexpr float kMaxOffset = 1.6F;
   fits.amplitude = now.height;
   fits.offset = now.center;
   fits.width = now.width;
   fits.good &= (now.center * now.center < kMaxOffset * kMaxOffset) & (fits.offset_gain > 0) &
                (fits.offset_gain < 1e30F);
+}
+
+PENCILSCAN_CLONES
+void fit_sampled_profiles(const SampledProfiles& profiles, ProfileFits& fits) {
+  constexpr std::size_t kAll = kProfileUnknowns + 2;  // background first, the centre last
+  constexpr float kLeast = 1e-6F;                     // of the background, where no sample tells it
+  const Lanes zero{};
+  Parameters now{profiles.amplitude, zero, profiles.width, zero};
+  now.height = now.height > 1e-4F ? now.height : zero + 1e-4F;
+  IntLanes is_open = zero == zero;
+  fits = ProfileFits();
+  fits.good = is_open;
+  for (int iteration = 0; iteration < kMaxIterations && any(is_open); ++iteration) {
+    LineShape<Lanes> shape;
+    IntLanes is_blunt;
+    make_shape(now.width, shape, is_blunt);
+    const Lanes half_per_width = 3 * now.width / shape.half;
+    const Lanes scale_change = -2 * shape.rate * shape.tail / ((1 - shape.tail) * (1 + shape.tail));
+    const Lanes inverse_width = 1 / now.width;
+    std::array<std::array<Lanes, kAll>, kAll> m{};
+    std::array<Lanes, kAll> x{};
+    Lanes square = profiles.scatter;
+    for (std::size_t s = 0; s < kProfileSize; ++s) {
+      const Lanes& o = profiles.offset[s];
+      const Lanes& w = profiles.weight[s];
+      const Lanes d = o - now.center;
+      Lanes e;
+      Lanes rising;
+      Lanes falling;
+      exponential(-shape.rate * d, e);
+      steps_at(shape, e, rising, falling);
+      const Lanes f = shape.scale * (rising - falling);
+      const Lanes steep = shape.scale * shape.rate;
+      const Lanes rise = steep * rising * (1 - rising);
+      const Lanes fall = steep * falling * (1 - falling);
+      const Lanes f_d = rise - fall;
+      const Lanes f_width =
+          is_blunt ? -d * inverse_width * f_d : (rise + fall + scale_change * f) * half_per_width;
+      const Lanes light = 1 + now.tilt * d;
+      const std::array<Lanes, kAll> J = {zero + 1,        o,     light * f,
+                                         light * f_width, d * f, -light * f_d};
+      const Lanes left = profiles.value[s] - now.height * J[2];
+      square += w * left * left;
+      for (std::size_t j = 0; j < kAll; ++j) {
+        x[j] += w * J[j] * left;
+        for (std::size_t k = j; k < kAll; ++k) m[j][k] += w * J[j] * J[k];
+      }
+    }
+    m[2 + kWidth][2 + kWidth] += kWidthPrior;
+    x[2 + kWidth] += kWidthPrior * now.height * (profiles.width - now.width);
+    m[2 + kTilt][2 + kTilt] += kTiltPrior;
+    x[2 + kTilt] -= kTiltPrior * now.height * now.tilt;
+    m[0][0] += kLeast;
+    m[1][1] += kLeast;
+    for (std::size_t i = 0; i < kAll; ++i) {
+      const Lanes inverse = 1 / m[i][i];
+      // What this unknown explains of what is left.
+      square -= x[i] * x[i] * inverse;
+      for (std::size_t j = i + 1; j < kAll; ++j) {
+        const Lanes factor = m[i][j] * inverse;
+        for (std::size_t k = j; k < kAll; ++k) m[j][k] -= factor * m[i][k];
+        x[j] -= factor * x[i];
+      }
+      m[i][i] = inverse;
+    }
+    const Lanes center_variance = m[kAll - 1][kAll - 1];
+    for (std::size_t i = kAll; i-- > 0;) {
+      for (std::size_t j = i + 1; j < kAll; ++j) x[i] -= m[i][j] * x[j];
+      x[i] *= m[i][i];
+    }
+    const Lanes freedom = profiles.samples - static_cast<float>(kAll);
+    select(is_open, (square > 0 ? square : zero) / (freedom > 1 ? freedom : zero + 1),
+           fits.residual2);
+    select(is_open, center_variance / (now.height * now.height), fits.offset_gain);
+    Lanes moved = x[2 + kCenter] / now.height;
+    Lanes widened = x[2 + kWidth] / now.height;
+    clamp(-0.7F, 0.7F, moved);
+    clamp(-0.5F, 0.5F, widened);
+    Parameters next = now;
+    next.tilt += x[2 + kTilt] / now.height;
+    clamp(-0.15F, 0.15F, next.tilt);
+    next.height += x[2 + kHeight];
+    next.center += moved;
+    next.width += widened;
+    clamp(kMinLineWidth, kMaxLineWidth, next.width);
+    select(is_open, next.height, now.height);
+    select(is_open, next.center, now.center);
+    select(is_open, next.width, now.width);
+    select(is_open, next.tilt, now.tilt);
+    fits.good &= now.height > kMinHeight;
+    const IntLanes is_small = (moved * moved < kSmallMove * kSmallMove) &
+                              (widened * widened < kSmallWidening * kSmallWidening);
+    is_open &= ~is_small & fits.good;
+  }
+  fits.amplitude = now.height;
+  fits.offset = now.center;
+  fits.width = now.width;
+  fits.good &= (now.center * now.center < kMaxOffset * kMaxOffset) & (fits.offset_gain > 0) &
+               (fits.offset_gain < 1e30F) & (profiles.samples > static_cast<float>(kAll));
 }
 
 }  // namespace pencilscan

@@ -51,4 +51,19 @@ struct ProfileFits {
 /// at 0. c0 and c1 are eliminated: everything is taken without its part in 1 and o.
 void fit_profiles(const ProfileBatch& batch, ProfileFits& fits);
 
+/// Samples of eight profiles wherever they lie: a mosaic has a colour at one pixel of four.
+struct SampledProfiles {
+  std::array<Lanes, kProfileSize> value;   ///< means of what lies within half a px of -7..7 px
+  std::array<Lanes, kProfileSize> offset;  ///< where these lie in the mean, px
+  std::array<Lanes, kProfileSize> weight;  ///< samples in each, of those that a full image has
+  Lanes scatter;  ///< sum of squares of the samples about these means, in that unit too
+  Lanes samples;  ///< how many there are
+  Lanes amplitude;
+  Lanes width;
+};
+
+/// fit_profiles() of these. The residual is that of all samples, not of its odd part alone: there
+/// may be none on the other side.
+void fit_sampled_profiles(const SampledProfiles& profiles, ProfileFits& fits);
+
 }  // namespace pencilscan

@@ -12,6 +12,7 @@
 #include "pencilscan/detection/curve_smoothing.h"
 #include "pencilscan/detection/profile_fit.h"
 #include "pencilscan/detection/refine_scales.h"
+#include "pencilscan/detection/sample_fit.h"
 #include "pencilscan/view/nearest.h"
 
 namespace pencilscan {
@@ -277,12 +278,16 @@ void fit_first(ImageSizes& sizes, const RefineOptions& options, Curve curve) {
   }
 }
 
-/// Fits the curves of one size to its image without all others.
-void fit_again(SizedImage& size, const RefineOptions& options) {
+/// Fits the curves of one size to its image without all others; where `samples` is not empty, to
+/// the pixels that are none of 0 in it.
+void fit_again(SizedImage& size, const cv::Mat& samples, const RefineOptions& options) {
   std::vector<Curve> sound_curves;
   for (Curve& curve : size.curves) {
     const Curve before = curve;
-    fit_curve(size.image, false, options.half_arc, curve);
+    if (samples.empty())
+      fit_curve(size.image, false, options.half_arc, curve);
+    else
+      fit_to_samples(size.image, samples, options.half_arc, curve);
     smooth_widths(curve.points);
     // The curves beside it meet the new fit at once, which saves a round.
     add_curve(before, size.image);
@@ -290,6 +295,17 @@ void fit_again(SizedImage& size, const RefineOptions& options) {
     cut_and_trim(curve, options, sound_curves);
   }
   size.curves = std::move(sound_curves);
+}
+
+/// Fits all curves again, to what the others leave of the image; `samples` are those of full size.
+void fit_all_again(ImageSizes& sizes, const cv::Mat& presence, const cv::Mat& samples,
+                   const RefineOptions& options) {
+  for (SizedImage& size : sizes.all()) {
+    for (Curve& curve : size.curves) smooth_positions(curve.points);
+  }
+  sizes.subtract_all_curves(presence);
+  for (std::size_t size = 0; size < sizes.all().size(); ++size)
+    fit_again(sizes.all()[size], size == 0 ? samples : cv::Mat(), options);
 }
 
 /// The part of the full image that the profiles of a curve need at `size`, whole pixels of that.
@@ -327,14 +343,24 @@ std::vector<Curve> refine_curves(const cv::Mat& presence, std::vector<Curve> cur
                                  const RefineOptions& options) {
   ImageSizes sizes(presence);
   for (Curve& curve : curves) fit_first(sizes, options, std::move(curve));
-  for (int round = 1; round < options.rounds; ++round) {
-    for (SizedImage& size : sizes.all()) {
-      for (Curve& curve : size.curves) smooth_positions(curve.points);
-    }
-    sizes.subtract_all_curves(presence);
-    for (SizedImage& size : sizes.all()) fit_again(size, options);
-  }
+  for (int round = 1; round < options.rounds; ++round) fit_all_again(sizes, presence, {}, options);
   return sizes.curves_at_full_size();
+}
+
+std::vector<Curve> refit_to_samples(const cv::Mat& presence, const cv::Mat& samples,
+                                    std::vector<Curve> curves, RefineOptions options) {
+  options.end_amplitude_ratio = 0;  // ends were trimmed
+  for (int round = 0; round < options.rounds; ++round) {
+    ImageSizes sizes(presence);
+    for (Curve& curve : curves) {
+      const std::size_t size =
+          std::min(size_of_curve(curve, 0), static_cast<std::size_t>(options.sizes - 1));
+      sizes.at(size).curves.push_back(resized(std::move(curve), 0, size));
+    }
+    fit_all_again(sizes, presence, samples, options);
+    curves = sizes.curves_at_full_size();
+  }
+  return curves;
 }
 
 std::vector<Curve> fit_guess(const cv::Mat& unexplained, Curve guess,

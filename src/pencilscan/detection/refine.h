@@ -28,6 +28,14 @@ struct RefineOptions {
 [[nodiscard]] std::vector<Curve> refine_curves(const cv::Mat& presence, std::vector<Curve> curves,
                                                const RefineOptions& options = {});
 
+/// Refined curves of an image whose values are interpolated but where `samples` (CV_8UC1) is not 0,
+/// fitted again to these alone, each counted once and where it lies: behind a mosaic, interpolated
+/// values repeat the noise of a quarter as many samples and widen lines, so that curves stated two
+/// thirds of the deviation that they had. A curve that coarser sizes show is fitted to these.
+[[nodiscard]] std::vector<Curve> refit_to_samples(const cv::Mat& presence, const cv::Mat& samples,
+                                                  std::vector<Curve> curves,
+                                                  RefineOptions options = {});
+
 /// Fits a curve whose place, direction and width are roughly known (amplitude 0) to an image from
 /// which all known curves were subtracted. Gives several pieces or none.
 [[nodiscard]] std::vector<Curve> fit_guess(const cv::Mat& unexplained, Curve guess,

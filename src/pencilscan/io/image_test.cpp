@@ -3,12 +3,15 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <numbers>
 #include <opencv2/core.hpp>
 
 #include "pencilscan/io/file.h"
 #include "pencilscan/io/io_fixture.h"
 #include "pencilscan/io/linear_light.h"
 #include "pencilscan/io/mosaic.h"
+#include "pencilscan/io/mosaic_light.h"
 
 namespace pencilscan {
 namespace {
@@ -187,6 +190,45 @@ TEST(Mosaic, PlanesOfColourComeBack) {
     EXPECT_EQ(cv::norm(sampled(back, mosaic), raw, cv::NORM_INF), 0);
     const cv::Rect inner(1, 1, image.cols - 2, image.rows - 2);
     EXPECT_LT(cv::norm(back(inner), image(inner), cv::NORM_INF), 1e-6);
+    const cv::Mat light = light_behind(raw, mosaic);
+    EXPECT_EQ(cv::norm(sampled(light, mosaic), raw, cv::NORM_INF), 0);
+    const cv::Rect inside(3, 3, image.cols - 6, image.rows - 6);
+    EXPECT_LT(cv::norm(light(inside), image(inside), cv::NORM_INF), 1e-6);
+  }
+}
+
+/// Of lines 8 px apart, four samples of red and blue.
+TEST(Mosaic, LinesFourSamplesApartKeepTheirContrast) {
+  constexpr float kSpacing = 8;
+  for (const bool down : {false, true}) {
+    cv::Mat image(40, 48, CV_32FC3);
+    for (int y = 0; y < image.rows; ++y) {
+      for (int x = 0; x < image.cols; ++x) {
+        const float phase =
+            static_cast<float>(down ? y : x) * 2 * std::numbers::pi_v<float> / kSpacing;
+        image.at<cv::Vec3f>(y, x) = cv::Vec3f::all(0.5F + 0.4F * std::cos(phase));
+      }
+    }
+    for (const char* name : {"RGGB", "BGGR", "GRBG", "GBRG"}) {
+      const cv::Mat raw = sampled(image, *Mosaic::from_name(name));
+      const cv::Mat light = light_behind(raw, *Mosaic::from_name(name));
+      const cv::Rect inside(4, 4, image.cols - 8, image.rows - 8);
+      // 1 - .884 of the amplitude; of means of two samples 1 - .707, .117.
+      EXPECT_LT(cv::norm(light(inside), image(inside), cv::NORM_INF), 0.05) << name;
+    }
+  }
+}
+
+/// Where a picture has no place three pixels away, its mirrored places see the same colour.
+TEST(Mosaic, SmallPicturesKeepColoursApart) {
+  const cv::Scalar color(0.2, 0.5, 0.8);
+  for (const cv::Size size : {cv::Size(2, 2), cv::Size(3, 2), cv::Size(2, 5), cv::Size(3, 3)}) {
+    for (const char* name : {"RGGB", "BGGR", "GRBG", "GBRG"}) {
+      const cv::Mat image(size, CV_32FC3, color);
+      const Mosaic mosaic = *Mosaic::from_name(name);
+      EXPECT_LT(cv::norm(light_behind(sampled(image, mosaic), mosaic), image, cv::NORM_INF), 1e-6)
+          << name << " " << size;
+    }
   }
 }
 

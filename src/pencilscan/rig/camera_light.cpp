@@ -10,6 +10,7 @@
 #include "pencilscan/core/formatted.h"
 #include "pencilscan/io/image.h"
 #include "pencilscan/io/linear_light.h"
+#include "pencilscan/io/mosaic_light.h"
 
 namespace pencilscan {
 namespace {
@@ -76,7 +77,7 @@ cv::Mat camera_values(const Camera& camera, const cv::Mat& stored) {
 cv::Mat linear_light(const Camera& camera, const cv::Mat& stored) {
   const cv::Mat linear =
       linearized(camera_values(camera, stored), camera.gamma, camera.black_level);
-  return camera.mosaic ? demosaiced(linear, *camera.mosaic) : linear;
+  return camera.mosaic ? light_behind(linear, *camera.mosaic) : linear;
 }
 
 bool are_more_than_one_in(int n, const cv::Mat& found) {

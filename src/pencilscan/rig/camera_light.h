@@ -27,7 +27,7 @@ void check_camera_image(const Camera& camera, const std::filesystem::path& path)
 [[nodiscard]] cv::Mat camera_values(const Camera& camera, const cv::Mat& stored);
 
 /// Linear light of an image as stored, CV_32FC3 RGB: black level and gamma taken out, the colours
-/// that a mosaic leaves out interpolated (io/mosaic.h).
+/// that a mosaic leaves out interpolated (io/mosaic_light.h).
 [[nodiscard]] cv::Mat linear_light(const Camera& camera, const cv::Mat& stored);
 
 /// True where more than one value in `n` of an image is among those found, CV_8UC1: not 0.
@@ -42,7 +42,7 @@ void check_camera_image(const Camera& camera, const std::filesystem::path& path)
 inline constexpr float kFullRange = 0.998F;
 
 /// Where an image as stored is at the top of the range, CV_8UC1: 255. For a mosaic, every pixel
-/// whose interpolated colours have such a sample in them.
+/// that is such a sample or lies beside one.
 [[nodiscard]] cv::Mat overexposed(const cv::Mat& stored);
 
 }  // namespace pencilscan
