@@ -46,7 +46,7 @@ export interface Named {
 export const kHoles: Named[] = [
   {name: 'background', color: [24, 24, 28]},
   {name: 'measured', about: 'some camera and projector fixed its depth', color: [225, 225, 225]},
-  {name: 'no projector', about: 'in shadow of all projectors, or turned away from them', color: [70, 70, 160]},
+  {name: 'no projector', about: 'in shadow of all projectors, turned away from them, or without their light in a picture', color: [70, 70, 160]},
   {name: 'one projector', about: 'lit by one projector only, whose lines did not fix the depth', color: [60, 160, 230]},
   {name: 'too compressed', about: 'lines lie closer together than the camera resolves, or the view is grazing', color: [240, 180, 40]},
   {name: 'ambiguous', about: 'several projectors light it, and yet no depth was accepted', color: [170, 80, 200]},

@@ -116,7 +116,8 @@ void advise_holes(const json& area, std::vector<Advice>& advice) {
   constexpr double kWorthSaying = 0.04;
   static const std::map<std::string, Known> kByReason = {
       {"no projector",
-       {"of the surface lies in the shadow of all projectors or is turned away from them",
+       {"of the surface lies in the shadow of all projectors, is turned away from them, or shows "
+        "none of their light",
         "Add or move a projector, or turn the object, so that light reaches it."}},
       {"one projector",
        {"of the surface is lit by one projector only, whose lines did not fix the depth",

@@ -118,6 +118,7 @@ struct ShapeResult {
   DepthResult depth;  ///< empty where it is off
   HoleReport holes;   ///< empty without dense depth
   SurfaceResult surface;
+  std::vector<char> unlit;  ///< per vertex of surface.mesh, 1: pictures are dark there (unlit.h)
   /// Of surface.mesh, the mean over moments where it rests: finish_shape() moves the vertices
   /// there. Empty where no moment comes before.
   std::vector<Vec3> steadied;

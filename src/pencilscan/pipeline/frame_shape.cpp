@@ -13,6 +13,7 @@
 #include "pencilscan/rig/camera_light.h"
 #include "pencilscan/rig/object_space.h"
 #include "pencilscan/surface/supported.h"
+#include "pencilscan/surface/unlit.h"
 #include "pencilscan/surface/untangle.h"
 #include "pencilscan/surface/vertex_color.h"
 #include "pencilscan/tracking/steady.h"
@@ -134,6 +135,15 @@ void hand_on(const FrameLinks& links, std::vector<std::array<int, 3>> coarse_fac
   links.hand_on(std::make_shared<const TrackedSurface>(std::move(next)));
 }
 
+/// Surface that pictures show as dark was not measured.
+void leave_unlit(const Rig& rig, const RayScene& closed, ShapeResult& result) {
+  TriangleMesh& mesh = result.surface.mesh;
+  if (mesh.confidence.empty()) return;
+  result.unlit = unlit_vertices(rig, closed, result.depth.lights, mesh);
+  for (std::size_t v = 0; v < result.unlit.size(); ++v)
+    if (result.unlit[v] != 0) mesh.confidence[v] = 0;
+}
+
 /// The depth maps become one closed surface, which lets depth be completed where it was missing and
 /// then follows it.
 void fuse(const Rig& rig, const PointResult& points, const std::vector<ColorView>& views,
@@ -141,9 +151,11 @@ void fuse(const Rig& rig, const PointResult& points, const std::vector<ColorView
   SurfaceResult& surface = result.surface;
   surface = close_depth(rig, result.depth.maps, options.fusion, silhouettes_of(rig, views));
   std::vector<std::array<int, 3>> coarse_faces = surface.mesh.faces;
-  guided_depth(rig, RayScene(surface.mesh), options.depth, points.background, result.depth);
-  result.depth.lights.clear();
+  const RayScene closed(surface.mesh);
+  guided_depth(rig, closed, options.depth, points.background, result.depth);
   follow_depth(rig, result.depth.maps, options.fusion, surface);
+  leave_unlit(rig, closed, result);
+  result.depth.lights.clear();
   if (links.hand_on && !surface.mesh.faces.empty()) hand_on(links, std::move(coarse_faces), result);
   note_points_used(rig, points.points, result.depth.maps, surface);
 }
@@ -167,7 +179,7 @@ void leave_unsupported(const Rig& rig, const PointResult& points, ShapeResult& r
       unsupported_vertices(rig, mesh, result.depth.maps, points.points, denied_places(rig, points),
                            kReach * line_spacing(rig));
   if (std::find(unsupported.begin(), unsupported.end(), 1) == unsupported.end()) return;
-  contradict_vertices(mesh, unsupported, result.holes);
+  give_reason(mesh, unsupported, HoleReason::kContradicted, result.holes);
   for (std::size_t v = 0; v < unsupported.size(); ++v) {
     if (unsupported[v] == 0) continue;
     mesh.confidence[v] = 0;
@@ -178,6 +190,7 @@ void leave_unsupported(const Rig& rig, const PointResult& points, ShapeResult& r
 void mark_holes(const Rig& rig, ShapeResult& result) {
   result.scene = std::make_shared<RayScene>(result.surface.mesh);
   result.holes = explain_holes(rig, *result.scene, result.depth.maps);
+  give_reason(result.surface.mesh, result.unlit, HoleReason::kNoProjector, result.holes);
   for (const HoleReason reason : result.holes.vertices)
     result.surface.mesh.hole.push_back(static_cast<std::uint8_t>(reason));
 }

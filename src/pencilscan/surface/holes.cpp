@@ -173,10 +173,10 @@ HoleReport explain_holes(const Rig& rig, const RayScene& surface, std::span<Dept
   return report;
 }
 
-void contradict_vertices(const TriangleMesh& mesh, std::span<const char> which,
-                         HoleReport& report) {
+void give_reason(const TriangleMesh& mesh, std::span<const char> which, HoleReason reason,
+                 HoleReport& report) {
   for (std::size_t v = 0; v < which.size(); ++v)
-    if (which[v] != 0) report.vertices[v] = HoleReason::kContradicted;
+    if (which[v] != 0) report.vertices[v] = reason;
   sum_areas(mesh, report);
 }
 

@@ -38,8 +38,9 @@ struct HoleReport {
 [[nodiscard]] HoleReport explain_holes(const Rig& rig, const RayScene& surface,
                                        std::span<DepthMap> maps, const HoleOptions& options = {});
 
-/// Vertices (1 in `which`) that were measured are contradicted after all.
-void contradict_vertices(const TriangleMesh& mesh, std::span<const char> which, HoleReport& report);
+/// Vertices (1 in `which`) that nobody measured after all have this reason.
+void give_reason(const TriangleMesh& mesh, std::span<const char> which, HoleReason reason,
+                 HoleReport& report);
 
 [[nodiscard]] const char* to_string(HoleReason reason);
 
