@@ -278,6 +278,60 @@ TEST(RefineCurves, ALineOfAnyWidthIsOneCurveInItsMiddle) {
   }
 }
 
+/// A vertical line 3 px wide whose light is missing over `gap` px around the middle row.
+cv::Mat line_with_gap(double gap, cv::Size size, double noise) {
+  cv::Mat image(size, CV_32F);
+  const auto step = [&](double d) { return 0.5 * (1 + std::erf(d / std::sqrt(2.0) / 0.7)); };
+  for (int v = 0; v < size.height; ++v) {
+    Random random(5, static_cast<std::uint64_t>(v));
+    const double y = v - 0.5 * size.height;
+    const double lit = 1 - (step(y + gap / 2) - step(y - gap / 2));
+    for (int u = 0; u < size.width; ++u) {
+      const double x = u - 0.5 * size.width;
+      const double light = step(x + 1.5) - step(x - 1.5);
+      image.at<float>(v, u) =
+          static_cast<float>(0.01 + 0.5 * lit * light + random.normal(0, noise));
+    }
+  }
+  return image;
+}
+
+/// Rows of the image that have a point of the line in its middle.
+std::vector<int> rows_with_points(const cv::Mat& image) {
+  std::vector<int> rows;
+  for (const Curve& curve : curves_of_all_sizes(image)) {
+    for (const CurvePoint& p : curve.points) {
+      if (std::abs(p.position.x() - 0.5F * static_cast<float>(image.cols)) < 1)
+        rows.push_back(static_cast<int>(std::lround(p.position.y())));
+    }
+  }
+  return rows;
+}
+
+// Filters and fits average over more of a line than such a gap is long.
+TEST(RefineCurves, AGapInALineHasNoPoints) {
+  const cv::Size size(60, 120);
+  for (const double gap : {5.0, 8.0}) {
+    SCOPED_TRACE(gap);
+    const std::vector<int> rows = rows_with_points(line_with_gap(gap, size, 0.01));
+    EXPECT_GT(rows.size(), 90U - static_cast<std::size_t>(gap));
+    for (const int row : rows) {
+      // A point stands for the pixel around it: half of it may be lit.
+      EXPECT_GE(std::abs(row - 0.5 * size.height), gap / 2 - 1) << row;
+    }
+  }
+}
+
+TEST(RefineCurves, NoiseMakesNoGapInALine) {
+  const cv::Size size(60, 400);
+  // Up to noise in which a point of the line is 3 deviations high.
+  for (const double noise : {0.01, 0.05, 0.15}) {
+    SCOPED_TRACE(noise);
+    const std::size_t lit = rows_with_points(line_with_gap(0, size, noise)).size();
+    EXPECT_GT(lit, 0.95 * size.height);
+  }
+}
+
 TEST(SmoothPositions, KeepsParabolasAndHalvesNoise) {
   const auto parabola = [](int i) {
     const float t = static_cast<float>(i) - 20;

@@ -17,12 +17,15 @@ constexpr float kMinLineWidth = 0.6F;  ///< px
 constexpr float kMaxLineWidth = 4.5F;
 constexpr float kModelReach = 3.0F;  ///< line profiles are rendered to this many widths
 
+/// Values at -kMaxHalf..kMaxHalf px across a curve; one more, never used, fills the last register.
+using Profile = std::array<float, 2 * kLanes>;
+
 /// Width (root of the second moment, px) of the profile of a line that is `line_px` wide in the
 /// image before blur.
 [[nodiscard]] float line_profile_width(float line_px);
 
 /// Height of the line profile of `width` at -7..8 px from its middle, 0 beyond its reach.
-void line_profile(float width, std::array<float, 2 * kLanes>& values);
+void line_profile(float width, Profile& values);
 
 /// Adds amplitude times the line profile of `width` at first + step i to image[stride i], i <
 /// count; all within kModelReach widths. A width beyond kMaxLineWidth is that of a smaller image.

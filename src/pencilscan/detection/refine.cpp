@@ -8,8 +8,10 @@
 #include <utility>
 
 #include "pencilscan/core/lanes.h"
+#include "pencilscan/core/stretches.h"
 #include "pencilscan/detection/curve_rendering.h"
 #include "pencilscan/detection/curve_smoothing.h"
+#include "pencilscan/detection/own_light.h"
 #include "pencilscan/detection/profile_fit.h"
 #include "pencilscan/detection/refine_scales.h"
 #include "pencilscan/detection/sample_fit.h"
@@ -29,44 +31,11 @@ struct Fit {
   bool good = false;
 };
 
-/// Values across a curve at -kMaxHalf..kMaxHalf px; one more, never used, fills the last register.
-using Profile = std::array<float, 2 * kLanes>;
-
-/// sample_bilinear() at position + o normal for the offsets o of a Profile.
-PENCILSCAN_CLONES
-void sample_across(const cv::Mat& image, const CurvePoint& point, Profile& profile) {
-  const auto* data = image.ptr<float>();
-  const auto row = static_cast<int>(image.step1());
-  for (int block = 0; block < 2; ++block) {
-    Lanes offset;
-    for (int k = 0; k < kLanes; ++k) offset[k] = static_cast<float>(block * kLanes + k - kMaxHalf);
-    Lanes x = point.position.x() + offset * point.normal.x();
-    Lanes y = point.position.y() + offset * point.normal.y();
-    clamp(0, static_cast<float>(image.cols - 1), x);
-    clamp(0, static_cast<float>(image.rows - 1), y);
-    IntLanes ix = __builtin_convertvector(x, IntLanes);
-    IntLanes iy = __builtin_convertvector(y, IntLanes);
-    ix = ix > image.cols - 2 ? ix - 1 : ix;
-    iy = iy > image.rows - 2 ? iy - 1 : iy;
-    x -= __builtin_convertvector(ix, Lanes);
-    y -= __builtin_convertvector(iy, Lanes);
-    const IntLanes at = iy * row + ix;
-    std::array<Lanes, 4> corner{};
-    gather(data, at, corner[0]);
-    gather(data + 1, at, corner[1]);
-    gather(data + row, at, corner[2]);
-    gather(data + row + 1, at, corner[3]);
-    const Lanes value =
-        (1 - y) * ((1 - x) * corner[0] + x * corner[1]) + y * ((1 - x) * corner[2] + x * corner[3]);
-    store(value, profile.data() + block * kLanes);
-  }
-}
-
 /// Samples the image across the curve, with the curve's own model added back where `residual` holds
 /// the image without all curves.
-void sample_profiles(const cv::Mat& residual, const std::vector<CurvePoint>& points, bool add_own,
-                     std::vector<Profile>& profiles) {
-  profiles.resize(points.size());
+std::vector<Profile> profiles_along(const cv::Mat& residual, const std::vector<CurvePoint>& points,
+                                    bool add_own) {
+  std::vector<Profile> profiles(points.size());
   Profile own;
   for (std::size_t i = 0; i < points.size(); ++i) {
     const CurvePoint& p = points[i];
@@ -75,6 +44,7 @@ void sample_profiles(const cv::Mat& residual, const std::vector<CurvePoint>& poi
     line_profile(p.width_px, own);
     for (std::size_t k = 0; k < own.size(); ++k) profiles[i][k] += p.amplitude * own[k];
   }
+  return profiles;
 }
 
 PENCILSCAN_CLONES
@@ -95,13 +65,13 @@ void mean_profile(const Profile* first, int count, Profile& mean) {
 
 /// Fits of eight points at once, from `first` on.
 void fit_batch(const std::vector<CurvePoint>& points, const std::vector<Profile>& profiles,
-               bool first_round, int half_arc, int first, ProfileFits& fits) {
+               const std::vector<int>& half_arcs, bool first_round, int first, ProfileFits& fits) {
   const int n = static_cast<int>(points.size());
   ProfileBatch batch;
   Profile mean;
   for (int k = 0; k < kLanes; ++k) {
     const int i = std::min(first + k, n - 1);
-    const int r = std::min({half_arc, i, n - 1 - i});  // symmetric: no shift towards the inside
+    const int r = half_arcs[static_cast<std::size_t>(i)];
     mean_profile(&profiles[static_cast<std::size_t>(i - r)], 2 * r + 1, mean);
     for (std::size_t o = 0; o < kProfileSize; ++o) batch.value[o][k] = mean[o];
     const float width = points[static_cast<std::size_t>(i)].width_px;
@@ -125,19 +95,30 @@ void fit_batch(const std::vector<CurvePoint>& points, const std::vector<Profile>
   fit_profiles(batch, fits);
 }
 
-void fit_curve(const cv::Mat& residual, bool first_round, int half_arc, Curve& curve) {
+/// Profiles to either side of each point that its fit averages: as many before as after it, so that
+/// it does not shift towards the inside of a curve, and no dark ones. 0 for these.
+std::vector<int> half_arcs(const std::vector<char>& is_dark, int most) {
+  std::vector<int> result(is_dark.size(), 0);
+  for_each_stretch(is_dark, [&](int begin, int end) {
+    for (int i = begin; i < end && is_dark[static_cast<std::size_t>(begin)] == 0; ++i)
+      result[static_cast<std::size_t>(i)] = std::min({most, i - begin, end - 1 - i});
+  });
+  return result;
+}
+
+void fit_curve(const std::vector<Profile>& profiles, const std::vector<char>& is_dark,
+               bool first_round, int half_arc, Curve& curve) {
   std::vector<CurvePoint>& points = curve.points;
-  std::vector<Profile> profiles;
-  sample_profiles(residual, points, !first_round, profiles);
   const int n = static_cast<int>(points.size());
+  const std::vector<int> averaged = half_arcs(is_dark, half_arc);
   std::vector<Fit> fits(points.size());
   for (int first = 0; first < n; first += kLanes) {
     ProfileFits batch;
-    fit_batch(points, profiles, first_round, half_arc, first, batch);
+    fit_batch(points, profiles, averaged, first_round, first, batch);
     for (int k = 0; k < std::min(kLanes, n - first); ++k) {
-      fits[static_cast<std::size_t>(first + k)] = {batch.amplitude[k],   batch.offset[k],
-                                                   batch.width[k],       batch.residual2[k],
-                                                   batch.offset_gain[k], batch.good[k] != 0};
+      const auto at = static_cast<std::size_t>(first + k);
+      fits[at] = {batch.amplitude[k], batch.offset[k],      batch.width[k],
+                  batch.residual2[k], batch.offset_gain[k], batch.good[k] != 0 && is_dark[at] == 0};
     }
   }
   // Sums of the residual variances of good fits, and their number, before each point.
@@ -167,6 +148,10 @@ void fit_curve(const cv::Mat& residual, bool first_round, int half_arc, Curve& c
   }
 }
 
+float kept_share(const RefineOptions& options) {
+  return static_cast<float>(options.end_amplitude_ratio);
+}
+
 /// Of dense lines the fit gives the least width: as thin as the picture can show them.
 bool sound(const CurvePoint& p, const RefineOptions& options) {
   return p.amplitude > 0 && p.sigma_px < options.max_sigma_px && p.width_px < kMaxLineWidth;
@@ -181,10 +166,10 @@ bool jumps(const CurvePoint& a, const CurvePoint& b) {
 }
 
 /// The points without faint ends.
-std::span<const CurvePoint> trimmed(std::span<const CurvePoint> points, double ratio) {
+std::span<const CurvePoint> trimmed(std::span<const CurvePoint> points, float ratio) {
   constexpr std::size_t kInward = 5;
   const auto faint = [&](const CurvePoint& end, const CurvePoint& inner) {
-    return end.amplitude < static_cast<float>(ratio) * inner.amplitude;
+    return end.amplitude < ratio * inner.amplitude;
   };
   std::size_t first = 0;
   std::size_t last = points.size();
@@ -197,7 +182,7 @@ void cut_and_trim(const Curve& curve, const RefineOptions& options, std::vector<
   const std::span<const CurvePoint> points(curve.points);
   std::size_t begin = 0;
   const auto finish = [&](std::size_t end) {
-    const auto piece = trimmed(points.subspan(begin, end - begin), options.end_amplitude_ratio);
+    const auto piece = trimmed(points.subspan(begin, end - begin), kept_share(options));
     if (static_cast<int>(piece.size()) >= options.min_points)
       result.push_back({curve.family, {piece.begin(), piece.end()}, {}});
   };
@@ -217,15 +202,19 @@ void cut_and_trim(const Curve& curve, const RefineOptions& options, std::vector<
 /// to it, in its pixels.
 struct SizedImage {
   cv::Mat image;
+  cv::Mat all_light;  ///< the image with the curves
   std::vector<Curve> curves;
 };
 
 class ImageSizes {
  public:
-  explicit ImageSizes(const cv::Mat& full) : sizes_{{full, {}}} {}
+  explicit ImageSizes(const cv::Mat& full) : sizes_{{full, full, {}}} {}
 
   [[nodiscard]] SizedImage& at(std::size_t size) {
-    while (sizes_.size() <= size) sizes_.push_back({resized_image(sizes_.back().image, 1), {}});
+    while (sizes_.size() <= size) {
+      const cv::Mat half = resized_image(sizes_.back().image, 1);
+      sizes_.push_back({half, half, {}});
+    }
     return sizes_[size];
   }
   [[nodiscard]] std::vector<SizedImage>& all() { return sizes_; }
@@ -264,7 +253,9 @@ void fit_first(ImageSizes& sizes, const RefineOptions& options, Curve curve) {
       for (CurvePoint& p : curve.points) p.width_px = std::min(p.width_px, kWidestProfilePx);
     }
     Curve fitted = curve;
-    fit_curve(sizes.at(size).image, true, options.half_arc, fitted);
+    // The light of others is still there: which point is dark shows later.
+    fit_curve(profiles_along(sizes.at(size).image, curve.points, false),
+              std::vector<char>(curve.points.size(), 0), true, options.half_arc, fitted);
     smooth_widths(fitted.points);
     const std::size_t wanted = size_for(fitted, size);
     if (wanted == size || t == kMostTries) {
@@ -284,10 +275,14 @@ void fit_again(SizedImage& size, const cv::Mat& samples, const RefineOptions& op
   std::vector<Curve> sound_curves;
   for (Curve& curve : size.curves) {
     const Curve before = curve;
-    if (samples.empty())
-      fit_curve(size.image, false, options.half_arc, curve);
-    else
+    if (samples.empty()) {
+      const std::vector<Profile> profiles = profiles_along(size.image, curve.points, true);
+      fit_curve(profiles,
+                dark_points(curve.points, profiles, size.all_light, {}, kept_share(options)), false,
+                options.half_arc, curve);
+    } else {
       fit_to_samples(size.image, samples, options.half_arc, curve);
+    }
     smooth_widths(curve.points);
     // The curves beside it meet the new fit at once, which saves a round.
     add_curve(before, size.image);
@@ -377,7 +372,11 @@ std::vector<Curve> fit_guess(const cv::Mat& unexplained, Curve guess,
     guess = resized(std::move(guess), 0, size);
   }
   // Once only: between lines this dense, a second fit to the others' residual moves away.
-  fit_curve(image, true, options.half_arc, guess);
+  const std::vector<Profile> profiles = profiles_along(image, guess.points, false);
+  std::vector<float> expected;
+  for (const CurvePoint& p : guess.points) expected.push_back(p.amplitude);
+  fit_curve(profiles, dark_points(guess.points, profiles, {}, expected, kept_share(options)), true,
+            options.half_arc, guess);
   smooth_widths(guess.points);
   std::vector<Curve> pieces;
   cut_and_trim(guess, options, pieces);

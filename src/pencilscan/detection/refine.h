@@ -11,7 +11,8 @@ struct RefineOptions {
   int rounds = 2;    ///< fits of all curves, from the second on with the others subtracted
   int half_arc = 4;  ///< profiles averaged on either side along the curve
   double end_amplitude_ratio = 0.6;  ///< a curve ends where its amplitude falls below this share
-                                     ///< of that 5 px further in
+                                     ///< of that 5 px further in, > 0; a line that is there has
+                                     ///< this share of its neighbours' (own_light.h)
   double max_sigma_px = 0.8;         ///< less certain points are dropped
   int min_points = 6;
   int sizes = 1;  ///< of the image that show lines best, each half of the one before; >= 1
@@ -20,8 +21,8 @@ struct RefineOptions {
 /// Sub-pixel positions: on each point the cross profile, averaged along the curve, is fitted by a
 /// blurred box under sloping light on a sloped background (Gauss-Newton), all other curves
 /// subtracted. Sets position,
-/// normal, amplitude, width and sigma of every point; cuts curves where they jump or vanish, and
-/// trims ends that overshoot a silhouette or depth step.
+/// normal, amplitude, width and sigma of every point; cuts curves where they jump or have no light
+/// of their own (own_light.h), and trims ends that overshoot a silhouette or depth step.
 ///
 /// A profile has 15 samples. Lines that are too wide for them are fitted to an image of half,
 /// quarter ... size, whose pixels are the samples (refine_scales.h); points stay about 1 px apart.
@@ -36,8 +37,9 @@ struct RefineOptions {
                                                   std::vector<Curve> curves,
                                                   RefineOptions options = {});
 
-/// Fits a curve whose place, direction and width are roughly known (amplitude 0) to an image from
-/// which all known curves were subtracted. Gives several pieces or none.
+/// Fits a curve whose place, direction and width are roughly known to an image from which all known
+/// curves were subtracted. Amplitudes: as lines around have them, or 0. Gives several pieces or
+/// none.
 [[nodiscard]] std::vector<Curve> fit_guess(const cv::Mat& unexplained, Curve guess,
                                            const RefineOptions& options = {});
 

@@ -429,6 +429,8 @@ Curve CameraMatching::guess_of(const LineChain& chain) const {
     point.position = p.position;
     point.normal = p.normal;
     point.width_px = missing_places_.expected_width(p);
+    point.amplitude =
+        named_.amplitude_around(p.position, name_of(p), p.spacing_px, 0, 1).value_or(0.F);
     curve.points.push_back(point);
   }
   return curve;
