@@ -225,6 +225,40 @@ PENCILSCAN_INLINE void odd_variance(const std::array<Lanes, kProfileSize>& measu
   variance = 0.5F * sum / (half - 2);
 }
 
+/// A step of Gauss-Newton, where the fit is open, in units of the height except for the height's
+/// own; ends fits that hardly move, or that find no line.
+PENCILSCAN_INLINE void take_step(const std::array<Lanes, kProfileUnknowns>& step, Parameters& now,
+                                 IntLanes& is_open, ProfileFits& fits) {
+  Lanes moved = step[kCenter] / now.height;
+  Lanes widened = step[kWidth] / now.height;
+  clamp(-0.7F, 0.7F, moved);
+  clamp(-0.5F, 0.5F, widened);
+  Parameters next = now;
+  next.tilt += step[kTilt] / now.height;
+  clamp(-0.15F, 0.15F, next.tilt);
+  next.height += step[kHeight];
+  next.center += moved;
+  next.width += widened;
+  clamp(kMinLineWidth, kMaxLineWidth, next.width);
+  select(is_open, next.height, now.height);
+  select(is_open, next.center, now.center);
+  select(is_open, next.width, now.width);
+  select(is_open, next.tilt, now.tilt);
+  // NaN fails too.
+  fits.good &= now.height > kMinHeight;
+  const IntLanes is_small = (moved * moved < kSmallMove * kSmallMove) &
+                            (widened * widened < kSmallWidening * kSmallWidening);
+  is_open &= ~is_small & fits.good;
+}
+
+PENCILSCAN_INLINE void end_fits(const Parameters& now, ProfileFits& fits) {
+  fits.amplitude = now.height;
+  fits.offset = now.center;
+  fits.width = now.width;
+  fits.good &= (now.center * now.center < kMaxOffset * kMaxOffset) & (fits.offset_gain > 0) &
+               (fits.offset_gain < 1e30F);
+}
+
 /// Pixels that stand for one in the profile of a line of `width`: 1, or as many as the width is of
 /// kMaxLineWidth, rounded up to a power of two. Wider lines are narrow ones of a smaller image.
 float profile_scale(float width) {
@@ -302,33 +336,9 @@ void fit_profiles(const ProfileBatch& batch, ProfileFits& fits) {
     odd_variance(measured, model, model_slope, background, now.height, batch.half, variance);
     select(is_open, variance, fits.residual2);
     select(is_open, center_variance / (now.height * now.height), fits.offset_gain);
-    // The step, in units of the height except for the height's own.
-    Lanes moved = n.right[kCenter] / now.height;
-    Lanes widened = n.right[kWidth] / now.height;
-    clamp(-0.7F, 0.7F, moved);
-    clamp(-0.5F, 0.5F, widened);
-    Parameters next = now;
-    next.tilt += n.right[kTilt] / now.height;
-    clamp(-0.15F, 0.15F, next.tilt);
-    next.height += n.right[kHeight];
-    next.center += moved;
-    next.width += widened;
-    clamp(kMinLineWidth, kMaxLineWidth, next.width);
-    select(is_open, next.height, now.height);
-    select(is_open, next.center, now.center);
-    select(is_open, next.width, now.width);
-    select(is_open, next.tilt, now.tilt);
-    // NaN fails too.
-    fits.good &= now.height > kMinHeight;
-    const IntLanes is_small = (moved * moved < kSmallMove * kSmallMove) &
-                              (widened * widened < kSmallWidening * kSmallWidening);
-    is_open &= ~is_small & fits.good;
+    take_step(n.right, now, is_open, fits);
   }
-  fits.amplitude = now.height;
-  fits.offset = now.center;
-  fits.width = now.width;
-  fits.good &= (now.center * now.center < kMaxOffset * kMaxOffset) & (fits.offset_gain > 0) &
-               (fits.offset_gain < 1e30F);
+  end_fits(now, fits);
 }
 
 PENCILSCAN_CLONES
@@ -403,31 +413,11 @@ void fit_sampled_profiles(const SampledProfiles& profiles, ProfileFits& fits) {
     select(is_open, (square > 0 ? square : zero) / (freedom > 1 ? freedom : zero + 1),
            fits.residual2);
     select(is_open, center_variance / (now.height * now.height), fits.offset_gain);
-    Lanes moved = x[2 + kCenter] / now.height;
-    Lanes widened = x[2 + kWidth] / now.height;
-    clamp(-0.7F, 0.7F, moved);
-    clamp(-0.5F, 0.5F, widened);
-    Parameters next = now;
-    next.tilt += x[2 + kTilt] / now.height;
-    clamp(-0.15F, 0.15F, next.tilt);
-    next.height += x[2 + kHeight];
-    next.center += moved;
-    next.width += widened;
-    clamp(kMinLineWidth, kMaxLineWidth, next.width);
-    select(is_open, next.height, now.height);
-    select(is_open, next.center, now.center);
-    select(is_open, next.width, now.width);
-    select(is_open, next.tilt, now.tilt);
-    fits.good &= now.height > kMinHeight;
-    const IntLanes is_small = (moved * moved < kSmallMove * kSmallMove) &
-                              (widened * widened < kSmallWidening * kSmallWidening);
-    is_open &= ~is_small & fits.good;
+    const std::array<Lanes, kProfileUnknowns> step = {x[2], x[3], x[4], x[5]};
+    take_step(step, now, is_open, fits);
   }
-  fits.amplitude = now.height;
-  fits.offset = now.center;
-  fits.width = now.width;
-  fits.good &= (now.center * now.center < kMaxOffset * kMaxOffset) & (fits.offset_gain > 0) &
-               (fits.offset_gain < 1e30F) & (profiles.samples > static_cast<float>(kAll));
+  end_fits(now, fits);
+  fits.good &= profiles.samples > static_cast<float>(kAll);
 }
 
 }  // namespace pencilscan

@@ -11,6 +11,7 @@
 #include "pencilscan/core/stretches.h"
 #include "pencilscan/detection/curve_rendering.h"
 #include "pencilscan/detection/curve_smoothing.h"
+#include "pencilscan/detection/fitted_points.h"
 #include "pencilscan/detection/own_light.h"
 #include "pencilscan/detection/profile_fit.h"
 #include "pencilscan/detection/refine_scales.h"
@@ -21,15 +22,6 @@ namespace pencilscan {
 namespace {
 
 using Eigen::Vector2f;
-
-struct Fit {
-  float amplitude = 0;
-  float offset = 0;
-  float width = 0;
-  float residual2 = 0;
-  float offset_gain = 0;
-  bool good = false;
-};
 
 /// Samples the image across the curve, with the curve's own model added back where `residual` holds
 /// the image without all curves.
@@ -111,40 +103,21 @@ void fit_curve(const std::vector<Profile>& profiles, const std::vector<char>& is
   std::vector<CurvePoint>& points = curve.points;
   const int n = static_cast<int>(points.size());
   const std::vector<int> averaged = half_arcs(is_dark, half_arc);
-  std::vector<Fit> fits(points.size());
+  std::vector<ProfileFit> fits(points.size());
   for (int first = 0; first < n; first += kLanes) {
     ProfileFits batch;
     fit_batch(points, profiles, averaged, first_round, first, batch);
     for (int k = 0; k < std::min(kLanes, n - first); ++k) {
       const auto at = static_cast<std::size_t>(first + k);
-      fits[at] = {batch.amplitude[k], batch.offset[k],      batch.width[k],
-                  batch.residual2[k], batch.offset_gain[k], batch.good[k] != 0 && is_dark[at] == 0};
+      fits[at] = fit_of(batch, k);
+      fits[at].good = fits[at].good && is_dark[at] == 0;
     }
   }
-  // Sums of the residual variances of good fits, and their number, before each point.
-  std::vector<double> level_before(points.size() + 1, 0.0);
-  std::vector<int> good_before(points.size() + 1, 0);
+  take_fits(fits, points);
   for (std::size_t i = 0; i < fits.size(); ++i) {
-    level_before[i + 1] = level_before[i] + (fits[i].good ? double{fits[i].residual2} : 0.0);
-    good_before[i + 1] = good_before[i] + (fits[i].good ? 1 : 0);
-  }
-  for (int i = 0; i < n; ++i) {
-    CurvePoint& p = points[static_cast<std::size_t>(i)];
-    const Fit& fit = fits[static_cast<std::size_t>(i)];
-    if (!fit.good) {
-      p.amplitude = 0;
-      p.sigma_px = 1;
-      continue;
-    }
-    // The residual level of one profile has few degrees of freedom: average it along the curve.
-    const auto low = static_cast<std::size_t>(std::max(0, i - 6));
-    const auto high = static_cast<std::size_t>(std::min(n, i + 7));
-    const double level = (level_before[high] - level_before[low]) /
-                         static_cast<double>(good_before[high] - good_before[low]);
-    p.position += fit.offset * p.normal;
-    p.amplitude = fit.amplitude;
-    p.width_px = fit.width;
-    p.sigma_px = std::sqrt(static_cast<float>(std::max(0.0, level)) * fit.offset_gain);
+    if (fits[i].good) continue;
+    points[i].amplitude = 0;
+    points[i].sigma_px = 1;
   }
 }
 

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "pencilscan/detection/fitted_points.h"
 #include "pencilscan/detection/profile_fit.h"
 #include "pencilscan/view/nearest.h"
 
@@ -13,15 +14,6 @@ namespace pencilscan {
 namespace {
 
 using Eigen::Vector2f;
-
-struct SampleFit {
-  float amplitude = 0;
-  float offset = 0;
-  float width = 0;
-  float residual2 = 0;
-  float offset_gain = 0;
-  bool good = false;
-};
 
 /// What lies within half a px of -7..7 px across one point.
 struct Bins {
@@ -74,7 +66,7 @@ void fit_to_samples(const cv::Mat& residual, const cv::Mat& samples, int half_ar
   const int n = static_cast<int>(points.size());
   std::vector<Bins> bins;
   for (const CurvePoint& p : points) bins.push_back(bins_across(residual, samples, p));
-  std::vector<SampleFit> fits(points.size());
+  std::vector<ProfileFit> fits(points.size());
   for (int first = 0; first < n; first += kLanes) {
     SampledProfiles batch{};
     for (int k = 0; k < kLanes; ++k) {
@@ -111,29 +103,10 @@ void fit_to_samples(const cv::Mat& residual, const cv::Mat& samples, int half_ar
     }
     ProfileFits of;
     fit_sampled_profiles(batch, of);
-    for (int k = 0; k < std::min(kLanes, n - first); ++k) {
-      fits[static_cast<std::size_t>(first + k)] = {of.amplitude[k],   of.offset[k],
-                                                   of.width[k],       of.residual2[k],
-                                                   of.offset_gain[k], of.good[k] != 0};
-    }
+    for (int k = 0; k < std::min(kLanes, n - first); ++k)
+      fits[static_cast<std::size_t>(first + k)] = fit_of(of, k);
   }
-  for (int i = 0; i < n; ++i) {
-    CurvePoint& p = points[static_cast<std::size_t>(i)];
-    const SampleFit& fit = fits[static_cast<std::size_t>(i)];
-    if (!fit.good) continue;
-    float level = 0;  // mean along the curve, as in fit_curve()
-    float good = 0;
-    for (int j = std::max(0, i - 6); j < std::min(n, i + 7); ++j) {
-      const SampleFit& other = fits[static_cast<std::size_t>(j)];
-      if (!other.good) continue;
-      level += other.residual2;
-      good += 1;
-    }
-    p.position += fit.offset * p.normal;
-    p.amplitude = fit.amplitude;
-    p.width_px = fit.width;
-    p.sigma_px = std::sqrt(level / good * fit.offset_gain);
-  }
+  take_fits(fits, points);
 }
 
 }  // namespace pencilscan
