@@ -420,17 +420,21 @@ void CameraMatching::append(News news, bool hold_light) {
   accept(std::move(news.runs));
 }
 
-/// A curve where a line is predicted, as wide as it would be there.
+/// A curve where a line is predicted, as wide as it would be there, and as high as lines around.
 Curve CameraMatching::guess_of(const LineChain& chain) const {
+  constexpr std::size_t kStep = 8;  // points; what counts as around reaches farther
   Curve curve;
   curve.family = family_of(families_, chain.front().pattern);
-  for (const PredictedPoint& p : chain) {
+  float height = 0;
+  for (std::size_t i = 0; i < chain.size(); ++i) {
+    const PredictedPoint& p = chain[i];
+    if (i % kStep == 0)
+      height = named_.amplitude_around(p.position, name_of(p), p.spacing_px, 0, 1).value_or(0.F);
     CurvePoint point;
     point.position = p.position;
     point.normal = p.normal;
     point.width_px = missing_places_.expected_width(p);
-    point.amplitude =
-        named_.amplitude_around(p.position, name_of(p), p.spacing_px, 0, 1).value_or(0.F);
+    point.amplitude = height;
     curve.points.push_back(point);
   }
   return curve;

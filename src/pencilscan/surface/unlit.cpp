@@ -29,8 +29,11 @@ float quantile(std::vector<float> values, double share) {
   return *at;
 }
 
-/// 255 where lines of one presence image (CV_32FC1) stand out of the dark around them.
-cv::Mat lit_by(const cv::Mat& presence, double spacing_px) {
+constexpr int kStep = 4;  // px: levels of light change slowly
+
+/// 255 where lines of a part of one presence image (CV_32FC1) stand out of the dark around them;
+/// the other pixels of the image, `dark_beside`, hold nothing.
+cv::Mat lit_in(const cv::Mat& presence, double spacing_px, int dark_beside) {
   // Lenses and the object itself scatter a hundredth or two of the light into what is dark.
   constexpr float kScattered = 0.03F;
   constexpr float kDark = 0.06F;      // as in silhouette.cpp: more is light, whatever the noise
@@ -38,7 +41,6 @@ cv::Mat lit_by(const cv::Mat& presence, double spacing_px) {
   constexpr double kInNoise = 0.95;   // share of the dark below a level ...
   constexpr float kBeyondNoise = 3;   // ... so many times which a disc of pixels stays below
   constexpr float kOwnHeight = 0.5F;  // of the line: farther out it only is its blur
-  constexpr int kStep = 4;            // px: levels change slowly
   const auto reach = [](double px) { return static_cast<int>(std::ceil(px)); };
   cv::Mat lines;
   cv::blur(presence, lines, cv::Size(3, 3));
@@ -57,7 +59,7 @@ cv::Mat lit_by(const cv::Mat& presence, double spacing_px) {
   cv::Mat beside;
   cv::dilate(peaks, beside, square(reach(spacing_px / kStep)));
   const float bright = quantile({picked.begin<float>(), picked.end<float>()}, 0.99);
-  std::vector<float> in_dark;
+  std::vector<float> in_dark(static_cast<std::size_t>(dark_beside / (kStep * kStep)), 0.F);
   for (int v = 0; v < picked.rows; ++v) {
     for (int u = 0; u < picked.cols; ++u)
       if (beside.at<float>(v, u) <= kDark * bright) in_dark.push_back(picked.at<float>(v, u));
@@ -72,6 +74,18 @@ cv::Mat lit_by(const cv::Mat& presence, double spacing_px) {
   cv::min(least, dim, least);
   cv::resize(least, least, lines.size(), 0, 0, cv::INTER_NEAREST);
   return (lines > least) & (lines > highest * kOwnHeight);
+}
+
+/// The same of a whole image. Detection leaves it black outside of what is lit.
+cv::Mat lit_by(const cv::Mat& presence, double spacing_px) {
+  cv::Mat lit(presence.size(), CV_8U, cv::Scalar(0));
+  const cv::Rect bright = cv::boundingRect(presence != 0);
+  if (bright.empty()) return lit;
+  const cv::Point corner(bright.x / kStep * kStep, bright.y / kStep * kStep);
+  const cv::Rect area(corner, bright.br());
+  const int beside = static_cast<int>(presence.total()) - area.area();
+  lit_in(presence(area), spacing_px, beside).copyTo(lit(area));
+  return lit;
 }
 
 /// Pixels from each to the nearest that is lit, CV_32FC1.
