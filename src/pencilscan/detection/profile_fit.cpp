@@ -72,6 +72,39 @@ PENCILSCAN_INLINE void height_at(const LineShape<float>& shape, const Lanes& d, 
   height = shape.scale * (rising - falling);
 }
 
+/// The profile of one width, and how it changes with the width.
+struct ShapeAndSlopes {
+  LineShape<Lanes> shape;
+  IntLanes is_blunt;
+  Lanes half_per_width;
+  Lanes scale_change;  ///< d scale / d half, relative
+  Lanes inverse_width;
+};
+
+PENCILSCAN_INLINE void make_slopes(const Lanes& width, ShapeAndSlopes& s) {
+  make_shape(width, s.shape, s.is_blunt);
+  const LineShape<Lanes>& shape = s.shape;
+  s.half_per_width = 3 * width / shape.half;
+  s.scale_change = -2 * shape.rate * shape.tail / ((1 - shape.tail) * (1 + shape.tail));
+  s.inverse_width = 1 / width;
+}
+
+/// Height of the profile at d, and its derivatives, given e = exp(-rate d).
+PENCILSCAN_INLINE void slopes_at(const ShapeAndSlopes& s, const Lanes& d, const Lanes& e, Lanes& f,
+                                 Lanes& f_d, Lanes& f_width) {
+  Lanes rising;
+  Lanes falling;
+  steps_at(s.shape, e, rising, falling);
+  f = s.shape.scale * (rising - falling);
+  const Lanes steep = s.shape.scale * s.shape.rate;
+  const Lanes rise = steep * rising * (1 - rising);
+  const Lanes fall = steep * falling * (1 - falling);
+  f_d = rise - fall;
+  // A blunt profile is stretched, the others become wider between the same edges.
+  f_width = s.is_blunt ? -d * s.inverse_width * f_d
+                       : (rise + fall + s.scale_change * f) * s.half_per_width;
+}
+
 struct Parameters {
   Lanes height;
   Lanes center;
@@ -153,37 +186,25 @@ PENCILSCAN_INLINE void linearize(const std::array<Lanes, kProfileSize>& measured
                                  const Background& background, const Parameters& at,
                                  std::array<Lanes, kProfileSize>& model, Lanes& model_slope,
                                  NormalEquations& n) {
-  LineShape<Lanes> shape;
-  IntLanes is_blunt;
-  make_shape(at.width, shape, is_blunt);
-  const Lanes half_per_width = 3 * at.width / shape.half;
+  ShapeAndSlopes shape;
+  make_slopes(at.width, shape);
   // exp(-rate (o - center)) from one offset to the next is a product.
   Lanes e;
   Lanes ratio;
-  exponential(shape.rate * (at.center + static_cast<float>(kMaxHalf)), e);
-  exponential(-shape.rate, ratio);
+  exponential(shape.shape.rate * (at.center + static_cast<float>(kMaxHalf)), e);
+  exponential(-shape.shape.rate, ratio);
   std::array<Lanes, kProfileUnknowns> sum{};
   std::array<Lanes, kProfileUnknowns> slope{};
   n = {};
-  // d scale / d half, relative
-  const Lanes scale_change = -2 * shape.rate * shape.tail / ((1 - shape.tail) * (1 + shape.tail));
-  const Lanes inverse_width = 1 / at.width;
   for (int i = 0; i < kProfileSize; ++i) {
     const auto s = static_cast<std::size_t>(i);
     const auto o = static_cast<float>(i - kMaxHalf);
     const Lanes d = o - at.center;
-    Lanes rising;
-    Lanes falling;
-    steps_at(shape, e, rising, falling);
+    Lanes f;
+    Lanes f_d;
+    Lanes f_width;
+    slopes_at(shape, d, e, f, f_d, f_width);
     e *= ratio;
-    const Lanes f = shape.scale * (rising - falling);
-    const Lanes steep = shape.scale * shape.rate;
-    const Lanes rise = steep * rising * (1 - rising);
-    const Lanes fall = steep * falling * (1 - falling);
-    const Lanes f_d = rise - fall;
-    // A blunt profile is stretched, the others become wider between the same edges.
-    const Lanes f_width =
-        is_blunt ? -d * inverse_width * f_d : (rise + fall + scale_change * f) * half_per_width;
     const Lanes light = (1 + at.tilt * d) * background.inside[s];
     std::array<Lanes, kProfileUnknowns> J;
     J[kHeight] = light * f;
@@ -352,12 +373,8 @@ void fit_sampled_profiles(const SampledProfiles& profiles, ProfileFits& fits) {
   fits = ProfileFits();
   fits.good = is_open;
   for (int iteration = 0; iteration < kMaxIterations && any(is_open); ++iteration) {
-    LineShape<Lanes> shape;
-    IntLanes is_blunt;
-    make_shape(now.width, shape, is_blunt);
-    const Lanes half_per_width = 3 * now.width / shape.half;
-    const Lanes scale_change = -2 * shape.rate * shape.tail / ((1 - shape.tail) * (1 + shape.tail));
-    const Lanes inverse_width = 1 / now.width;
+    ShapeAndSlopes shape;
+    make_slopes(now.width, shape);
     std::array<std::array<Lanes, kAll>, kAll> m{};
     std::array<Lanes, kAll> x{};
     Lanes square = profiles.scatter;
@@ -366,17 +383,11 @@ void fit_sampled_profiles(const SampledProfiles& profiles, ProfileFits& fits) {
       const Lanes& w = profiles.weight[s];
       const Lanes d = o - now.center;
       Lanes e;
-      Lanes rising;
-      Lanes falling;
-      exponential(-shape.rate * d, e);
-      steps_at(shape, e, rising, falling);
-      const Lanes f = shape.scale * (rising - falling);
-      const Lanes steep = shape.scale * shape.rate;
-      const Lanes rise = steep * rising * (1 - rising);
-      const Lanes fall = steep * falling * (1 - falling);
-      const Lanes f_d = rise - fall;
-      const Lanes f_width =
-          is_blunt ? -d * inverse_width * f_d : (rise + fall + scale_change * f) * half_per_width;
+      exponential(-shape.shape.rate * d, e);
+      Lanes f;
+      Lanes f_d;
+      Lanes f_width;
+      slopes_at(shape, d, e, f, f_d, f_width);
       const Lanes light = 1 + now.tilt * d;
       const std::array<Lanes, kAll> J = {zero + 1,        o,     light * f,
                                          light * f_width, d * f, -light * f_d};
