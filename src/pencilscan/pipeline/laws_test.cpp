@@ -12,7 +12,7 @@
 #include "pencilscan/geometry/ray_scene.h"
 #include "pencilscan/grid/gamma_trace.h"
 #include "pencilscan/pipeline/frame.h"
-#include "pencilscan/pipeline/frame_warnings.h"
+#include "pencilscan/pipeline/light_warnings.h"
 #include "pencilscan/pipeline/sample_frame.h"
 #include "pencilscan/pipeline/sensor_frame.h"
 #include "pencilscan/rig/camera_light.h"

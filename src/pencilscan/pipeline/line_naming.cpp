@@ -7,6 +7,7 @@
 #include "pencilscan/pipeline/frame_warnings.h"
 #include "pencilscan/pipeline/naming_doubt.h"
 #include "pencilscan/pipeline/rig_refinement.h"
+#include "pencilscan/pipeline/rig_warnings.h"
 
 namespace pencilscan {
 namespace {

@@ -14,6 +14,8 @@
 #include "pencilscan/io/image.h"
 #include "pencilscan/io/temporary_folder.h"
 #include "pencilscan/pipeline/frame_warnings.h"
+#include "pencilscan/pipeline/light_warnings.h"
+#include "pencilscan/pipeline/rig_warnings.h"
 #include "pencilscan/pipeline/sample_frame.h"
 #include "pencilscan/pipeline/sequence.h"
 #include "pencilscan/planning/ring.h"

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <string>
+
+#include "pencilscan/core/warning.h"
+#include "pencilscan/pipeline/frame.h"
+#include "pencilscan/pipeline/view_agreement.h"
+
+namespace pencilscan {
+
+/// Crossings miss each other by more than noise; what was done about it.
+[[nodiscard]] Warning rig_warning(const CrossingDisagreement& crossings, RigInFrame rig_in_frame);
+
+/// The one device whose crossings miss each other by far more than noise, where the rig as a whole
+/// does not (per device: cameras, then projectors). Counts alike in all resolutions.
+[[nodiscard]] std::optional<std::size_t> device_that_is_off(
+    std::span<const CrossingDisagreement> device_crossings);
+/// By how much its crossings miss, and what noise explains, in plain words.
+[[nodiscard]] std::string misses_text(const Device& device, const CrossingDisagreement& crossings);
+[[nodiscard]] std::optional<Warning> device_warning(
+    const Rig& rig, std::span<const CrossingDisagreement> device_crossings);
+
+/// That what one camera sees lies apart from what the others see, and that it was left out, or not.
+[[nodiscard]] Warning another_moment_warning(const Rig& rig, std::size_t camera,
+                                             const ViewsApart& apart, bool is_left_out);
+
+/// That depths of different cameras are not those of one surface, by so many deviations.
+[[nodiscard]] Warning views_warning(double deviations);
+
+/// That depth maps of different cameras do not fit each other (ConsistencyReport::sigma_scale),
+/// where nothing that was `said` explains it.
+[[nodiscard]] std::optional<Warning> depth_warning(double deviations,
+                                                   std::span<const Warning> said);
+
+}  // namespace pencilscan
