@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "pencilscan/calibration/calibrate.h"
-#include "pencilscan/calibration/verdict.h"
+#include "pencilscan/calibration/finding.h"
 
 namespace pencilscan {
 

@@ -6,7 +6,7 @@
 #include "pencilscan/calibration/capture_moves.h"
 #include "pencilscan/calibration/pair_fit.h"
 #include "pencilscan/calibration/pair_matches.h"
-#include "pencilscan/calibration/verdict.h"
+#include "pencilscan/calibration/finding.h"
 
 namespace pencilscan {
 

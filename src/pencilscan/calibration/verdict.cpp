@@ -4,44 +4,36 @@
 #include <cmath>
 
 #include "pencilscan/bundle/bundle_device.h"
-#include "pencilscan/calibration/given_values.h"
+#include "pencilscan/calibration/flat_scene.h"
+#include "pencilscan/calibration/given_findings.h"
 #include "pencilscan/calibration/pair_fit.h"
-#include "pencilscan/calibration/scale_deviation.h"
+#include "pencilscan/calibration/scale_findings.h"
 #include "pencilscan/calibration/suspects.h"
 #include "pencilscan/core/formatted.h"
-#include "pencilscan/core/length_units.h"
 #include "pencilscan/core/name_list.h"
 
 namespace pencilscan {
 namespace {
 
 constexpr int kCells = 4;
-const std::string kOffThePlane =
-    "capture an object with depth, or the plane in several poses that differ in tilt (one "
-    "--captures each)";
-
 std::string percent(double share) { return formatted(100 * share, "%.3g") + " %"; }
 
 class Judge {
  public:
   Judge(const CalibrationInput& input, const CalibrationResult& result,
         const Uncertainty& uncertainty, const VerdictOptions& options)
-      : input_(input), result_(result), uncertainty_(uncertainty), options_(options) {
-    double planar = 0;
-    double all = 0;
-    for (const PairGeometry& pair : result.pairs) {
-      planar += pair.planar_share * static_cast<double>(pair.inliers);
-      all += static_cast<double>(pair.inliers);
-    }
-    if (all > 0) planar_share_ = planar / all;
-  }
+      : input_(input),
+        result_(result),
+        uncertainty_(uncertainty),
+        options_(options),
+        scene_(flat_scene(result, options)) {}
 
   std::vector<Finding> findings() {
     judge_scene();
     if (!result_.solved) {
       add(Grade::kUnusable,
-          "no structure could be found that explains the correspondences" + reason(),
-          advice("give rough K of the devices, or captures that overlap more"));
+          "no structure could be found that explains the correspondences" + scene_.reason(),
+          scene_.advice("give rough K of the devices, or captures that overlap more"));
       return std::move(findings_);
     }
     judge_knowledge();
@@ -50,7 +42,7 @@ class Judge {
     judge_residuals();
     judge_devices();
     judge_volume();
-    judge_scale();
+    add_all(scale_findings(input_, result_, uncertainty_, scene_, options_));
     judge_given();
     return std::move(findings_);
   }
@@ -58,6 +50,9 @@ class Judge {
  private:
   void add(Grade grade, const std::string& what, const std::string& advice = {}) {
     findings_.push_back({grade, what, advice});
+  }
+  void add_all(const std::vector<Finding>& findings) {
+    findings_.insert(findings_.end(), findings.begin(), findings.end());
   }
   [[nodiscard]] const std::string& name(std::size_t d) const {
     return device_at(input_.rig, d).name;
@@ -70,21 +65,9 @@ class Judge {
           "check exposure and focus: see the decoding table");
     }
     const bool helped = !result_.problem.board_views.empty();
-    if (planar_share_ < options_.planar_share) return;
-    add(helped ? Grade::kDoubtful : Grade::kUnusable, "planar scene: " + plane_text(),
-        kOffThePlane);
-  }
-
-  [[nodiscard]] std::string plane_text() const {
-    return "one plane explains " + percent(planar_share_) +
-           " of the correspondences, and every rig sees a plane alike";
-  }
-  /// Why a rig is known weakly, and what helps.
-  [[nodiscard]] std::string reason() const {
-    return planar_share_ < options_.mostly_planar_share ? "" : ": " + plane_text();
-  }
-  [[nodiscard]] std::string advice(const std::string& usual) const {
-    return planar_share_ < options_.mostly_planar_share ? usual : kOffThePlane + ", or give K";
+    if (scene_.share < options_.planar_share) return;
+    add(helped ? Grade::kDoubtful : Grade::kUnusable, "planar scene: " + scene_.text(),
+        kLeaveThePlane);
   }
 
   /// One fundamental matrix has seven degrees of freedom: the pose takes five.
@@ -107,8 +90,7 @@ class Judge {
   }
 
   void judge_pairs() {
-    for (const Finding& finding : find_contradictions(input_, result_).findings)
-      findings_.push_back(finding);
+    add_all(find_contradictions(input_, result_).findings);
     const auto matches = matches_by_pair(input_.tracks);
     const PairFit fit = tolerant_fit(result_);
     for (const PairGeometry& pair : result_.pairs) {
@@ -167,7 +149,8 @@ class Judge {
         worst_device = d;
       }
       for (const std::size_t i : {kFx, kCx, kCy})
-        if (u.is_prior[i] && !is_given(d)) at_prior.push_back(name(d) + " " + kIntrinsicNames[i]);
+        if (u.is_prior[i] && !is_given(result_, d))
+          at_prior.push_back(name(d) + " " + kIntrinsicNames[i]);
       judge_lens(d);
       const Device& placed = device_at(result_.rig, d);
       const double scale = device.inner[kFx] / placed.width;
@@ -180,9 +163,10 @@ class Judge {
     if (worst > good_focal_sigma()) {
       add(worst > options_.usable_focal_sigma ? Grade::kUnusable : Grade::kDoubtful,
           "focal lengths are known weakly: that of " + name(worst_device) + " to " +
-              percent(worst) + " (one standard deviation)" + reason(),
-          advice("add captures with the object moved through the whole volume, or give K of the "
-                 "cameras"));
+              percent(worst) + " (one standard deviation)" + scene_.reason(),
+          scene_.advice(
+              "add captures with the object moved through the whole volume, or give K of the "
+              "cameras"));
     }
     if (!at_prior.empty()) {
       add(Grade::kDoubtful,
@@ -208,7 +192,7 @@ class Judge {
     const char* which = "";
     for (const std::size_t i : {kFy, kP1, kP2, kCx, kK1, kK2, kK3}) {
       // How far a given K moved is told in its tolerances, but for the shape of its pixels.
-      if (is_given(d) && (i == kCx || i == kCy)) continue;
+      if (is_given(result_, d) && (i == kCx || i == kCy)) continue;
       const double sigma = device.prior_sigma[i];
       if (sigma == 0 || !std::isfinite(sigma)) continue;
       const double value = i == kFy ? device.inner[kFy] / device.inner[kFx] : device.inner[i];
@@ -222,10 +206,23 @@ class Judge {
     add(Grade::kDoubtful,
         std::string(which) + " of " + name(d) + " lies " + formatted(worst) +
             " standard deviations from what such devices have" +
-            (is_given(d) ? " and from what was given" : "") + ": the data contradict the model",
+            (is_given(result_, d) ? " and from what was given" : "") +
+            ": the data contradict the model",
         std::string("check that nothing moved and that no glass or mirror is in the way") +
             (has_board ? ", and that the board is flat and its squares are square" : "") +
             ", and add captures");
+  }
+
+  void judge_given() {
+    // Before a plane another rig fits as well as the right one, and has another K.
+    const bool is_any_other =
+        worst_focal_sigma_ > options_.usable_focal_sigma && scene_.is_mostly_flat;
+    if (!is_any_other) {
+      add_all(given_findings(input_, result_));
+    } else if (std::count(result_.given.begin(), result_.given.end(), GivenUse::kNone) <
+               static_cast<std::ptrdiff_t>(result_.given.size())) {
+      add(Grade::kGood, "given K are not judged: " + scene_.text());
+    }
   }
 
   void judge_volume() {
@@ -237,176 +234,15 @@ class Judge {
         "a measured point is off by " + formatted(uncertainty_.volume_median) + unit +
             " (one standard deviation) from the rig's errors alone, scale apart, in a volume of "
             "radius " +
-            formatted(uncertainty_.volume_radius, "%.3g") + unit + reason(),
-        advice("add captures that fill the volume"));
-  }
-
-  void judge_scale() {
-    if (!input_.board_views.empty() && result_.problem.board_views.empty())
-      add(Grade::kDoubtful, "the board was seen, but not placed: too few correspondences lie on it",
-          "let a projector light the board while a camera sees all of it");
-    if (!result_.rig.unit_known)
-      add(Grade::kGood, "the scale is not known: the rig's unit is \"unknown\"",
-          "give --known-distance" + best_pair_text() + ", or a --board");
-    judge_scale_deviation();
-    if (result_.board_times) judge_board_lengths(*result_.board_times);
-    if (result_.given_times) judge_given_lengths(*result_.given_times);
-    judge_given_places();
-  }
-
-  /// Which distance would fix the scale best, and to what.
-  [[nodiscard]] std::string best_pair_text() const {
-    const auto best = best_distance(result_, uncertainty_);
-    if (!best) return {};
-    return " of " + name(best->devices[0]) + " and " + name(best->devices[1]) +
-           ", with which lengths are known to " + percent(best->share);
-  }
-
-  [[nodiscard]] std::string given_length(const ScaleDeviation& scale) const {
-    switch (scale.from) {
-      case ScaleDeviation::From::kDistance:
-        return "the distance of " + name(scale.devices[0]) + " and " + name(scale.devices[1]);
-      case ScaleDeviation::From::kBoard:
-        return "the board";
-      case ScaleDeviation::From::kPoses:
-        return "the given poses";
-    }
-    return {};
-  }
-
-  void judge_scale_deviation() {
-    const auto scale = scale_deviation(input_, result_, uncertainty_);
-    if (!scale || scale->share <= options_.good_scale_sigma) return;
-    const auto best = best_distance(result_, uncertainty_);
-    // Deviations are stated to a fifth (docs/calibration.md, "Deviations").
-    constexpr double kClearly = 0.8;
-    const bool another_helps = best && best->share < kClearly * scale->share;
-    const std::string captures = "add captures that fill the volume, or give K of the cameras";
-    std::string what_to_do =
-        another_helps ? "give --known-distance" + best_pair_text() : advice(captures);
-    if (another_helps && best->share > options_.good_scale_sigma) what_to_do += "; " + captures;
-    add(Grade::kDoubtful,
-        "the scale is known weakly: lengths in the volume to " + percent(scale->share) +
-            " (one standard deviation) by " + given_length(*scale) + reason(),
-        what_to_do);
-  }
-
-  /// Of what is `factor` times as long by `measured` as by `other`: what is too short is in the
-  /// larger unit.
-  [[nodiscard]] static std::string unit_behind(double factor, const std::string& other,
-                                               const std::string& measured) {
-    constexpr double kUnitTolerance = 0.1;
-    const UnitFactor* unit = unit_behind_factor(std::max(factor, 1 / factor), kUnitTolerance);
-    if (unit == nullptr) return {};
-    return "; " + (factor > 1 ? other : measured) + " is probably in " + unit->words;
-  }
-
-  void judge_board_lengths(double factor) {
-    add(Grade::kDoubtful,
-        "the known distance and the board contradict each other: by the known distance, which "
-        "counts, lengths are " +
-            formatted(factor, "%.3g") + " times those by the board" +
-            unit_behind(factor, "the board", "the known distance"),
-        "measure a square of the board, and the distance of the lenses of these two devices");
-  }
-
-  /// A distance or a board against given poses, all in millimetres.
-  void judge_given_lengths(double factor) {
-    const std::string measured = input_.distance ? "known distance" : "board";
-    std::string what = "the " + measured + " and the given poses contradict each other: by the " +
-                       measured + ", lengths are " + formatted(factor, "%.3g") +
-                       " times those of t. Poses, volume and floor were multiplied by it";
-    what += unit_behind(factor, "t", "the " + measured);
-    add(Grade::kDoubtful, what, "give the " + measured + " and t in mm");
-  }
-
-  void judge_given_places() {
-    std::string lost = result_.has_lost_volume ? "volume" : "";
-    if (result_.has_lost_floor) lost += lost.empty() ? "floor" : " and floor";
-    if (lost.empty()) return;
-    add(Grade::kGood,
-        lost +
-            " of the devices file were left out: fewer than three of its poses are known, so "
-            "the rig has a frame of its own",
-        "state them in the rig's frame, or give three poses");
-  }
-
-  /// A given K within its tolerance.
-  [[nodiscard]] bool is_given(std::size_t d) const {
-    return result_.given[d] == GivenUse::kTolerance || result_.given[d] == GivenUse::kExact;
-  }
-
-  /// The tolerances of given K.
-  [[nodiscard]] std::string tolerances() const {
-    return percent(result_.tolerance.focal) + ", " + formatted(result_.tolerance.center_px) + " px";
-  }
-
-  /// `moved`: tolerances; infinite where there is none.
-  [[nodiscard]] std::string how_far_off(std::size_t d, std::size_t intrinsic, double moved) const {
-    const std::string what = kIntrinsicNames[intrinsic];
-    if (std::isfinite(moved))
-      return what + " " + formatted(moved) + " of its tolerances (" + tolerances() + ") off";
-    const double stated = bundle_device(device_at(input_.rig, d)).inner[intrinsic];
-    return what + " is " + formatted(result_.problem.devices[d].inner[intrinsic], "%.5g") +
-           ", and was stated exactly as " + formatted(stated, "%.5g");
-  }
-
-  void judge_given() {
-    // Before a plane another rig fits as well as the right one, and has another K.
-    if (worst_focal_sigma_ > options_.usable_focal_sigma &&
-        planar_share_ >= options_.mostly_planar_share) {
-      if (std::count(result_.given.begin(), result_.given.end(), GivenUse::kNone) <
-          static_cast<std::ptrdiff_t>(result_.given.size()))
-        add(Grade::kGood, "given K are not judged: " + plane_text());
-      return;
-    }
-    const std::string unit = tolerances();
-    const std::string advice =
-        "check that K is of this lens, focus and image size, or say how rough it is "
-        "(--focal-tolerance, --center-tolerance)";
-    std::string moved_within;
-    std::vector<char> within(result_.placed.size(), 0);
-    for (std::size_t d = 0; d < result_.placed.size(); ++d) {
-      if (result_.given[d] == GivenUse::kNone || result_.placed[d] == 0) continue;
-      const BundleDevice& found = result_.problem.devices[d];
-      const auto moved = moved_deviations(device_at(input_.rig, d), result_.tolerance, found);
-      const auto most =
-          static_cast<std::size_t>(std::max_element(moved.begin(), moved.end()) - moved.begin());
-      if (is_given(d) && moved[most] <= kContradictsDeviations) {
-        if (moved[most] > 0)
-          add_name(moved_within,
-                   name(d) + " by " + kIntrinsicNames[most] + " " + formatted(moved[most]));
-        within[d] = 1;
-        continue;
-      }
-      const bool is_free = result_.given[d] == GivenUse::kContradicted;
-      add(Grade::kDoubtful,
-          "the data contradict the given K of " + name(d) + ": " +
-              how_far_off(d, most, moved[most]) +
-              (is_free ? ", so it was only a start" : ", though it was held near it"),
-          advice);
-    }
-    // A single one would be named above.
-    const double together = common_pull(input_, within, result_.tolerance, result_.problem);
-    if (together > kContradictsDeviations)
-      add(Grade::kDoubtful,
-          "the data contradict the given K together: that all are off by as much is as unlikely "
-          "as " +
-              formatted(together) +
-              " standard deviations, though each alone is near its tolerance (" + unit + ")",
-          advice);
-    if (moved_within.empty() && std::count(within.begin(), within.end(), 1) > 0)
-      add(Grade::kGood, "given K were kept exactly");
-    if (!moved_within.empty())
-      add(Grade::kGood,
-          "given K were kept; they moved, in their tolerances (" + unit + "): " + moved_within);
+            formatted(uncertainty_.volume_radius, "%.3g") + unit + scene_.reason(),
+        scene_.advice("add captures that fill the volume"));
   }
 
   const CalibrationInput& input_;
   const CalibrationResult& result_;
   const Uncertainty& uncertainty_;
   const VerdictOptions& options_;
-  double planar_share_ = 0;       ///< of the correspondences of all pairs
+  FlatScene scene_;
   double worst_focal_sigma_ = 0;  ///< over the focal length
   std::vector<Finding> findings_;
 };

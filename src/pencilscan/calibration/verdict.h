@@ -1,23 +1,13 @@
 #pragma once
 
-#include <string>
 #include <vector>
 
 #include "pencilscan/bundle/uncertainty.h"
 #include "pencilscan/calibration/calibrate.h"
+#include "pencilscan/calibration/finding.h"
 #include "pencilscan/calibration/rig_frame.h"
 
 namespace pencilscan {
-
-enum class Grade { kGood, kDoubtful, kUnusable };
-[[nodiscard]] std::string to_string(Grade grade);
-
-/// Something to know about a calibration, in plain words.
-struct Finding {
-  Grade grade = Grade::kGood;  ///< what it makes of the calibration; good: a note
-  std::string what;
-  std::string advice;  ///< what to do; may be empty
-};
 
 struct Verdict {
   Grade grade = Grade::kGood;  ///< the worst of the findings

@@ -5,8 +5,8 @@
 #include <cmath>
 
 #include "pencilscan/core/median.h"
+#include "pencilscan/pipeline/disagreement_warnings.h"
 #include "pencilscan/pipeline/frame_warnings.h"
-#include "pencilscan/pipeline/rig_warnings.h"
 #include "pencilscan/rig/sample_devices.h"
 #include "pencilscan/simulation/panel_light.h"
 #include "pencilscan/simulation/render.h"

@@ -6,9 +6,9 @@
 #include "pencilscan/core/formatted.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/pipeline/coarse_view.h"
+#include "pencilscan/pipeline/disagreement_warnings.h"
 #include "pencilscan/pipeline/frame_warnings.h"
 #include "pencilscan/pipeline/light_warnings.h"
-#include "pencilscan/pipeline/rig_warnings.h"
 #include "pencilscan/pipeline/sensor_frame.h"
 #include "pencilscan/surface/manifold.h"
 

@@ -2,11 +2,11 @@
 #include <optional>
 #include <utility>
 
+#include "pencilscan/pipeline/disagreement_warnings.h"
 #include "pencilscan/pipeline/frame.h"
 #include "pencilscan/pipeline/light_warnings.h"
 #include "pencilscan/pipeline/line_naming.h"
 #include "pencilscan/pipeline/picture_check.h"
-#include "pencilscan/pipeline/rig_warnings.h"
 
 // Of a frame's way: what its pictures say of themselves, and the solution.
 

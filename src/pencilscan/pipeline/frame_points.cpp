@@ -4,9 +4,9 @@
 
 #include "pencilscan/core/median.h"
 #include "pencilscan/core/parallel.h"
+#include "pencilscan/pipeline/disagreement_warnings.h"
 #include "pencilscan/pipeline/frame.h"
 #include "pencilscan/pipeline/frame_warnings.h"
-#include "pencilscan/pipeline/rig_warnings.h"
 #include "pencilscan/pipeline/view_agreement.h"
 #include "pencilscan/points/surface_check.h"
 #include "pencilscan/rig/object_space.h"

@@ -4,10 +4,10 @@
 #include <limits>
 #include <utility>
 
+#include "pencilscan/pipeline/disagreement_warnings.h"
 #include "pencilscan/pipeline/frame_warnings.h"
 #include "pencilscan/pipeline/naming_doubt.h"
 #include "pencilscan/pipeline/rig_refinement.h"
-#include "pencilscan/pipeline/rig_warnings.h"
 
 namespace pencilscan {
 namespace {

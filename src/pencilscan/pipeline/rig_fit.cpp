@@ -8,11 +8,11 @@
 
 #include "pencilscan/core/formatted.h"
 #include "pencilscan/core/name_list.h"
+#include "pencilscan/pipeline/disagreement_warnings.h"
 #include "pencilscan/pipeline/line_naming.h"
 #include "pencilscan/pipeline/lost_cameras.h"
 #include "pencilscan/pipeline/lost_projectors.h"
 #include "pencilscan/pipeline/naming_doubt.h"
-#include "pencilscan/pipeline/rig_warnings.h"
 
 namespace pencilscan {
 namespace {

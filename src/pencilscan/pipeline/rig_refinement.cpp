@@ -8,10 +8,10 @@
 #include <utility>
 
 #include "pencilscan/joint/joint.h"
+#include "pencilscan/pipeline/disagreement_warnings.h"
 #include "pencilscan/pipeline/lost_cameras.h"
 #include "pencilscan/pipeline/lost_projectors.h"
 #include "pencilscan/pipeline/naming_doubt.h"
-#include "pencilscan/pipeline/rig_warnings.h"
 #include "pencilscan/pipeline/view_agreement.h"
 #include "pencilscan/refinement/moved_devices.h"
 

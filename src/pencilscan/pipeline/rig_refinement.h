@@ -20,8 +20,8 @@ struct RigRefinementOptions {
   RefineRigOptions refine;
   /// The rig is wanted, not only names for the lines of one frame. Then cameras that stand far off
   /// are looked for first (lost_cameras.h). A rig is refused in which one device's crossings still
-  /// miss each other by far more than noise (rig_warnings.h), or a projector's lines cross those
-  /// of others elsewhere. Of a refused one a projector that stands far off is looked for
+  /// miss each other by far more than noise (disagreement_warnings.h), or a projector's lines cross
+  /// those of others elsewhere. Of a refused one a projector that stands far off is looked for
   /// (lost_projectors.h).
   bool is_for_rig = true;
 };

@@ -284,7 +284,8 @@ bool are_enough(const CrossingDisagreement& crossings) {
 }
 
 bool disagrees(const CrossingDisagreement& crossings) {
-  // Single devices of right rigs reach 1.8 times (device_warning() in pipeline/rig_warnings.cpp).
+  // Single devices of right rigs reach 1.8 times (device_warning() in
+  // pipeline/disagreement_warnings.cpp).
   constexpr double kFactor = 2;
   return are_enough(crossings) &&
          crossings.median_px > kFactor * std::max(0.05, crossings.expected_px);

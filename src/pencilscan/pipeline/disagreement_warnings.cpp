@@ -1,4 +1,4 @@
-#include "pencilscan/pipeline/rig_warnings.h"
+#include "pencilscan/pipeline/disagreement_warnings.h"
 
 #include <algorithm>
 #include <cmath>

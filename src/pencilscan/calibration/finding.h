@@ -1,0 +1,17 @@
+#pragma once
+
+#include <string>
+
+namespace pencilscan {
+
+enum class Grade { kGood, kDoubtful, kUnusable };
+[[nodiscard]] std::string to_string(Grade grade);
+
+/// Something to know about a calibration, in plain words.
+struct Finding {
+  Grade grade = Grade::kGood;  ///< what it makes of the calibration; good: a note
+  std::string what;
+  std::string advice;  ///< what to do; may be empty
+};
+
+}  // namespace pencilscan
