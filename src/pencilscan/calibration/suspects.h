@@ -4,9 +4,9 @@
 #include <vector>
 
 #include "pencilscan/calibration/capture_moves.h"
+#include "pencilscan/calibration/finding.h"
 #include "pencilscan/calibration/pair_fit.h"
 #include "pencilscan/calibration/pair_matches.h"
-#include "pencilscan/calibration/finding.h"
 
 namespace pencilscan {
 

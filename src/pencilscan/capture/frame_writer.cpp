@@ -10,7 +10,7 @@
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/io/image.h"
 #include "pencilscan/io/partial_folder.h"
-#include "pencilscan/recording/pack.h"
+#include "pencilscan/recording/frame_folders.h"
 #include "pencilscan/recording/recording_writer.h"
 
 namespace pencilscan {

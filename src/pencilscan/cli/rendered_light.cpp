@@ -6,7 +6,7 @@
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/formatted.h"
 #include "pencilscan/io/image.h"
-#include "pencilscan/recording/pack.h"
+#include "pencilscan/recording/frame_folders.h"
 
 namespace pencilscan::cli {
 

@@ -9,6 +9,7 @@
 #include "pencilscan/core/median.h"
 #include "pencilscan/core/name_list.h"
 #include "pencilscan/core/parallel.h"
+#include "pencilscan/recording/frame_folders.h"
 #include "pencilscan/recording/pack.h"
 
 namespace pencilscan::cli {

@@ -20,7 +20,7 @@
 #include "pencilscan/pipeline/sequence.h"
 #include "pencilscan/pipeline/sequence_inputs.h"
 #include "pencilscan/pipeline/shard.h"
-#include "pencilscan/recording/pack.h"
+#include "pencilscan/recording/frame_folders.h"
 
 namespace pencilscan::cli {
 namespace {

@@ -20,7 +20,7 @@
 #include "pencilscan/io/mesh_file.h"
 #include "pencilscan/io/partial_folder.h"
 #include "pencilscan/planning/units.h"
-#include "pencilscan/recording/pack.h"
+#include "pencilscan/recording/frame_folders.h"
 #include "pencilscan/simulation/blender.h"
 #include "pencilscan/simulation/photography.h"
 #include "pencilscan/simulation/povray.h"

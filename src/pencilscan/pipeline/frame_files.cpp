@@ -11,7 +11,7 @@
 #include "pencilscan/io/hash.h"
 #include "pencilscan/io/image.h"
 #include "pencilscan/io/json_text.h"
-#include "pencilscan/recording/pack.h"
+#include "pencilscan/recording/frame_folders.h"
 #include "pencilscan/rig/camera_light.h"
 
 namespace pencilscan {

@@ -9,6 +9,7 @@
 #include "pencilscan/io/file.h"
 #include "pencilscan/io/hash.h"
 #include "pencilscan/pipeline/frame_files.h"
+#include "pencilscan/recording/frame_folders.h"
 #include "pencilscan/recording/frame_sets.h"
 #include "pencilscan/recording/pack.h"
 #include "pencilscan/recording/recording.h"

@@ -19,7 +19,7 @@
 #include "pencilscan/pipeline/sample_frame.h"
 #include "pencilscan/pipeline/sequence.h"
 #include "pencilscan/planning/ring.h"
-#include "pencilscan/recording/pack.h"
+#include "pencilscan/recording/frame_folders.h"
 #include "pencilscan/rig/sample_devices.h"
 #include "pencilscan/simulation/simulated_object.h"
 

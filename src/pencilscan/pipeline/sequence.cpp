@@ -24,7 +24,7 @@
 #include "pencilscan/pipeline/sensor_frame.h"
 #include "pencilscan/pipeline/sequence_inputs.h"
 #include "pencilscan/pipeline/surface_chain.h"
-#include "pencilscan/recording/pack.h"
+#include "pencilscan/recording/frame_folders.h"
 
 namespace pencilscan {
 namespace {

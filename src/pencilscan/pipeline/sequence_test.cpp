@@ -25,6 +25,7 @@
 #include "pencilscan/pipeline/repeated_pictures.h"
 #include "pencilscan/pipeline/run_folder.h"
 #include "pencilscan/pipeline/sequence_inputs.h"
+#include "pencilscan/recording/frame_folders.h"
 #include "pencilscan/recording/pack.h"
 #include "pencilscan/rig/sample_devices.h"
 

@@ -1,8 +1,6 @@
 #pragma once
 
 #include <filesystem>
-#include <optional>
-#include <span>
 #include <string>
 #include <vector>
 
@@ -47,16 +45,5 @@ PackReport unpack_recording(const Recording& recording, const FrameSets& sets,
 /// frame, a sentence a camera (CameraClock::left_out).
 [[nodiscard]] std::vector<std::string> left_out_warnings(const Recording& recording,
                                                          const FrameSets& sets);
-
-/// The frame folders below `folder` in their order: by number where all names are digits, else by
-/// name; not those whose names begin with a dot. InputError when there is none.
-[[nodiscard]] std::vector<std::string> frame_folder_names(const std::filesystem::path& folder);
-
-/// Says where the order of names is not that of the numbers in them: shot_10 before shot_2.
-/// `names`: in order.
-[[nodiscard]] std::optional<std::string> order_warning(std::span<const std::string> names);
-
-/// The name of frame k: six digits.
-[[nodiscard]] std::string six_digits(std::size_t frame);
 
 }  // namespace pencilscan

@@ -13,6 +13,7 @@
 #include "pencilscan/io/file.h"
 #include "pencilscan/io/image.h"
 #include "pencilscan/io/temporary_folder.h"
+#include "pencilscan/recording/frame_folders.h"
 
 namespace pencilscan {
 namespace {
