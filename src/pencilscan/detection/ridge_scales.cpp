@@ -197,20 +197,24 @@ std::vector<Ridgel> merged_scales(const cv::Mat& presence, const std::vector<Rid
   constexpr int kCellPx = 4;
   const CellIndex index(presence.size(), kCellPx, fine.size(),
                         [&](std::size_t i) { return std::pair(fine[i].x, fine[i].y); });
+  std::vector<Ridgel> by_cell;  // what lies together, together in memory
+  by_cell.reserve(fine.size());
+  for (const int item : index.items()) by_cell.push_back(fine[static_cast<std::size_t>(item)]);
   std::vector<char> is_edge(fine.size(), 0);
   std::vector<Ridgel> result;
-  std::vector<std::size_t> beside;
+  std::vector<std::size_t> beside;  // in by_cell
   for (const Ridgel& w : wide) {
     bool is_middle = true;
     beside.clear();
     const auto look = [&](float radius, float max_across) {
-      index.around(w.x, w.y, radius, [&](int item) {
-        const auto i = static_cast<std::size_t>(item);
-        const Ridgel& f = fine[i];
-        const auto [across, along] = distance(f, w);
-        if (across > max_across || along > kAlong || !are_parallel(f, w)) return true;
-        if (across < kSameLine) is_middle = false;
-        beside.push_back(i);
+      index.ranges(w.x, w.y, radius, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end && is_middle; ++i) {
+          const Ridgel& f = by_cell[i];
+          const auto [across, along] = distance(f, w);
+          if (across > max_across || along > kAlong || !are_parallel(f, w)) continue;
+          if (across < kSameLine) is_middle = false;
+          beside.push_back(i);
+        }
         return is_middle;
       });
     };
@@ -220,10 +224,10 @@ std::vector<Ridgel> merged_scales(const cv::Mat& presence, const std::vector<Rid
     look(kLineReach, kLineReach);
     const float middle = value_at(presence, 1, w);
     for (const std::size_t i : beside) {
-      is_middle = is_middle && middle >= kFlatTop * value_at(presence, 1, fine[i]);
+      is_middle = is_middle && middle >= kFlatTop * value_at(presence, 1, by_cell[i]);
     }
     if (!is_middle) continue;
-    for (const std::size_t i : beside) is_edge[i] = 1;
+    for (const std::size_t i : beside) is_edge[static_cast<std::size_t>(index.items()[i])] = 1;
     result.push_back(w);
     result.back().width_px = kWideLinePx;
   }

@@ -111,6 +111,7 @@ class CameraMatching {
   std::vector<LabeledRun> not_on_surface_;  ///< runs whose points it does not hold yet
   NamedPoints named_;
   std::vector<PredictedPoint> missing_;  ///< predicted points that no label explains
+  std::size_t not_shown_by_ = 0;         ///< so many named points do not show any of those
   std::vector<PredictedPoint> shown_;    ///< those that one does
   PredictedPlaces missing_places_;       ///< those as of the last predict()
   std::vector<DeniedRun> denied_;
@@ -203,6 +204,7 @@ void CameraMatching::predict() {
   constexpr float kFarApart = 5;  // px; of denser lines more are missing by themselves
   const bool is_first = expected_.empty();
   expected_.resize(rig_.projectors.size());
+  if (missing_.empty()) not_shown_by_ = named_.count();
   for (const PredictedPoint& p :
        predict_lines(rig_, camera_, surface_, patterns_, options_.prediction)) {
     const bool is_named = named_.show(p);
@@ -380,7 +382,8 @@ bool CameraMatching::fits(const CurvePoint& point, const LineName& name, int fam
 
 /// Missing points that no curve shows by now, in chains.
 std::vector<LineChain> CameraMatching::still_missing() {
-  std::erase_if(missing_, [&](const PredictedPoint& p) { return named_.show(p); });
+  const std::size_t known = std::exchange(not_shown_by_, named_.count());
+  std::erase_if(missing_, [&](const PredictedPoint& p) { return named_.show(p, known); });
   return chain_points(missing_);
 }
 

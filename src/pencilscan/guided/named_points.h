@@ -1,6 +1,8 @@
 #pragma once
 
+#include <map>
 #include <optional>
+#include <utility>
 
 #include "pencilscan/detection/curve.h"
 #include "pencilscan/guided/guided_matching.h"
@@ -15,8 +17,11 @@ class NamedPoints {
 
   /// Adds the points of a run of the curve.
   void add(const Curve& curve, const LabeledRun& run);
-  /// True where a point within 1.5 px has the name of a predicted one.
-  [[nodiscard]] bool show(const PredictedPoint& p) const;
+  /// How many points were added.
+  [[nodiscard]] std::size_t count() const { return names_.size(); }
+  /// True where a point within 1.5 px has the name of a predicted one. The first `known` points are
+  /// known not to.
+  [[nodiscard]] bool show(const PredictedPoint& p, std::size_t known = 0) const;
   /// visit(name) for each point within `reach` px, of a pixel or two.
   template <class Visit>
   void names_around(const Eigen::Vector2f& place, float reach, Visit visit) const {
@@ -36,14 +41,17 @@ class NamedPoints {
     Eigen::Vector2f position;
     LineName name;
   };
-  struct NamedLight {
-    NamedPlace place;
+  struct LineLight {
+    Eigen::Vector2f position;
+    int line;
     float amplitude;
   };
 
   const GuidedMatchingOptions& options_;
-  Places<NamedPlace> names_;   ///< looked for within a pixel or two
-  Places<NamedLight> lights_;  ///< the same points, looked for within some line spacings
+  cv::Size size_;
+  Places<NamedPlace> names_;  ///< looked for within a pixel or two
+  /// The same points by projector and pattern, looked for within some line spacings.
+  std::map<std::pair<int, int>, Places<LineLight>> lights_;
 };
 
 }  // namespace pencilscan

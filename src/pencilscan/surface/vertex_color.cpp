@@ -154,11 +154,11 @@ Samples collect(const Rig& rig, const RayScene& surface, std::span<const ColorVi
 
 /// Sum of value(v) over all vertices, which value may change.
 template <class Value>
-Eigen::Array3d ordered_sum(std::size_t count, const Value& value) {
+Eigen::Array4d ordered_sum(std::size_t count, const Value& value) {
   constexpr std::size_t kRun = 4096;
-  const Eigen::Array3d zero = Eigen::Array3d::Zero();
+  const Eigen::Array4d zero = Eigen::Array4d::Zero();
   return sum_of_runs(count, kRun, zero, [&](std::size_t from, std::size_t to) {
-    Eigen::Array3d sum = zero;
+    Eigen::Array4d sum = zero;
     for (std::size_t v = from; v < to; ++v) sum += value(v);
     return sum;
   });
@@ -249,47 +249,55 @@ class Neighbors {
   std::vector<int> neighbors_;
 };
 
+/// Three channels and a zero, so that processors take them at once.
+using Lanes = Eigen::Array4f;
+
+Lanes lanes(const Channels& c) { return {c[0], c[1], c[2], 0.F}; }
+
 /// Minimises sum_v weight_v (rho_v - right_v / weight_v)^2 + smoothing sum_edges (rho_i - rho_j)^2
 /// per channel by conjugate gradients with the diagonal as preconditioner, from `rho`. The mesh is
 /// closed, so that each edge appears once in both directions and the matrix is symmetric.
 void solve(const Neighbors& neighbors, std::span<const Evidence> sums, float smoothing, int rounds,
            std::vector<Channels>& rho) {
   const std::size_t n = sums.size();
-  const auto diagonal = [&](std::size_t v) -> Channels {
-    return sums[v].weight + smoothing * static_cast<float>(neighbors.of(v).size()) + 1e-9F;
-  };
-  const auto times = [&](const std::vector<Channels>& x, std::size_t v) {
-    Channels sum = diagonal(v) * x[v];
-    for (const int k : neighbors.of(v)) sum -= smoothing * x[static_cast<std::size_t>(k)];
+  std::vector<Lanes> x(n), diagonal(n), residual(n), direction(n), product(n);
+  parallel_chunks(n, [&](std::size_t v) {
+    x[v] = lanes(rho[v]);
+    diagonal[v] =
+        lanes(sums[v].weight) + smoothing * static_cast<float>(neighbors.of(v).size()) + 1e-9F;
+  });
+  const auto times = [&](const std::vector<Lanes>& y, std::size_t v) {
+    Lanes sum = diagonal[v] * y[v];
+    for (const int k : neighbors.of(v)) sum -= smoothing * y[static_cast<std::size_t>(k)];
     return sum;
   };
-  std::vector<Channels> residual(n), direction(n), product(n);
-  Eigen::Array3d energy = ordered_sum(n, [&](std::size_t v) -> Eigen::Array3d {
-    residual[v] = sums[v].right - times(rho, v);
-    direction[v] = residual[v] / diagonal(v);
+  Eigen::Array4d energy = ordered_sum(n, [&](std::size_t v) -> Eigen::Array4d {
+    residual[v] = lanes(sums[v].right) - times(x, v);
+    direction[v] = residual[v] / diagonal[v];
     return (residual[v] * direction[v]).cast<double>();
   });
   // residual / diagonal is how far a vertex is off: the energy if all were off by the tolerance.
-  const Eigen::Array3d enough = ordered_sum(n, [&](std::size_t v) -> Eigen::Array3d {
-    const Channels off = kTolerance * rho[v];
-    return (diagonal(v) * off * off).cast<double>();
+  const Eigen::Array4d enough = ordered_sum(n, [&](std::size_t v) -> Eigen::Array4d {
+    const Lanes off = kTolerance * x[v];
+    return (diagonal[v] * off * off).cast<double>();
   });
   for (int round = 0; round < rounds && (energy > enough).any(); ++round) {
-    const Eigen::Array3d curvature = ordered_sum(n, [&](std::size_t v) -> Eigen::Array3d {
+    const Eigen::Array4d curvature = ordered_sum(n, [&](std::size_t v) -> Eigen::Array4d {
       product[v] = times(direction, v);
       return (direction[v] * product[v]).cast<double>();
     });
-    const Channels step = (energy / (curvature + 1e-30)).cast<float>();
-    const Eigen::Array3d next = ordered_sum(n, [&](std::size_t v) -> Eigen::Array3d {
-      rho[v] += step * direction[v];
+    const Lanes step = (energy / (curvature + 1e-30)).cast<float>();
+    const Eigen::Array4d next = ordered_sum(n, [&](std::size_t v) -> Eigen::Array4d {
+      x[v] += step * direction[v];
       residual[v] -= step * product[v];
-      return (residual[v] * residual[v] / diagonal(v)).cast<double>();
+      return (residual[v] * residual[v] / diagonal[v]).cast<double>();
     });
-    const Channels ratio = (next / (energy + 1e-30)).cast<float>();
+    const Lanes ratio = (next / (energy + 1e-30)).cast<float>();
     energy = next;
     parallel_chunks(
-        n, [&](std::size_t v) { direction[v] = residual[v] / diagonal(v) + ratio * direction[v]; });
+        n, [&](std::size_t v) { direction[v] = residual[v] / diagonal[v] + ratio * direction[v]; });
   }
+  parallel_chunks(n, [&](std::size_t v) { rho[v] = x[v].head<3>(); });
 }
 
 /// The mean of all evidence at every vertex.

@@ -26,6 +26,9 @@ class Places {
     cell.last = entry;
   }
 
+  /// How many things there are.
+  [[nodiscard]] std::size_t size() const { return entries_.size(); }
+
   void clear() {
     std::fill(cells_.begin(), cells_.end(), Cell{});
     entries_.clear();
@@ -44,6 +47,25 @@ class Places {
         }
       }
     }
+  }
+
+  /// True where is_it(thing) is for one within `reach` px, or some farther away, that was not among
+  /// the first `known` to be added.
+  template <class IsIt>
+  [[nodiscard]] bool any_around(const Eigen::Vector2f& at, float reach, std::size_t known,
+                                IsIt is_it) const {
+    for (int y = row(at.y() - reach); y <= row(at.y() + reach); ++y) {
+      for (int x = column(at.x() - reach); x <= column(at.x() + reach); ++x) {
+        const Cell& cell = cells_[index(x, y)];
+        if (cell.last < static_cast<int>(known)) continue;
+        for (int i = cell.first; i >= 0;) {
+          const Entry& entry = entries_[static_cast<std::size_t>(i)];
+          if (i >= static_cast<int>(known) && is_it(entry.thing)) return true;
+          i = entry.next;
+        }
+      }
+    }
+    return false;
   }
 
  private:
