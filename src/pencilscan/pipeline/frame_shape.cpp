@@ -127,7 +127,9 @@ void hand_on(const FrameLinks& links, std::vector<std::array<int, 3>> coarse_fac
         steady_surface(*before, result.surface.report.spacing_mm, next.coarse_faces, next.mesh);
     next.variance = std::move(steadied.variance);
     next.motion = steadied.motion;
-    result.surface.report.self_intersections = untangle(measured.vertices, next.mesh);
+    // The measured surface was untangled; where it moved on, others may be left.
+    std::size_t& intersections = result.surface.report.self_intersections;
+    intersections = std::max(intersections, untangle(measured.vertices, next.mesh));
     result.steadied = next.mesh.vertices;
   } else {
     next.variance = first_variance(next.mesh);

@@ -39,6 +39,25 @@ bool boxes_touch(const Triangle& a, const Triangle& b) {
   return (a.low.array() <= b.high.array()).all() && (b.low.array() <= a.high.array()).all();
 }
 
+/// A bounding box in floats, four at once: a quick look before that at the box itself.
+struct FloatBox {
+  Eigen::Array4f low, high;
+
+  FloatBox() = default;
+  explicit FloatBox(const Triangle& t) : low(Eigen::Array4f::Zero()), high(low) {
+    constexpr float kRounding =
+        1e-6F;  // of a coordinate, more than floats and their difference lose
+    low.head<3>() = t.low.cast<float>().array();
+    high.head<3>() = t.high.cast<float>().array();
+    low -= kRounding * low.abs();
+    high += kRounding * high.abs();
+  }
+};
+
+bool boxes_touch(const FloatBox& a, const FloatBox& b) {
+  return (a.low - b.high).max(b.low - a.high).maxCoeff() <= 0;
+}
+
 /// Of the corners of `t` over the plane of `base`, times the length of its normal.
 std::array<double, 3> heights(const Triangle& t, const Triangle& base) {
   const auto height = [&](std::size_t k) { return base.normal.dot(t.x[k] - base.x[0]); };
@@ -72,7 +91,9 @@ bool cut_each_other(const Triangle& a, const Triangle& b) {
 }
 
 bool have_common_vertex(const std::array<int, 3>& a, const std::array<int, 3>& b) {
-  return std::find_first_of(a.begin(), a.end(), b.begin(), b.end()) != a.end();
+  // Without branches: of faces in one place, a third or so have one.
+  const auto is_of_b = [&](int v) { return (v == b[0]) | (v == b[1]) | (v == b[2]); };
+  return is_of_b(a[0]) | is_of_b(a[1]) | is_of_b(a[2]);
 }
 
 using Cell = std::array<std::int32_t, 3>;
@@ -115,8 +136,10 @@ std::size_t hash(const Cell& c) {
 struct Buckets {
   std::vector<std::uint32_t> starts;  ///< of each bucket in `faces`, and the end of the last
   std::vector<std::uint32_t> faces;
+  std::vector<FloatBox> boxes;  ///< of each face of the mesh
 
-  explicit Buckets(const TriangleMesh& mesh) : starts(std::bit_ceil(mesh.faces.size()) + 1, 0) {
+  explicit Buckets(const TriangleMesh& mesh)
+      : starts(std::bit_ceil(mesh.faces.size()) + 1, 0), boxes(mesh.faces.size()) {
     const double size = cell_size(mesh);
     const std::size_t mask = starts.size() - 2;
     struct Entry {
@@ -127,7 +150,9 @@ struct Buckets {
       runs[r].reserve(4 * kFacesPerRun);
       const std::size_t end = std::min(mesh.faces.size(), (r + 1) * kFacesPerRun);
       for (std::size_t f = r * kFacesPerRun; f < end; ++f) {
-        for_each_cell(triangle(mesh, f), size, [&](const Cell& cell) {
+        const Triangle t = triangle(mesh, f);
+        boxes[f] = FloatBox(t);
+        for_each_cell(t, size, [&](const Cell& cell) {
           runs[r].push_back(
               {static_cast<std::uint32_t>(hash(cell) & mask), static_cast<std::uint32_t>(f)});
         });
@@ -207,22 +232,41 @@ std::vector<std::size_t> self_intersections(const TriangleMesh& mesh) {
   std::vector<std::vector<std::size_t>> found((buckets.starts.size() + kBucketsPerRun - 2) /
                                               kBucketsPerRun);
   parallel_for(found.size(), [&](std::size_t run) {
-    std::vector<Triangle> triangles;
+    std::vector<FloatBox> boxes;
+    std::vector<std::array<int, 3>> corners;
+    std::vector<std::size_t> touching;
     const std::size_t end = std::min((run + 1) * kBucketsPerRun, buckets.starts.size() - 1);
     for (std::size_t k = run * kBucketsPerRun; k < end; ++k) {
       const std::span faces =
           std::span(buckets.faces)
               .subspan(buckets.starts[k], buckets.starts[k + 1] - buckets.starts[k]);
-      triangles.clear();
-      for (const std::uint32_t f : faces) triangles.push_back(triangle(mesh, f));
-      for (std::size_t a = 0; a < faces.size(); ++a) {
+      if (faces.size() < 2) continue;
+      boxes.clear();
+      corners.clear();
+      for (const std::uint32_t f : faces) {
+        boxes.push_back(buckets.boxes[f]);
+        corners.push_back(mesh.faces[f]);
+      }
+      touching.resize(faces.size());
+      for (std::size_t a = 0; a + 1 < faces.size(); ++a) {
+        // Without branches: every second pair touches, at random.
+        std::size_t count = 0;
         for (std::size_t b = a + 1; b < faces.size(); ++b) {
-          if (!boxes_touch(triangles[a], triangles[b]) ||
-              have_common_vertex(mesh.faces[faces[a]], mesh.faces[faces[b]]))
-            continue;
-          if (!cut_each_other(triangles[a], triangles[b])) continue;
+          touching[count] = b;
+          count += boxes_touch(boxes[a], boxes[b]) ? 1 : 0;
+        }
+        std::size_t apart = 0;
+        for (std::size_t i = 0; i < count; ++i) {
+          const std::size_t b = touching[i];
+          touching[apart] = b;
+          apart += have_common_vertex(corners[a], corners[b]) ? 0 : 1;
+        }
+        for (std::size_t i = 0; i < apart; ++i) {
+          const Triangle of_a = triangle(mesh, faces[a]);
+          const Triangle of_b = triangle(mesh, faces[touching[i]]);
+          if (!boxes_touch(of_a, of_b) || !cut_each_other(of_a, of_b)) continue;
           found[run].push_back(faces[a]);
-          found[run].push_back(faces[b]);
+          found[run].push_back(faces[touching[i]]);
         }
       }
     }
@@ -246,16 +290,16 @@ std::size_t untangle(std::span<const Vec3> before, TriangleMesh& mesh) {
     if (near.vertices[v] != before[v]) moved.push_back(v);
     near.vertices[v] = as_floats(near.vertices[v]);
   }
-  near.faces = mesh.faces;
-  if (2 * moved.size() < before.size()) {
+  if (!moved.empty()) near.faces = mesh.faces;
+  if (!moved.empty() && 2 * moved.size() < before.size()) {
     const FacesOf faces_of(near);
     near.faces =
         faces_near(near, faces_of, around(near, faces_of, std::move(moved), 2 * kFarthest));
   }
   std::vector<std::size_t> faces = self_intersections(near);
+  std::vector<std::size_t> cut = vertices_of(near, faces);
   for (int round = 0; round < kRounds && !faces.empty(); ++round) {
     const FacesOf faces_of(near);
-    const std::vector<std::size_t> cut = vertices_of(near, faces);
     const std::vector<std::size_t> marked =
         around(near, faces_of, cut, 1 + std::max(0, round - kSmoothings) / 2);
     auto fewer = faces_near(near, faces_of, around(near, faces_of, cut, 2 * kFarthest));
@@ -264,8 +308,11 @@ std::size_t untangle(std::span<const Vec3> before, TriangleMesh& mesh) {
       if (round >= kSmoothings) near.vertices[v] = 0.5 * (before[v] + near.vertices[v]);
       near.vertices[v] = as_floats(near.vertices[v]);
     }
-    near.faces = std::move(fewer);
+    // What cut each other has moved, and so has all that may do so now.
+    near.faces = faces_near(near, faces_of, marked);
     faces = self_intersections(near);
+    cut = vertices_of(near, faces);
+    near.faces = std::move(fewer);
   }
   near.vertices.swap(mesh.vertices);
   return faces.size();

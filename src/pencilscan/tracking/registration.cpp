@@ -85,10 +85,15 @@ class TwistFit {
   explicit TwistFit(double radius) : radius_(radius) {}
 
   void add(const Match& match, const Vec3& offset, double weight) {
-    Vec6 row;
-    row << offset.cross(match.normal) / radius_, match.normal;
-    A_ += weight * row * row.transpose();
-    b_ += weight * match.gap * row;
+    const Vec3 turn = offset.cross(match.normal) / radius_;
+    const std::array<double, 6> row{turn[0],         turn[1],         turn[2],
+                                    match.normal[0], match.normal[1], match.normal[2]};
+    double* sum = A_.data();
+    for (std::size_t i = 0; i < 6; ++i) {
+      const double weighted = weight * row[i];
+      for (std::size_t j = 0; j < 6; ++j) *sum++ += weighted * row[j];
+      b_[static_cast<Eigen::Index>(i)] += weighted * match.gap;
+    }
     weight_ += weight;
   }
 

@@ -163,16 +163,23 @@ Steadied steady_surface(const TrackedSurface& before, double spacing,
   }
   const std::vector<double> together = spread(mesh, gaps, weights);
   constexpr double kLeastGain = 1.0 / (kMemoryMoments + 1);
+  // A mean that takes a hundredth off the variance takes half of one off the deviation.
+  constexpr double kMostGain = 0.99;
   parallel_chunks(count, [&](std::size_t v) {
     if (!(earlier[v].variance > 0)) return;
-    const auto travel = travel_at(then, registered, mesh.vertices[v], spacing);
-    if (!travel) return;
     const auto now = static_cast<double>(variance[v]);
     const double noise = kSharedNoise * (now + earlier[v].variance);
-    const double way = std::max(std::abs(together[v]), *travel);
-    const double motion = std::max(0.0, way * way - noise);
-    const double predicted = earlier[v].variance + motion;
-    const double gain = std::max(kLeastGain, predicted / (predicted + now));
+    const auto gain_after = [&](double way) {
+      const double predicted = earlier[v].variance + std::max(0.0, way * way - noise);
+      return std::max(kLeastGain, predicted / (predicted + now));
+    };
+    double way = std::abs(together[v]);
+    if (gain_after(way) > kMostGain) return;
+    const auto travel = travel_at(then, registered, mesh.vertices[v], spacing);
+    if (!travel) return;
+    way = std::max(way, *travel);
+    const double gain = gain_after(way);
+    if (gain > kMostGain) return;
     mesh.vertices[v] += (1 - gain) * earlier[v].gap * normals[v];
     variance[v] = static_cast<float>(gain * now);
   });

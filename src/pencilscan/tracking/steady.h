@@ -24,7 +24,8 @@ struct Steadied {
 /// moment before, by a Kalman filter whose one state is its place (R. Kalman, A new approach to
 /// linear filtering and prediction problems, 1960). The process noise is the larger of how far
 /// the surface there has come, along itself too, as registration says (registration.h), and how far
-/// the vertices around it moved together, beyond their noise. Parts that move stay as measured, and
+/// the vertices around it moved together, beyond their noise. Where that leaves the filter less
+/// than a hundredth of the variance to gain, as in parts that move, vertices stay as measured, and
 /// so do vertices that lie farther than `spacing` from the registered surface: they are new.
 /// `spacing`: of the depth maps' nodes on the surface; same unit as the mesh. `coarse_faces`: of
 /// the mesh's first vertices, before its triangles were cut finer.
