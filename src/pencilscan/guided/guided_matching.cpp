@@ -1,6 +1,7 @@
 #include "pencilscan/guided/guided_matching.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
 #include <tuple>
@@ -30,6 +31,38 @@ struct CurvePlace {
   std::size_t curve;
   std::size_t point;
 };
+
+/// Points [begin, end) of a curve.
+struct Stretch {
+  int begin;
+  int end;
+};
+
+/// Where along a curve one line is predicted.
+struct NamedStretches {
+  LineName name;
+  std::vector<Stretch> stretches;
+};
+
+/// `names`: per point of a curve; nothing where no line is predicted.
+std::vector<NamedStretches> stretches_of_names(const std::vector<std::optional<LineName>>& names) {
+  std::vector<NamedStretches> result;
+  for_each_stretch(names, [&](int begin, int end) {
+    const auto& name = names[static_cast<std::size_t>(begin)];
+    if (!name) return;
+    auto known = std::find_if(result.begin(), result.end(),
+                              [&](const NamedStretches& n) { return n.name == *name; });
+    if (known == result.end()) known = result.insert(known, {*name, {}});
+    known->stretches.push_back({begin, end});
+  });
+  return result;
+}
+
+int points_of(std::span<const Stretch> stretches) {
+  int points = 0;
+  for (const Stretch& s : stretches) points += s.end - s.begin;
+  return points;
+}
 
 /// Guided matching in one camera.
 class CameraMatching {
@@ -69,7 +102,7 @@ class CameraMatching {
   void append(News news, bool hold_light);
   void grow_surface();
   [[nodiscard]] bool fits(const CurvePoint& point, const LineName& name, int family) const;
-  [[nodiscard]] float color_margin(const Curve& curve, int begin, int end,
+  [[nodiscard]] float color_margin(const Curve& curve, std::span<const Stretch> stretches,
                                    const LineName& name) const;
   [[nodiscard]] float color_lead(const Curve& curve, int begin, int end, const LineName& name,
                                  const LineName& other) const;
@@ -256,14 +289,17 @@ std::size_t CameraMatching::color_of(const LineName& name, int family) const {
       pattern)[static_cast<std::size_t>(pattern.symbol(name.line))]);
 }
 
-/// Logarithm of how much likelier the colour of a stretch [begin, end) is under a name than under
-/// the likeliest other colour; 0 where the family has one colour.
-float CameraMatching::color_margin(const Curve& curve, int begin, int end,
+/// Logarithm of how much likelier the colour of stretches of a curve is under a name than under the
+/// likeliest other colour; 0 where the family has one colour.
+float CameraMatching::color_margin(const Curve& curve, std::span<const Stretch> stretches,
                                    const LineName& name) const {
-  const auto family = static_cast<std::size_t>(curve.family);
-  const std::size_t own = color_of(name, curve.family);
-  std::vector<float> evidence = color_evidence(curve, begin, end, families_[family].colors.size());
-  std::swap(evidence[own], evidence.back());
+  const std::size_t colors = families_[static_cast<std::size_t>(curve.family)].colors.size();
+  std::vector<float> evidence(colors, 0.F);
+  for (const Stretch& stretch : stretches) {
+    const std::vector<float> of_one = color_evidence(curve, stretch.begin, stretch.end, colors);
+    for (std::size_t k = 0; k < colors; ++k) evidence[k] += of_one[k];
+  }
+  std::swap(evidence[color_of(name, curve.family)], evidence.back());
   const float of_name = evidence.back();
   evidence.pop_back();
   return evidence.empty() ? 0 : of_name - *std::max_element(evidence.begin(), evidence.end());
@@ -342,6 +378,9 @@ void CameraMatching::adopt_curves() {
   // A colour denies a name if it says more against it than a guided name is certain. A surface that
   // is not there predicts lines too: their places fit, their colours do not.
   const float certainty = std::log(options_.confidence / (1 - options_.confidence));
+  const auto denies = [&](float margin, int points) {
+    return margin < -certainty && has_dense_ && points >= options_.min_adopted;
+  };
   std::vector<LabeledRun> adopted;
   std::vector<std::optional<LineName>> names;
   std::vector<float> spacings;
@@ -357,17 +396,23 @@ void CameraMatching::adopt_curves() {
       names[i] = line->name;
       spacings[i] = line->spacing_px;
     }
-    for_each_stretch(names, [&](int begin, int end) {
-      const auto& name = names[static_cast<std::size_t>(begin)];
-      if (!name || !is_long_enough(decided[c], begin, end)) return;
-      const float margin = color_margin(curve, begin, end, *name);
-      if (margin < -certainty && has_dense_ && end - begin >= options_.min_adopted)
-        denied_.push_back({run_of(static_cast<int>(c), begin, end, *name),
-                           spacings[static_cast<std::size_t>((begin + end) / 2)]});
-      if (margin > -certainty && agrees_along(static_cast<int>(c), begin, end, *name) &&
-          is_supported(curve, begin, end, *name, margin))
-        adopted.push_back(run_of(static_cast<int>(c), begin, end, *name));
-    });
+    for (const auto& [name, stretches] : stretches_of_names(names)) {
+      // Pieces of a curve on which one line is predicted are that line, or another one, together.
+      const float of_all = color_margin(curve, stretches, name);
+      const bool are_denied = denies(of_all, points_of(stretches));
+      for (const Stretch& stretch : stretches) {
+        const auto [begin, end] = stretch;
+        const float own = color_margin(curve, {&stretch, 1}, name);
+        const float margin = has_dense_ ? std::min(own, of_all) : own;
+        if (are_denied || denies(own, end - begin))
+          denied_.push_back({run_of(static_cast<int>(c), begin, end, name),
+                             spacings[static_cast<std::size_t>((begin + end) / 2)]});
+        if (margin > -certainty && is_long_enough(decided[c], begin, end) &&
+            agrees_along(static_cast<int>(c), begin, end, name) &&
+            is_supported(curve, begin, end, name, margin))
+          adopted.push_back(run_of(static_cast<int>(c), begin, end, name));
+      }
+    }
   }
   accept(std::move(adopted));
 }
@@ -464,7 +509,8 @@ bool CameraMatching::is_of_other(const CurvePlace& place, const LineName& name) 
   const int begin = std::max(0, middle - kPointsPerMeasurement / 2);
   const int end =
       std::min(static_cast<int>(curve.points.size()), middle + kPointsPerMeasurement / 2 + 1);
-  return shows_background_ || color_margin(curve, begin, end, name) < 0;
+  const std::array<Stretch, 1> around{{{begin, end}}};
+  return shows_background_ || color_margin(curve, around, name) < 0;
 }
 
 /// True where what the curves leave of the light may be left of a curve of another line, within

@@ -248,6 +248,24 @@ TEST_F(LabeledScene, OnADenseSurfaceALineOfTheOtherColorTakesTheLabelsOfTheLines
   EXPECT_GT(undecided[static_cast<std::size_t>(UndecidedReason::kContradicted)], 60U);
 }
 
+TEST_F(LabeledScene, OnADenseSurfacePiecesOfACurveOfTheOtherColorAreDeniedTogether) {
+  constexpr std::size_t kPiece = 6;  // points: too few for their colour to deny a line alone
+  const std::size_t curve = middle_curve(0);
+  const std::vector<MeasuredPoint> dense = points();
+  remove_label(curve);
+  Curve& seen = graph_.curves[curve];
+  for (std::size_t i = 0; i < seen.code.size(); i += 2) std::swap(seen.code[i], seen.code[i + 1]);
+  for (std::size_t i = 0; i < seen.points.size(); ++i)
+    if (i % (kPiece + 3) >= kPiece) seen.points[i].width_px *= 2;  // of no line that is predicted
+  match_guided(rig, families, std::vector<std::vector<cv::Mat>>(1), {&graph_, 1}, labeling_, {},
+               dense);
+  std::ptrdiff_t labelled = 0;
+  for (const LabeledRun& run : labeling_.runs[0])
+    if (run.curve == static_cast<int>(curve)) labelled += run.end - run.begin;
+  EXPECT_EQ(labelled, 0);
+  EXPECT_GT(labeling_.denied[0].size(), 5U);
+}
+
 TEST_F(LabeledScene, CurveMuchWiderThanThePredictedLineGetsNoLabel) {
   const std::size_t curve = middle_curve(0);
   remove_label(curve);
