@@ -88,14 +88,27 @@ cv::Mat lit_by(const cv::Mat& presence, double spacing_px) {
   return lit;
 }
 
-/// Pixels from each to the nearest that is lit, CV_32FC1.
-cv::Mat way_to_light(const CameraLight& light) {
-  cv::Mat lit = light.valid == 0;
-  for (const cv::Mat& presence : light.families)
-    lit |= lit_by(presence, static_cast<double>(light.spacing_px));
+/// Pixels from each to the nearest that is lit (CV_8U, not 0), CV_32FC1.
+cv::Mat way_to(const cv::Mat& lit) {
   cv::Mat way;
   cv::distanceTransform(lit == 0, way, cv::DIST_L2, cv::DIST_MASK_PRECISE);
   return way;
+}
+
+/// The same for the light of each family.
+std::vector<cv::Mat> ways_to_light(const CameraLight& light) {
+  const cv::Mat overexposed = light.valid == 0;
+  std::vector<cv::Mat> ways;
+  for (const cv::Mat& presence : light.families)
+    ways.push_back(way_to(lit_by(presence, static_cast<double>(light.spacing_px)) | overexposed));
+  return ways;
+}
+
+/// To the light of any.
+cv::Mat shortest(const std::vector<cv::Mat>& ways) {
+  cv::Mat least = ways.front().clone();
+  for (const cv::Mat& way : ways) cv::min(least, way, least);
+  return least;
 }
 
 /// Where one camera shows no light although it would have to.
@@ -106,19 +119,24 @@ class DarkPlaces {
         scene_(scene),
         light_(light),
         eye_(light.camera->center()),
-        way_(way_to_light(light)),
+        ways_(ways_to_light(light)),
+        way_(shortest(ways_)),
         dark_(way_.rows, way_.cols, CV_8U, cv::Scalar(0)) {}
 
   /// True where the nearest line of a pattern is missing at a place with this normal.
   [[nodiscard]] bool lacks_line(const Vec3& x, const Vec3& normal) const {
     const auto at = pixel_facing(x, normal);
     if (!at) return false;
-    const auto way = static_cast<double>(way_.at<float>(*at));
-    if (way <= kOff || !sees(scene_, eye_, x, normal, kFacing)) return false;
+    const auto is_dark = [&](const cv::Mat& way) { return way.at<float>(*at) > kOff; };
+    if (std::none_of(ways_.begin(), ways_.end(), is_dark) ||
+        !sees(scene_, eye_, x, normal, kFacing))
+      return false;
     const TangentView view(*light_.camera, x, normal);
     return std::any_of(
-        light_.patterns.begin(), light_.patterns.end(),
-        [&](const PatternView& pattern) { return is_missing(pattern, view, x, normal, way); });
+        light_.patterns.begin(), light_.patterns.end(), [&](const PatternView& pattern) {
+          const cv::Mat& way = ways_[static_cast<std::size_t>(pattern.family())];
+          return is_missing(pattern, view, x, normal, static_cast<double>(way.at<float>(*at)));
+        });
   }
   /// The disc without light around a place is dark.
   void darken_around(const Vec3& x) {
@@ -177,8 +195,9 @@ class DarkPlaces {
   const RayScene& scene_;
   const CameraLight& light_;
   Vec3 eye_;
-  cv::Mat way_;
-  cv::Mat dark_;  ///< CV_8U, 1: in the disc of a vertex that lacks a line
+  std::vector<cv::Mat> ways_;  ///< to the light of each family
+  cv::Mat way_;                ///< to the light of any
+  cv::Mat dark_;               ///< CV_8U, 1: in the disc of a vertex that lacks a line
   bool has_dark_ = false;
 };
 

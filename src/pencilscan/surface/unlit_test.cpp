@@ -14,17 +14,20 @@ namespace {
 constexpr double kLinesApart = 8;             // of lines, footprints and pixels
 constexpr double kHole = 1.75 * kLinesApart;  // radius
 
-/// One camera above the plane z = 0 and a projector beside it, which shows columns. A pixel covers
-/// 1.
-Rig rig_above() {
+/// One camera above the plane z = 0 and projectors on both sides of it, which show columns. A pixel
+/// covers 1.
+Rig rig_above(std::size_t projectors) {
   Rig rig;
   rig.cameras = {sample::device_at<Camera>({1e-3, 0, 1000}, "cam", 240, 240, 1000)};
-  rig.projectors = {sample::device_at<Projector>({300, 0, 950}, "proj", 640, 512, 1000)};
   LinePattern pattern;
   pattern.pitch_px = kLinesApart;
   pattern.line_width_px = kLinesApart / 3;
   pattern.offset_px = kLinesApart / 2;
-  rig.projectors[0].patterns = {pattern};
+  for (const double x : {300, -300}) {
+    if (rig.projectors.size() == projectors) break;
+    rig.projectors.push_back(sample::device_at<Projector>({x, 0, 950}, "proj", 640, 512, 1000));
+    rig.projectors.back().patterns = {pattern};
+  }
   return rig;
 }
 
@@ -45,29 +48,39 @@ TriangleMesh sheet_of_vertices() {
   return mesh;
 }
 
-/// The plane as the camera sees it, with noise. `albedo`: of places on it.
-CameraLight seen(const Rig& rig, const std::function<double(const Vec3&)>& albedo) {
+/// Share of the light that a place on the plane gives back.
+using Albedo = std::function<double(const Vec3&)>;
+
+/// The light of a projector on the plane, as the camera sees it with noise.
+cv::Mat seen_light(const Rig& rig, std::size_t projector, const Albedo& albedo) {
   constexpr double kNoise = 0.01;  // of the height of a line
   const Camera& camera = rig.cameras[0];
-  const Projector& projector = rig.projectors[0];
-  const LinePattern& pattern = projector.patterns[0];
+  const LinePattern& pattern = rig.projectors[projector].patterns[0];
   cv::Mat image(camera.height, camera.width, CV_32F);
   cv::RNG noise(7);
   for (int v = 0; v < image.rows; ++v) {
     for (int u = 0; u < image.cols; ++u) {
       const Ray ray = camera.ray({u, v});
       const Vec3 x = ray.origin - ray.origin.z() / ray.direction.z() * ray.direction;
-      const double panel = (*projector.project(x))[0] - pattern.offset_px;
+      const double panel = (*rig.projectors[projector].project(x))[0] - pattern.offset_px;
       const double off = (panel - pattern.pitch_px * std::round(panel / pattern.pitch_px)) / 1.5;
       image.at<float>(v, u) = static_cast<float>(
           std::max(0.0, albedo(x) * std::exp(-off * off) + noise.gaussian(kNoise)));
     }
   }
+  return image;
+}
+
+/// The plane as the camera sees it. `albedos`: of each projector's light, which is a family.
+CameraLight seen(const Rig& rig, const std::vector<Albedo>& albedos) {
   CameraLight light;
-  light.camera = &camera;
-  light.patterns.emplace_back(rig, camera, 0, 0);
-  light.families = {image};
-  light.valid = cv::Mat(image.rows, image.cols, CV_8U, cv::Scalar(1));
+  light.camera = &rig.cameras[0];
+  for (std::size_t p = 0; p < albedos.size(); ++p) {
+    light.patterns.emplace_back(rig, rig.cameras[0], static_cast<int>(p), 0);
+    light.patterns.back().set_family(static_cast<int>(p));
+    light.families.push_back(seen_light(rig, p, albedos[p]));
+  }
+  light.valid = cv::Mat(light.families[0].size(), CV_8U, cv::Scalar(1));
   light.spacing_px = static_cast<float>(kLinesApart);
   return light;
 }
@@ -75,14 +88,14 @@ CameraLight seen(const Rig& rig, const std::function<double(const Vec3&)>& albed
 double all_white(const Vec3&) { return 1; }
 
 /// White but for a disc.
-std::function<double(const Vec3&)> with_disc(double radius, double albedo) {
+Albedo with_disc(double radius, double albedo) {
   return [=](const Vec3& x) { return x.norm() < radius ? albedo : 1; };
 }
 
-std::vector<char> unlit_of(const std::function<double(const Vec3&)>& albedo,
+std::vector<char> unlit_of(const std::vector<Albedo>& albedos,
                            const TriangleMesh& scene = sheet_of_vertices()) {
-  const Rig rig = rig_above();
-  const CameraLight light = seen(rig, albedo);
+  const Rig rig = rig_above(albedos.size());
+  const CameraLight light = seen(rig, albedos);
   return unlit_vertices(rig, RayScene(scene), {&light, 1}, sheet_of_vertices());
 }
 
@@ -91,7 +104,7 @@ std::ptrdiff_t count_of(const std::vector<char>& unlit) {
 }
 
 TEST(Unlit, IsAHoleUpToItsRimAndNothingElse) {
-  const std::vector<char> unlit = unlit_of(with_disc(kHole, 0));
+  const std::vector<char> unlit = unlit_of({with_disc(kHole, 0)});
   const TriangleMesh mesh = sheet_of_vertices();
   for (std::size_t v = 0; v < unlit.size(); ++v) {
     const double r = mesh.vertices[v].norm();
@@ -100,15 +113,30 @@ TEST(Unlit, IsAHoleUpToItsRimAndNothingElse) {
   }
 }
 
+TEST(Unlit, IsWhereOnlyTheLightOfAnotherFamilyIs) {
+  const std::vector<char> unlit = unlit_of({all_white, with_disc(kHole, 0)});
+  const TriangleMesh mesh = sheet_of_vertices();
+  std::ptrdiff_t in_disc = 0;
+  for (std::size_t v = 0; v < unlit.size(); ++v) {
+    const double r = mesh.vertices[v].norm();
+    if (r < kHole / 2) in_disc += unlit[v];
+    if (r > kHole + 1) {
+      EXPECT_EQ(unlit[v], 0) << mesh.vertices[v].transpose();
+    }
+  }
+  EXPECT_GT(in_disc, 0);
+  EXPECT_EQ(count_of(unlit_of({all_white, all_white})), 0);
+}
+
 TEST(Unlit, IsNotTheDarkBetweenLines) {
-  EXPECT_EQ(count_of(unlit_of(all_white)), 0);
-  EXPECT_EQ(count_of(unlit_of(with_disc(kLinesApart / 3, 0))), 0)
+  EXPECT_EQ(count_of(unlit_of({all_white})), 0);
+  EXPECT_EQ(count_of(unlit_of({with_disc(kLinesApart / 3, 0)})), 0)
       << "which lines pass on both sides";
 }
 
 TEST(Unlit, IsPaintOnlyWhereItGivesNoLineBack) {
-  EXPECT_EQ(count_of(unlit_of(with_disc(kHole, 0.08))), 0);
-  EXPECT_GT(count_of(unlit_of(with_disc(kHole, 0.01))), 0) << "no picture tells it from a hole";
+  EXPECT_EQ(count_of(unlit_of({with_disc(kHole, 0.08)})), 0);
+  EXPECT_GT(count_of(unlit_of({with_disc(kHole, 0.01)})), 0) << "no picture tells it from a hole";
 }
 
 TEST(Unlit, IsNotAShadow) {
@@ -118,7 +146,7 @@ TEST(Unlit, IsNotAShadow) {
     scene.vertices.emplace_back(150 + x, y, 475);  // between the projector and the hole
   scene.faces.push_back({first, first + 1, first + 2});
   scene.faces.push_back({first, first + 2, first + 3});
-  EXPECT_EQ(count_of(unlit_of(with_disc(kHole, 0), scene)), 0);
+  EXPECT_EQ(count_of(unlit_of({with_disc(kHole, 0)}, scene)), 0);
 }
 
 }  // namespace
