@@ -141,7 +141,7 @@ void hand_on(const FrameLinks& links, std::vector<std::array<int, 3>> coarse_fac
 void leave_unlit(const Rig& rig, const RayScene& closed, ShapeResult& result) {
   TriangleMesh& mesh = result.surface.mesh;
   if (mesh.confidence.empty()) return;
-  result.unlit = unlit_vertices(rig, closed, result.depth.lights, mesh);
+  result.unlit = unlit_vertices(rig, closed, result.depth.lights, mesh, result.surface.evidence);
   for (std::size_t v = 0; v < result.unlit.size(); ++v)
     if (result.unlit[v] != 0) mesh.confidence[v] = 0;
 }

@@ -123,8 +123,9 @@ class DarkPlaces {
         way_(shortest(ways_)),
         dark_(way_.rows, way_.cols, CV_8U, cv::Scalar(0)) {}
 
-  /// True where the nearest line of a pattern is missing at a place with this normal.
-  [[nodiscard]] bool lacks_line(const Vec3& x, const Vec3& normal) const {
+  /// True where the nearest line of a pattern is missing at a place with this normal: where its own
+  /// family's light is, or `any_light`.
+  [[nodiscard]] bool lacks_line(const Vec3& x, const Vec3& normal, bool any_light) const {
     const auto at = pixel_facing(x, normal);
     if (!at) return false;
     const auto is_dark = [&](const cv::Mat& way) { return way.at<float>(*at) > kOff; };
@@ -134,7 +135,7 @@ class DarkPlaces {
     const TangentView view(*light_.camera, x, normal);
     return std::any_of(
         light_.patterns.begin(), light_.patterns.end(), [&](const PatternView& pattern) {
-          const cv::Mat& way = ways_[static_cast<std::size_t>(pattern.family())];
+          const cv::Mat& way = any_light ? way_ : ways_[static_cast<std::size_t>(pattern.family())];
           return is_missing(pattern, view, x, normal, static_cast<double>(way.at<float>(*at)));
         });
   }
@@ -204,14 +205,18 @@ class DarkPlaces {
 }  // namespace
 
 std::vector<char> unlit_vertices(const Rig& rig, const RayScene& scene,
-                                 std::span<const CameraLight> lights, const TriangleMesh& mesh) {
+                                 std::span<const CameraLight> lights, const TriangleMesh& mesh,
+                                 std::span<const SurfaceEvidence> evidence) {
+  constexpr float kSeveral = 1.5F;  // cameras; between vertices, their number is a mean
+
   const std::vector<Vec3> normals = vertex_normals(mesh);
   std::vector<std::vector<char>> unlit(lights.size());
   parallel_for(lights.size(), [&](std::size_t k) {
     DarkPlaces places(rig, scene, lights[k]);
     unlit[k].assign(mesh.vertices.size(), 0);
     parallel_chunks(mesh.vertices.size(), [&](std::size_t v) {
-      unlit[k][v] = places.lacks_line(mesh.vertices[v], normals[v]) ? 1 : 0;
+      const bool is_seen_twice = !evidence.empty() && evidence[v].cameras > kSeveral;
+      unlit[k][v] = places.lacks_line(mesh.vertices[v], normals[v], is_seen_twice) ? 1 : 0;
     });
     // What was invented may lie anywhere: it says nothing of what is around.
     for (std::size_t v = 0; v < mesh.vertices.size(); ++v)

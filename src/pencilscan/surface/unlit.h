@@ -6,6 +6,7 @@
 #include "pencilscan/depth/window_fit.h"
 #include "pencilscan/geometry/ray_scene.h"
 #include "pencilscan/rig/rig.h"
+#include "pencilscan/uncertainty/error_model.h"
 
 namespace pencilscan {
 
@@ -19,16 +20,20 @@ namespace pencilscan {
 ///      it, whatever the surface does around. A vertex is unlit in a camera that it faces and that
 ///      sees it if no pixel within half a spacing and a pixel is lit in the pattern's family,
 ///      although the projector lights the place of that line. Spacings are those of the surface
-///      there, in that picture. Light of other families does not count: a surface that goes on
-///      before what lies behind its rim fits the lines of one projector there, a line or more off,
-///      and lacks those of the others.
+///      there, in that picture. Where one camera's depth made the vertex, light of other
+///      families does not count: a surface that goes on before what lies behind its rim fits the
+///      lines of one projector there, a line or more off, and lacks those of the others. So does
+///      paint that gives back one family's light alone; depths of several cameras speak for it, and
+///      there any light counts.
 ///   3. What else a camera sees in the disc without light of any family around such a vertex is
 ///      unlit too.
-/// A place whose paint gives back less than that of a family is denied as well: no picture tells it
+/// A place whose paint gives back less than that is denied as well: no picture tells it
 /// from a hole, and nothing was measured there. `scene`: casts the shadows; within a footprint or
 /// so it is the mesh. `lights`: with their noise or without; those of a rig in footprints.
+/// `evidence`: of each vertex; empty: as of one camera.
 [[nodiscard]] std::vector<char> unlit_vertices(const Rig& rig, const RayScene& scene,
                                                std::span<const CameraLight> lights,
-                                               const TriangleMesh& mesh);
+                                               const TriangleMesh& mesh,
+                                               std::span<const SurfaceEvidence> evidence = {});
 
 }  // namespace pencilscan

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <span>
 
 #include "pencilscan/rig/sample_devices.h"
 
@@ -93,10 +94,11 @@ Albedo with_disc(double radius, double albedo) {
 }
 
 std::vector<char> unlit_of(const std::vector<Albedo>& albedos,
-                           const TriangleMesh& scene = sheet_of_vertices()) {
+                           const TriangleMesh& scene = sheet_of_vertices(),
+                           std::span<const SurfaceEvidence> evidence = {}) {
   const Rig rig = rig_above(albedos.size());
   const CameraLight light = seen(rig, albedos);
-  return unlit_vertices(rig, RayScene(scene), {&light, 1}, sheet_of_vertices());
+  return unlit_vertices(rig, RayScene(scene), {&light, 1}, sheet_of_vertices(), evidence);
 }
 
 std::ptrdiff_t count_of(const std::vector<char>& unlit) {
@@ -126,6 +128,18 @@ TEST(Unlit, IsWhereOnlyTheLightOfAnotherFamilyIs) {
   }
   EXPECT_GT(in_disc, 0);
   EXPECT_EQ(count_of(unlit_of({all_white, all_white})), 0);
+}
+
+TEST(Unlit, IsNoPaintWhereSeveralCamerasHaveDepth) {
+  std::vector<SurfaceEvidence> evidence(sheet_of_vertices().vertices.size());
+  const auto count = [&](float cameras, double other_light) {
+    for (SurfaceEvidence& e : evidence) e.cameras = cameras;
+    return count_of(unlit_of({with_disc(kHole, other_light), with_disc(kHole, 0)},
+                             sheet_of_vertices(), evidence));
+  };
+  EXPECT_GT(count(1, 1), 0);
+  EXPECT_EQ(count(2, 1), 0);
+  EXPECT_GT(count(2, 0), 0) << "no light of any family";
 }
 
 TEST(Unlit, IsNotTheDarkBetweenLines) {
