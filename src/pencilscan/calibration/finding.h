@@ -14,4 +14,7 @@ struct Finding {
   std::string advice;  ///< what to do; may be empty
 };
 
+/// A share in the text of a finding: "0.42 %", to three digits.
+[[nodiscard]] std::string share_text(double share);
+
 }  // namespace pencilscan

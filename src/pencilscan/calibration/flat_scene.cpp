@@ -1,7 +1,5 @@
 #include "pencilscan/calibration/flat_scene.h"
 
-#include "pencilscan/core/formatted.h"
-
 namespace pencilscan {
 
 FlatScene flat_scene(const CalibrationResult& result, const VerdictOptions& options) {
@@ -18,7 +16,7 @@ FlatScene flat_scene(const CalibrationResult& result, const VerdictOptions& opti
 }
 
 std::string FlatScene::text() const {
-  return "one plane explains " + formatted(100 * share, "%.3g %%") +
+  return "one plane explains " + share_text(share) +
          " of the correspondences, and every rig sees a plane alike";
 }
 

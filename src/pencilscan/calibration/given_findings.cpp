@@ -71,8 +71,8 @@ class GivenJudge {
 
   /// The tolerances of given K.
   [[nodiscard]] std::string tolerances() const {
-    return formatted(100 * result_.tolerance.focal, "%.3g %%") + ", " +
-           formatted(result_.tolerance.center_px) + " px";
+    return share_text(result_.tolerance.focal) + ", " + formatted(result_.tolerance.center_px) +
+           " px";
   }
 
   /// `moved`: tolerances; infinite where there is none.

@@ -47,7 +47,7 @@ class ScaleJudge {
     const auto best = best_distance(result_, uncertainty_);
     if (!best) return {};
     return " of " + name(best->devices[0]) + " and " + name(best->devices[1]) +
-           ", with which lengths are known to " + formatted(100 * best->share, "%.3g %%");
+           ", with which lengths are known to " + share_text(best->share);
   }
 
   [[nodiscard]] std::string given_length(const ScaleDeviation& scale) const {
@@ -74,9 +74,8 @@ class ScaleJudge {
         another_helps ? "give --known-distance" + best_pair_text() : scene_.advice(captures);
     if (another_helps && best->share > options_.good_scale_sigma) what_to_do += "; " + captures;
     add(Grade::kDoubtful,
-        "the scale is known weakly: lengths in the volume to " +
-            formatted(100 * scale->share, "%.3g %%") + " (one standard deviation) by " +
-            given_length(*scale) + scene_.reason(),
+        "the scale is known weakly: lengths in the volume to " + share_text(scale->share) +
+            " (one standard deviation) by " + given_length(*scale) + scene_.reason(),
         what_to_do);
   }
 

@@ -16,8 +16,6 @@ namespace pencilscan {
 namespace {
 
 constexpr int kCells = 4;
-std::string percent(double share) { return formatted(100 * share, "%.3g") + " %"; }
-
 class Judge {
  public:
   Judge(const CalibrationInput& input, const CalibrationResult& result,
@@ -103,7 +101,7 @@ class Judge {
       const double share = std::max(pair.inlier_share(), by_rig);
       if (share >= options_.low_inlier_share) continue;
       add(Grade::kDoubtful,
-          "only " + percent(share) + " of the correspondences of " + name(pair.projector) + "/" +
+          "only " + share_text(share) + " of the correspondences of " + name(pair.projector) + "/" +
               name(pair.camera) + " fit a rigid scene seen by one camera and one projector",
           "look at these images: something moved, or files are mixed up");
     }
@@ -163,7 +161,7 @@ class Judge {
     if (worst > good_focal_sigma()) {
       add(worst > options_.usable_focal_sigma ? Grade::kUnusable : Grade::kDoubtful,
           "focal lengths are known weakly: that of " + name(worst_device) + " to " +
-              percent(worst) + " (one standard deviation)" + scene_.reason(),
+              share_text(worst) + " (one standard deviation)" + scene_.reason(),
           scene_.advice(
               "add captures with the object moved through the whole volume, or give K of the "
               "cameras"));
@@ -248,18 +246,6 @@ class Judge {
 };
 
 }  // namespace
-
-std::string to_string(Grade grade) {
-  switch (grade) {
-    case Grade::kGood:
-      return "good";
-    case Grade::kDoubtful:
-      return "doubtful";
-    case Grade::kUnusable:
-      return "unusable";
-  }
-  return "unknown";
-}
 
 std::vector<std::vector<TrendCell>> residual_trends(const CalibrationResult& result) {
   std::vector<std::vector<TrendCell>> trends(result.placed.size(),

@@ -26,4 +26,9 @@ inline constexpr std::size_t kNamedFrames = 8;
   return text;
 }
 
+/// "3 (000012, 000020, 000021)": how many frames or rows, and the first of them.
+[[nodiscard]] inline std::string counted_names(const std::vector<std::string>& names) {
+  return std::to_string(names.size()) + " (" + name_list(names, kNamedFrames) + ")";
+}
+
 }  // namespace pencilscan

@@ -1,7 +1,6 @@
 #include "pencilscan/guided/guided_matching.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <optional>
 #include <tuple>
@@ -16,6 +15,7 @@
 #include "pencilscan/guided/denied_lines.h"
 #include "pencilscan/guided/line_chains.h"
 #include "pencilscan/guided/merged_lines.h"
+#include "pencilscan/guided/name_colors.h"
 #include "pencilscan/guided/named_points.h"
 #include "pencilscan/guided/predicted_places.h"
 #include "pencilscan/guided/shared_curves.h"
@@ -31,38 +31,6 @@ struct CurvePlace {
   std::size_t curve;
   std::size_t point;
 };
-
-/// Points [begin, end) of a curve.
-struct Stretch {
-  int begin;
-  int end;
-};
-
-/// Where along a curve one line is predicted.
-struct NamedStretches {
-  LineName name;
-  std::vector<Stretch> stretches;
-};
-
-/// `names`: per point of a curve; nothing where no line is predicted.
-std::vector<NamedStretches> stretches_of_names(const std::vector<std::optional<LineName>>& names) {
-  std::vector<NamedStretches> result;
-  for_each_stretch(names, [&](int begin, int end) {
-    const auto& name = names[static_cast<std::size_t>(begin)];
-    if (!name) return;
-    auto known = std::find_if(result.begin(), result.end(),
-                              [&](const NamedStretches& n) { return n.name == *name; });
-    if (known == result.end()) known = result.insert(known, {*name, {}});
-    known->stretches.push_back({begin, end});
-  });
-  return result;
-}
-
-int points_of(std::span<const Stretch> stretches) {
-  int points = 0;
-  for (const Stretch& s : stretches) points += s.end - s.begin;
-  return points;
-}
 
 /// Guided matching in one camera.
 class CameraMatching {
@@ -102,10 +70,6 @@ class CameraMatching {
   void append(News news, bool hold_light);
   void grow_surface();
   [[nodiscard]] bool fits(const CurvePoint& point, const LineName& name, int family) const;
-  [[nodiscard]] float color_margin(const Curve& curve, std::span<const Stretch> stretches,
-                                   const LineName& name) const;
-  [[nodiscard]] float color_lead(const Curve& curve, int begin, int end, const LineName& name,
-                                 const LineName& other) const;
   [[nodiscard]] bool is_supported(const Curve& curve, int begin, int end, const LineName& name,
                                   float margin) const;
   [[nodiscard]] bool is_of_object(const LabeledRun& run, int at) const;
@@ -123,10 +87,10 @@ class CameraMatching {
   [[nodiscard]] bool is_of_other(const CurvePlace& place, const LineName& name) const;
   [[nodiscard]] bool is_rest_of_other(const CurvePoint& point, const LineName& name, float reach,
                                       const Places<CurvePlace>& undecided) const;
-  [[nodiscard]] std::size_t color_of(const LineName& name, int family) const;
 
   const Rig& rig_;
   const std::vector<ColorFamily>& families_;
+  NameColors colors_;
   const Camera& camera_;
   GridGraph& graph_;
   std::vector<LabeledRun>& runs_;
@@ -158,6 +122,7 @@ CameraMatching::CameraMatching(const Rig& rig, const std::vector<ColorFamily>& f
                                std::span<const MeasuredPoint> dense)
     : rig_(rig),
       families_(families),
+      colors_(rig, families),
       camera_(rig.camera(graph.camera)),
       graph_(graph),
       runs_(runs),
@@ -282,39 +247,6 @@ void CameraMatching::confirm_tentative() {
   accept(std::move(confirmed));
 }
 
-/// Which colour of its family a line has.
-std::size_t CameraMatching::color_of(const LineName& name, int family) const {
-  const LinePattern& pattern = rig_.pattern(name.pattern);
-  return static_cast<std::size_t>(families_[static_cast<std::size_t>(family)].color_of_symbol(
-      pattern)[static_cast<std::size_t>(pattern.symbol(name.line))]);
-}
-
-/// Logarithm of how much likelier the colour of stretches of a curve is under a name than under the
-/// likeliest other colour; 0 where the family has one colour.
-float CameraMatching::color_margin(const Curve& curve, std::span<const Stretch> stretches,
-                                   const LineName& name) const {
-  const std::size_t colors = families_[static_cast<std::size_t>(curve.family)].colors.size();
-  std::vector<float> evidence(colors, 0.F);
-  for (const Stretch& stretch : stretches) {
-    const std::vector<float> of_one = color_evidence(curve, stretch.begin, stretch.end, colors);
-    for (std::size_t k = 0; k < colors; ++k) evidence[k] += of_one[k];
-  }
-  std::swap(evidence[color_of(name, curve.family)], evidence.back());
-  const float of_name = evidence.back();
-  evidence.pop_back();
-  return evidence.empty() ? 0 : of_name - *std::max_element(evidence.begin(), evidence.end());
-}
-
-/// Logarithm of how much likelier the colour of a stretch [begin, end) is under one name than under
-/// another.
-float CameraMatching::color_lead(const Curve& curve, int begin, int end, const LineName& name,
-                                 const LineName& other) const {
-  const auto family = static_cast<std::size_t>(curve.family);
-  const std::vector<float> evidence =
-      color_evidence(curve, begin, end, families_[family].colors.size());
-  return evidence[color_of(name, curve.family)] - evidence[color_of(other, curve.family)];
-}
-
 /// True where the lines around support a name. On a dense surface the stretch's own colour may do
 /// so instead: where all lines of a projector were missed, there are none around.
 bool CameraMatching::is_supported(const Curve& curve, int begin, int end, const LineName& name,
@@ -351,7 +283,7 @@ bool CameraMatching::agrees_along(int curve, int begin, int end, const LineName&
   const auto has_other = [&](const LabeledRun& run, int at) {
     const LineName other{run.label.pattern, run.label.line};
     return !(other == name) && !is_of_object(run, at) &&
-           color_lead(graph_.curves[static_cast<std::size_t>(curve)], begin, end, name, other) <
+           colors_.lead(graph_.curves[static_cast<std::size_t>(curve)], {begin, end}, name, other) <
                kJump - certainty;
   };
   if (after != runs_.end() && after->curve == curve && has_other(*after, after->begin))
@@ -396,13 +328,13 @@ void CameraMatching::adopt_curves() {
       names[i] = line->name;
       spacings[i] = line->spacing_px;
     }
-    for (const auto& [name, stretches] : stretches_of_names(names)) {
+    for (const auto& [name, pieces] : pieces_of_names(names)) {
       // Pieces of a curve on which one line is predicted are that line, or another one, together.
-      const float of_all = color_margin(curve, stretches, name);
-      const bool are_denied = denies(of_all, points_of(stretches));
-      for (const Stretch& stretch : stretches) {
-        const auto [begin, end] = stretch;
-        const float own = color_margin(curve, {&stretch, 1}, name);
+      const float of_all = colors_.margin(curve, pieces, name);
+      const bool are_denied = denies(of_all, points_of(pieces));
+      for (const PointRange& piece : pieces) {
+        const auto [begin, end] = piece;
+        const float own = pieces.size() == 1 ? of_all : colors_.margin(curve, {piece}, name);
         const float margin = has_dense_ ? std::min(own, of_all) : own;
         if (are_denied || denies(own, end - begin))
           denied_.push_back({run_of(static_cast<int>(c), begin, end, name),
@@ -509,8 +441,7 @@ bool CameraMatching::is_of_other(const CurvePlace& place, const LineName& name) 
   const int begin = std::max(0, middle - kPointsPerMeasurement / 2);
   const int end =
       std::min(static_cast<int>(curve.points.size()), middle + kPointsPerMeasurement / 2 + 1);
-  const std::array<Stretch, 1> around{{{begin, end}}};
-  return shows_background_ || color_margin(curve, around, name) < 0;
+  return shows_background_ || colors_.margin(curve, {PointRange{begin, end}}, name) < 0;
 }
 
 /// True where what the curves leave of the light may be left of a curve of another line, within

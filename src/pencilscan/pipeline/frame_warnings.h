@@ -21,6 +21,7 @@ namespace pencilscan {
 [[nodiscard]] Warning alike_warning(const std::string& projectors);
 /// Of NamingDoubt::of_projectors().
 [[nodiscard]] Warning naming_warning(const std::string& doubt);
+
 /// Projectors that have hardly any of the lines that the measured surface lets expect, where the
 /// others have theirs.
 [[nodiscard]] std::vector<Warning> missing_lines_warnings(const Rig& rig,

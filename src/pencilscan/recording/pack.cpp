@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "pencilscan/core/error.h"
+#include "pencilscan/core/name_list.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/io/file.h"
 #include "pencilscan/io/found_files.h"

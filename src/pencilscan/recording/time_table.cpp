@@ -46,10 +46,6 @@ std::vector<std::string> read_header(const std::filesystem::path& file, const st
 
 }  // namespace
 
-std::string counted_names(const std::vector<std::string>& names) {
-  return std::to_string(names.size()) + " (" + name_list(names, kNamedFrames) + ")";
-}
-
 TimeTable read_time_table(const std::filesystem::path& file,
                           const std::vector<std::string>& cameras) {
   TimeTable times;

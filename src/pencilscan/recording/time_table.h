@@ -28,7 +28,4 @@ using TimeTable = std::map<std::string, std::map<std::string, std::int64_t>>;
                                                        const TimeTable& times,
                                                        const FoundFrames& found);
 
-/// "3 (000012, 000020, 000021)".
-[[nodiscard]] std::string counted_names(const std::vector<std::string>& names);
-
 }  // namespace pencilscan

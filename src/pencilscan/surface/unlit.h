@@ -27,9 +27,9 @@ namespace pencilscan {
 ///      there any light counts.
 ///   3. What else a camera sees in the disc without light of any family around such a vertex is
 ///      unlit too.
-/// A place whose paint gives back less than that is denied as well: no picture tells it
-/// from a hole, and nothing was measured there. `scene`: casts the shadows; within a footprint or
-/// so it is the mesh. `lights`: with their noise or without; those of a rig in footprints.
+/// A place whose paint gives back less than that is denied as well: no picture tells it from a
+/// hole, and nothing was measured there. `scene`: casts the shadows; within a footprint or so it is
+/// the mesh. `lights`: with their noise or without; those of a rig in footprints.
 /// `evidence`: of each vertex; empty: as of one camera.
 [[nodiscard]] std::vector<char> unlit_vertices(const Rig& rig, const RayScene& scene,
                                                std::span<const CameraLight> lights,
