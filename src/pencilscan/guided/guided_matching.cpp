@@ -16,6 +16,7 @@
 #include "pencilscan/guided/line_chains.h"
 #include "pencilscan/guided/merged_lines.h"
 #include "pencilscan/guided/name_colors.h"
+#include "pencilscan/guided/named_ends.h"
 #include "pencilscan/guided/named_points.h"
 #include "pencilscan/guided/predicted_places.h"
 #include "pencilscan/guided/shared_curves.h"
@@ -67,6 +68,9 @@ class CameraMatching {
     std::vector<LabeledRun> runs;
   };
   void add_good(Curve curve, const std::vector<char>& good, const LineName& name, News& news) const;
+  template <class IsLine>
+  void add_new(const Curve& curve, const ContinuedLine& line, IsLine is_line, const LineName& name,
+               News& news) const;
   void append(News news, bool hold_light);
   void grow_surface();
   [[nodiscard]] bool fits(const CurvePoint& point, const LineName& name, int family) const;
@@ -386,6 +390,30 @@ void CameraMatching::add_good(Curve curve, const std::vector<char>& good, const 
   if (news.runs.size() > before) news.curves.push_back(std::move(curve));
 }
 
+/// Names what is new on a fitted line: of stretches that are the line, and long enough with the
+/// ends of curves that they continue, what these do not show.
+template <class IsLine>
+void CameraMatching::add_new(const Curve& curve, const ContinuedLine& line, IsLine is_line,
+                             const LineName& name, News& news) const {
+  std::vector<char> is_known;
+  std::vector<char> good;
+  for (const CurvePoint& p : curve.points) {
+    is_known.push_back(line.is_of_end(p) ? 1 : 0);
+    good.push_back(is_known.back() != 0 || is_line(p) ? 1 : 0);
+  }
+  for_each_stretch(good, [&](int begin, int end) {
+    if (good[static_cast<std::size_t>(begin)] == 0 || end - begin < options_.min_points) return;
+    const std::span of_stretch(is_known.begin() + begin, is_known.begin() + end);
+    for_each_stretch(of_stretch, [&](int first, int last) {
+      if (of_stretch[static_cast<std::size_t>(first)] != 0) return;
+      const auto points = curve.points.begin() + begin;
+      const auto index = static_cast<int>(graph_.curves.size() + news.curves.size());
+      news.curves.push_back({curve.family, {points + first, points + last}, {}});
+      news.runs.push_back(run_of(index, 0, last - first, name));
+    });
+  });
+}
+
 /// Curves that no image showed by themselves. `hold_light`: that no other curve holds.
 void CameraMatching::append(News news, bool hold_light) {
   is_subtracted_.resize(graph_.curves.size() + news.curves.size(), hold_light ? 1 : 0);
@@ -466,6 +494,7 @@ void CameraMatching::find_missing() {
   const Places<CurvePlace> undecided = undecided_places();
   RefineOptions fitting;
   fitting.min_points = options_.min_points;
+  const NamedEnds ends(camera_, graph_.curves, runs_, is_subtracted_);
   News news;
   for (const LineChain& chain : still_missing()) {
     // Where the surface is as it was, the line was not found before. Lines of floors and walls that
@@ -473,23 +502,25 @@ void CameraMatching::find_missing() {
     const auto is_new = [&](const PredictedPoint& p) {
       return surface_.refitted()[p.patch] != 0 && shows_object_[p.patch] != 0;
     };
-    if (static_cast<int>(chain.size()) < options_.min_points ||
-        std::none_of(chain.begin(), chain.end(), is_new))
-      continue;
+    if (std::none_of(chain.begin(), chain.end(), is_new)) continue;
     const LineName name = name_of(chain.front());
-    Curve guess = guess_of(chain);
-    const int family = guess.family;
-    const cv::Mat& image = unexplained_[static_cast<std::size_t>(family)];
+    const ContinuedLine line = ends.continued(guess_of(chain), name, fitting.half_arc + 1);
+    if (static_cast<int>(line.curve.points.size()) < options_.min_points) continue;
+    const int family = line.curve.family;
+    cv::Mat& image = unexplained_[static_cast<std::size_t>(family)];
     // As near as a curve lies to its line.
     const auto reach = static_cast<float>(
         std::min(options_.max_offset_px,
                  options_.max_offset_lines * static_cast<double>(chain.front().spacing_px)));
-    for (Curve& curve : fit_guess(image, std::move(guess), fitting)) {
-      std::vector<char> good;
-      for (const CurvePoint& p : curve.points)
-        good.push_back(fits(p, name, family) && !is_rest_of_other(p, name, reach, undecided));
-      add_good(std::move(curve), good, name, news);
-    }
+    const float least = static_cast<float>(fitting.end_amplitude_ratio) * line.amplitude_within();
+    const auto is_line = [&](const CurvePoint& p) {
+      return p.amplitude >= least && fits(p, name, family) &&
+             !is_rest_of_other(p, name, reach, undecided);
+    };
+    for (const Curve& end : line.ends) add_curve(end, image);
+    for (const Curve& curve : fit_guess(image, line.curve, fitting))
+      add_new(curve, line, is_line, name, news);
+    for (const Curve& end : line.ends) subtract_curve(end, image);
   }
   append(std::move(news), true);
 }

@@ -39,7 +39,8 @@ struct GuidedMatchingOptions {
 ///      floor or wall with another name, and lines around or, on a dense surface, its own colour
 ///      support it,
 ///   3. fits a new curve where a line is predicted and no curve was found. The fit is to the image
-///      that remains once the known curves are subtracted. What remains on a curve without a name
+///      that remains once the known curves are subtracted, and goes on from those that show the
+///      line beside the gap (named_ends.h). What remains on a curve without a name
 ///      is no line where that has another line's colour, or where a floor or wall is in the
 ///      picture,
 ///   4. on a dense surface, tells lines apart that made one curve (merged_lines.h), and names

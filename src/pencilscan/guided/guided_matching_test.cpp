@@ -83,6 +83,43 @@ class LabeledScene : public testing::Test, protected TwoProjectorScene {
     return 2 * points > static_cast<int>(graph_.curves[curve].points.size()) ? line : -1;
   }
 
+  /// True where a run of new points goes on with a detected curve of its line: the light of curves
+  /// reaches 2 px beyond their ends (curve_rendering.h).
+  bool continues_a_curve(const LabeledRun& run) const {
+    constexpr float kOverhang = 3;  // px, with half a width
+    const Curve& found = graph_.curves[static_cast<std::size_t>(run.curve)];
+    for (std::size_t k = 0; k < true_lines[0].size(); ++k) {
+      const Curve& curve = graph_.curves[k];
+      if (curve.family != found.family || true_lines[0][k] != run.label.line) continue;
+      const auto is_near = [&](const CurvePoint& p) {
+        return std::any_of(curve.points.begin(), curve.points.end(), [&](const CurvePoint& q) {
+          return (p.position - q.position).norm() < kOverhang;
+        });
+      };
+      if (std::all_of(found.points.begin() + run.begin, found.points.begin() + run.end, is_near))
+        return true;
+    }
+    return false;
+  }
+
+  /// Presence images of all curves as they are, with noise.
+  std::vector<cv::Mat> noisy_presence() const {
+    std::vector<cv::Mat> presence;
+    for (int f = 0; f < 2; ++f) {
+      std::vector<Curve> of_family;
+      for (const Curve& curve : graph_.curves) {
+        if (curve.family == f) of_family.push_back(curve);
+      }
+      presence.push_back(render_curves(of_family, {camera().width, camera().height}));
+      Random random(11);
+      for (int y = 0; y < presence.back().rows; ++y) {
+        for (int x = 0; x < presence.back().cols; ++x)
+          presence.back().at<float>(y, x) += static_cast<float>(random.normal(0, 0.01));
+      }
+    }
+    return presence;
+  }
+
   GridGraph graph_;
   Labeling labeling_;
 };
@@ -329,19 +366,7 @@ TEST_F(LabeledScene, ACurveThatTwoProjectorsLightHasTheNamesOfBoth) {
 }
 
 TEST_F(LabeledScene, MissedLineIsFoundInTheImageWhereItIsAndNotWhereItIsDark) {
-  std::vector<cv::Mat> presence;
-  for (int f = 0; f < 2; ++f) {
-    std::vector<Curve> of_family;
-    for (const Curve& curve : graph_.curves) {
-      if (curve.family == f) of_family.push_back(curve);
-    }
-    presence.push_back(render_curves(of_family, {camera().width, camera().height}));
-    Random random(11);
-    for (int y = 0; y < presence.back().rows; ++y) {
-      for (int x = 0; x < presence.back().cols; ++x)
-        presence.back().at<float>(y, x) += static_cast<float>(random.normal(0, 0.01));
-    }
-  }
+  std::vector<cv::Mat> presence = noisy_presence();
   // One curve is in the image but was not detected, another was never projected.
   const std::size_t missed = middle_curve(0);
   const std::size_t dark = missed + 2;
@@ -357,7 +382,7 @@ TEST_F(LabeledScene, MissedLineIsFoundInTheImageWhereItIsAndNotWhereItIsDark) {
   match_guided(rig, families, images, {&graph_, 1}, labeling_);
   std::size_t found = 0;
   for (const LabeledRun& run : labeling_.runs[0]) {
-    if (run.curve < static_cast<int>(before)) continue;
+    if (run.curve < static_cast<int>(before) || continues_a_curve(run)) continue;
     EXPECT_EQ(run.label.pattern, (PatternRef{0, 0}));
     EXPECT_EQ(run.label.line, line);
     for (int i = run.begin; i < run.end; ++i) {
@@ -371,6 +396,60 @@ TEST_F(LabeledScene, MissedLineIsFoundInTheImageWhereItIsAndNotWhereItIsDark) {
     }
   }
   EXPECT_GT(static_cast<double>(found), 0.5 * static_cast<double>(truth.size()));
+}
+
+TEST_F(LabeledScene, GapOfALineIsClosedWhereTheImageShowsItAndNotWhereItIsDark) {
+  constexpr std::size_t kGap = 7;  // points, too few for a new curve where named ones end
+  std::vector<cv::Mat> presence = noisy_presence();
+  const std::size_t lit = middle_curve(0);
+  const std::size_t dark = lit + 2;
+  std::vector<CurvePoint> truth;
+  std::vector<CurvePoint> unlit;
+  for (const std::size_t k : {lit, dark}) {
+    std::vector<CurvePoint>& points = graph_.curves[k].points;
+    const std::size_t middle = points.size() / 2;
+    std::vector<CurvePoint>& gap = k == lit ? truth : unlit;
+    const auto first = points.begin() + static_cast<std::ptrdiff_t>(middle);
+    gap.assign(first, first + kGap);
+    remove_label(k);
+    const int line = true_lines[0][k];
+    for (const auto& [begin, end] :
+         {std::pair(std::size_t{0}, middle), std::pair(middle + kGap, points.size())}) {
+      graph_.curves.push_back(graph_.curves[k]);
+      Curve& piece = graph_.curves.back();
+      piece.points.assign(graph_.curves[k].points.begin() + static_cast<std::ptrdiff_t>(begin),
+                          graph_.curves[k].points.begin() + static_cast<std::ptrdiff_t>(end));
+      piece.code.resize(2 * piece.points.size());
+      graph_.component_of_curve.push_back(graph_.component_of_curve[k]);
+      labeling_.runs[0].push_back({static_cast<int>(graph_.curves.size()) - 1, 0,
+                                   static_cast<int>(piece.points.size()),
+                                   CurveLabel{{0, 0}, line, 1.0 * line, 1}});
+    }
+    graph_.curves[k].points.clear();
+    graph_.curves[k].code.clear();
+  }
+  Curve shadow;
+  shadow.points = unlit;
+  presence[0] -= render_curves({shadow}, presence[0].size());
+  const std::size_t before = graph_.curves.size();
+  const std::vector<std::vector<cv::Mat>> images = {presence};
+  match_guided(rig, families, images, {&graph_, 1}, labeling_);
+  std::vector<CurvePoint> found;
+  for (const LabeledRun& run : labeling_.runs[0]) {
+    if (run.curve < static_cast<int>(before)) continue;
+    const std::vector<CurvePoint>& points =
+        graph_.curves[static_cast<std::size_t>(run.curve)].points;
+    found.insert(found.end(), points.begin() + run.begin, points.begin() + run.end);
+  }
+  const auto shown = [&](const std::vector<CurvePoint>& of_line) {
+    return std::count_if(of_line.begin(), of_line.end(), [&](const CurvePoint& t) {
+      return std::any_of(found.begin(), found.end(), [&](const CurvePoint& p) {
+        return (p.position - t.position).norm() < 0.8F;
+      });
+    });
+  };
+  EXPECT_GE(shown(truth), static_cast<std::ptrdiff_t>(kGap) - 2);
+  EXPECT_EQ(shown(unlit), 0);
 }
 
 TEST_F(LabeledScene, WhatIsLeftOfAnUndecidedCurveIsNoMissedLine) {
