@@ -7,10 +7,17 @@
 namespace pencilscan {
 namespace {
 
-constexpr float kSideStart = 0.2F;    // of the radius: where a side of the window begins
-constexpr float kLeastLight = 0.6F;   // share of the predicted light that a part must show ...
-constexpr float kLeastEnergy = 40.F;  // ... where that would be beyond noise
-constexpr float kMiddle2 = 0.2F;      // squared radius of the middle, in radii
+constexpr float kSideStart = 0.2F;  // of the radius: where a side of the window begins
+constexpr float kMiddle2 = 0.2F;    // squared radius of the middle, in radii
+
+/// Whether a part shows too little of the light that is predicted in it. `energy`: the predicted
+/// light's squares over the variance of the noise; `seen`: the same of predicted and seen light, of
+/// which noise makes the square root of the energy.
+bool is_dark(float seen, float energy) {
+  constexpr float kLeastLight = 0.6F;   // share of the predicted light ...
+  constexpr float kBeyondNoise = 2.5F;  // ... and deviations of the noise below it
+  return seen < std::min(kLeastLight * energy, energy - kBeyondNoise * std::sqrt(energy));
+}
 
 }  // namespace
 
@@ -50,11 +57,11 @@ void WindowParts::sum_up() {
 
 std::optional<std::size_t> WindowParts::dark_side() const {
   std::optional<std::size_t> darkest;
-  float least = kLeastLight;
+  float least = 1;
   for (std::size_t side = 0; side < kSides; ++side) {
     const float energy = predicted_in_[side];
     const float seen = seen_in_[side];
-    if (!(energy > kLeastEnergy && seen < least * energy)) continue;
+    if (!is_dark(seen, energy) || seen > least * energy) continue;
     least = seen / energy;
     darkest = side;
   }
@@ -62,8 +69,7 @@ std::optional<std::size_t> WindowParts::dark_side() const {
 }
 
 bool WindowParts::is_middle_dark() const {
-  const float energy = predicted_in_[kSides];
-  return energy > kLeastEnergy && seen_in_[kSides] < kLeastLight * energy;
+  return is_dark(seen_in_[kSides], predicted_in_[kSides]);
 }
 
 }  // namespace pencilscan
