@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
+#include <optional>
+#include <utility>
 
 #include "pencilscan/core/chunks.h"
 #include "pencilscan/core/median.h"
@@ -23,8 +26,8 @@ struct Node {
 /// Another node that agrees or disagrees, with the device through which that was found.
 struct Link {
   std::uint32_t other;
-  std::uint16_t group;      ///< map; maps + projector; or these + a map that contradicts
-  float disagreement = -1;  ///< of a support: distance across the surface over its deviation
+  std::uint16_t group;     ///< map; maps + projector; or these + a map that contradicts
+  float disagreement = 0;  ///< of a support: distance across the surface over its deviation
 };
 
 struct Links {
@@ -103,7 +106,7 @@ class Comparison {
   }
 
   /// Distance of node i from the surface at `other`, seen `beyond` it by the other's camera, over
-  /// the standard deviation that the two of them state.
+  /// the standard deviation that the two of them state; below zero where that is nearer.
   [[nodiscard]] float disagreement(std::size_t i, std::size_t other, double beyond) const {
     const auto cosine = [&](std::size_t k) {
       const DepthMap& map = maps_[nodes_[k].map];
@@ -113,7 +116,7 @@ class Comparison {
     const double c = cosine(other);
     const double sigma = std::hypot(c * static_cast<double>(node(other).sigma),
                                     cosine(i) * static_cast<double>(node(i).sigma));
-    return static_cast<float>(std::abs(c * beyond) / std::max(sigma, 1e-9));
+    return static_cast<float>(c * beyond / std::max(sigma, 1e-9));
   }
 
   void compare_with_cameras(std::size_t i, Links& links) const {
@@ -227,11 +230,61 @@ double sigma_scale(const Links& links) {
   constexpr double kUsual = 1.7;  // of the rendered scenes, where one camera is all there is
   std::vector<float> ratios;
   for (const auto& of_node : links.support) {
-    for (const Link& link : of_node) ratios.push_back(link.disagreement);
+    for (const Link& link : of_node) ratios.push_back(std::abs(link.disagreement));
   }
   constexpr std::size_t kEnough = 200;
   if (ratios.size() < kEnough) return kUsual;
   return kDeviationPerMedian * static_cast<double>(upper_median(std::move(ratios)));
+}
+
+/// What neighbouring places have in common of the disagreement: a device that stands elsewhere than
+/// the rig says moves whole surfaces, noise and what is as fine as lines moves every window by
+/// itself. Of the medians m, n of blocks side by side that is the root of their covariance
+/// (s^2 of m + n - s^2 of m - n) / 4, with s from medians (R. Gnanadesikan and J. R. Kettenring,
+/// Biometrics 28, 1972). Nothing where blocks are few.
+std::optional<double> shared_scale(const std::vector<Node>& nodes, std::span<const DepthMap> maps,
+                                   const Links& links) {
+  // Windows reach over less than half of a block, so that noise of two has little in common.
+  constexpr int kBlock = 8;  // nodes
+  constexpr std::size_t kLeastOfBlock = 10;
+  constexpr std::size_t kLeastPairs = 20;  // s is then known to a sixth
+  // Blocks of the nodes of one map, as another map sees them.
+  std::map<std::pair<std::uint32_t, std::uint16_t>, std::vector<std::vector<float>>> seen;
+  const auto across = [&](std::uint32_t m) { return maps[m].columns / kBlock + 1; };
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    const DepthMap& map = maps[nodes[i].map];
+    const auto index = static_cast<int>(nodes[i].index);
+    const int block =
+        index / map.columns / kBlock * across(nodes[i].map) + index % map.columns / kBlock;
+    for (const Link& link : links.support[i]) {
+      auto& blocks = seen[{nodes[i].map, link.group}];
+      if (blocks.empty())
+        blocks.resize(static_cast<std::size_t>((map.rows / kBlock + 1) * across(nodes[i].map)));
+      blocks[static_cast<std::size_t>(block)].push_back(link.disagreement);
+    }
+  }
+  std::vector<float> sums;
+  std::vector<float> differences;
+  for (const auto& [pair, blocks] : seen) {
+    std::vector<std::optional<float>> medians;
+    for (const auto& block : blocks)
+      medians.push_back(block.size() < kLeastOfBlock ? std::nullopt
+                                                     : std::optional(upper_median(block)));
+    const auto columns = static_cast<std::size_t>(across(pair.first));
+    const auto add = [&](std::size_t i, std::size_t j) {
+      if (j >= medians.size() || !medians[i] || !medians[j]) return;
+      sums.push_back(std::abs(*medians[i] + *medians[j]));
+      differences.push_back(std::abs(*medians[i] - *medians[j]));
+    };
+    for (std::size_t i = 0; i < medians.size(); ++i) {
+      if ((i + 1) % columns != 0) add(i, i + 1);
+      add(i, i + columns);
+    }
+  }
+  if (sums.size() < kLeastPairs) return std::nullopt;
+  const auto sum = static_cast<double>(upper_median(std::move(sums)));
+  const auto difference = static_cast<double>(upper_median(std::move(differences)));
+  return kDeviationPerMedian * std::sqrt(std::max(0.0, sum * sum - difference * difference)) / 2;
 }
 
 constexpr double kUnseenErrors = 1.15;  // what the cameras have in common, as a factor
@@ -323,6 +376,7 @@ ConsistencyReport check_consistency(const Rig& rig, std::span<const int> pattern
     ++report.contradicted;
   }
   report.sigma_scale = sigma_scale(links);
+  report.shared_scale = shared_scale(comparison.nodes(), maps, links);
   report.sigma_factor = kUnseenErrors * std::clamp(report.sigma_scale, 1 / kUnseenErrors, 4.0);
   scale_sigma(report.sigma_factor, maps);
   for (DepthMap& map : maps) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -19,7 +20,9 @@ struct ConsistencyOptions {
 };
 
 struct ConsistencyReport {
-  double sigma_scale = 1;        ///< by which the cameras' disagreement exceeds what sigma says
+  double sigma_scale = 1;  ///< by which the cameras' disagreement exceeds what sigma says
+  /// What neighbouring places have in common of it; nothing where too few places tell.
+  std::optional<double> shared_scale;
   double sigma_factor = 1;       ///< by which sigma was widened: errors that all share, too
   std::size_t contradicted = 0;  ///< nodes removed
   std::size_t unconfirmed = 0;   ///< nodes of one projector removed, as no one confirms them

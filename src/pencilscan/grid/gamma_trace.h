@@ -1,12 +1,25 @@
 #pragma once
 
+#include <cstddef>
 #include <opencv2/core.hpp>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "pencilscan/grid/grid_graph.h"
 
 namespace pencilscan {
+
+// Light of two projectors adds where their lines cross. Let o be the crossing, a a step along one
+// line and b a step along the other. Light that is the sum of what is constant along either line
+// has L(o) + L(o + a + b) = L(o + a) + L(o + b), however near other lines are, and also after any
+// linear filter. With light L = v^gamma, values v give a gamma at every crossing.
+
+/// What one crossing says of a picture's gamma.
+struct CrossingGamma {
+  double log_gamma = 0;  ///< of the values: light is value^gamma; 0: they are light
+  double weight = 0;     ///< > 0: how much the sum changes with log_gamma
+};
 
 /// What the brightness of crossings says of a picture's gamma.
 struct GammaTrace {
@@ -15,12 +28,10 @@ struct GammaTrace {
   std::size_t crossings = 0;  ///< that said something
 };
 
-/// Light of two projectors adds where their lines cross: with light L = v^gamma, L at the crossing
-/// and off both lines are together what they are on either line beside it. `values`: CV_32FC3.
-/// Result: log(gamma) of every crossing that says one.
-[[nodiscard]] std::vector<double> log_gammas_at_crossings(const GridGraph& graph,
-                                                          const cv::Mat& values);
-/// Their median; nothing where they are too few.
-[[nodiscard]] std::optional<GammaTrace> gamma_of_crossings(const std::vector<double>& logs);
+/// The gamma of every crossing that says one. `values`: CV_32FC3.
+[[nodiscard]] std::vector<CrossingGamma> gammas_at_crossings(const GridGraph& graph,
+                                                             const cv::Mat& values);
+/// Their weighted median; nothing where they are too few.
+[[nodiscard]] std::optional<GammaTrace> gamma_of_crossings(std::span<const CrossingGamma> said);
 
 }  // namespace pencilscan

@@ -4,6 +4,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "pencilscan/core/warning.h"
 #include "pencilscan/pipeline/frame.h"
@@ -30,9 +31,13 @@ namespace pencilscan {
 /// That depths of different cameras are not those of one surface, by so many deviations.
 [[nodiscard]] Warning views_warning(double deviations);
 
-/// That depth maps of different cameras do not fit each other (ConsistencyReport::sigma_scale),
-/// where nothing that was `said` explains it.
-[[nodiscard]] std::optional<Warning> depth_warning(double deviations,
+/// That depth maps of different cameras do not fit each other, over whole patches or each place by
+/// itself, where nothing that was `said` explains it. The second is no fault of the rig.
+[[nodiscard]] std::optional<Warning> depth_warning(const ConsistencyReport& depth,
                                                    std::span<const Warning> said);
+
+/// Puts findings on gamma first, and leaves out that views disagree, which it explains. Crossings
+/// meet as well with a gamma as without: findings on them stay.
+void let_gamma_explain(std::vector<Warning>& warnings);
 
 }  // namespace pencilscan

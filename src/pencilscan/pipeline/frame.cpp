@@ -26,13 +26,13 @@ Frame without(Frame frame, const std::vector<char>& left_out) {
 }
 
 /// Why a frame has no points: wrong pictures, else their light.
-std::string why_nothing(const PointResult& result) {
+std::string why_nothing(const Rig& rig, const PointResult& result) {
   const std::string why = "no curve could be given its projector line";
   std::string of_pictures;
   for (const Warning& warning : result.warnings)
     if (warning.code == WarningCode::kWrongPicture) of_pictures += "; " + warning.text;
   if (!of_pictures.empty()) return why + of_pictures;
-  const double light = signal_to_noise(result);
+  const double light = signal_to_noise(rig, result);
   if (light == 0)
     return why + "; no picture shows a line: are the projectors on, and is their light enough?";
   return why + "; lines are " + formatted(light, "%.1f") +
@@ -62,6 +62,7 @@ void end_points(const Rig& rig, const Frame& frame, PointResult& result) {
   if (auto warning = volume_warning(rig, lines_cut_by_volume(rig, result.graphs, result.labeling)))
     result.warnings.push_back(std::move(*warning));
   if (auto warning = few_names_warning(result)) result.warnings.push_back(std::move(*warning));
+  let_gamma_explain(result.warnings);
   restore_light(frame, result);
 }
 
@@ -106,7 +107,7 @@ FrameResult measure_frame(const Rig& rig, const Frame& frame, PointResult lines,
   result.points = place_points(
       rig, std::move(lines), looks_again ? before_surface(options.points) : options.points, clock);
   if (shows_room_alone(result.points)) throw NothingFound(why_room_alone(result.points));
-  if (result.points.points.empty()) throw NothingFound(why_nothing(result.points));
+  if (result.points.points.empty()) throw NothingFound(why_nothing(rig, result.points));
   if (!options.meshes) {
     end_points(rig, frame, result.points);
     return result;
@@ -120,8 +121,7 @@ FrameResult measure_frame(const Rig& rig, const Frame& frame, PointResult lines,
   end_points(rig, frame, result.points);
   if (auto warning = little_light_warning(rig, result.points))
     result.points.warnings.push_back(std::move(*warning));
-  if (auto warning =
-          depth_warning(result.shape.depth.report.consistency.sigma_scale, result.points.warnings))
+  if (auto warning = depth_warning(result.shape.depth.report.consistency, result.points.warnings))
     result.points.warnings.push_back(std::move(*warning));
   return count_motion(rig, std::move(result));
 }

@@ -111,6 +111,7 @@ struct PointResult {
   /// Per point, footprints: what its sigma rests on. Empty where it did not settle on the surface.
   std::vector<PointEvidence> evidence;
   std::vector<Warning> warnings;
+  std::vector<std::string> notes;  ///< what could not be told, and what to do; no fault
 };
 
 /// Dense depth and surface of one frame.

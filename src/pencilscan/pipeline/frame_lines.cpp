@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <optional>
+#include <string>
 #include <utility>
 
 #include "pencilscan/pipeline/disagreement_warnings.h"
@@ -93,8 +94,11 @@ void forget_camera(std::size_t camera, PointResult& result) {
 PointResult check_pictures(const Rig& rig, const Frame& frame, PointResult curves) {
   if (std::optional<Warning> warning = interpolation_warning(rig, curves.detections))
     curves.warnings.push_back(std::move(*warning));
-  if (std::optional<Warning> warning = gamma_warning(rig, frame, curves.detections, curves.graphs))
+  const auto gammas = gammas_of_light(rig, frame, curves.graphs);
+  if (std::optional<Warning> warning = gamma_warning(rig, curves.detections, gammas))
     curves.warnings.push_back(std::move(*warning));
+  else if (std::string note = gamma_note(rig, frame, gammas); !note.empty())
+    curves.notes.push_back(std::move(note));
   leave_out(rig, plain_faults(rig, frame), curves);
   return curves;
 }

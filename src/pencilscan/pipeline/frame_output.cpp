@@ -169,6 +169,7 @@ ordered_json hole_counts(const std::array<std::size_t, kHoleReasons>& nodes) {
 ordered_json depth_report(const Rig& rig, const DepthReport& depth, const HoleReport& holes) {
   ordered_json report;
   report["sigma_scale"] = number(depth.consistency.sigma_scale);
+  if (const auto& shared = depth.consistency.shared_scale) report["shared_scale"] = number(*shared);
   report["nodes_unconfirmed"] = depth.consistency.unconfirmed;
   report["nodes_completed"] = depth.completed;
   report["nodes_contradicted"] = depth.consistency.contradicted;
@@ -302,6 +303,7 @@ nlohmann::ordered_json frame_report(const Rig& rig, const Frame& frame, const Po
     for (const auto& [name, value] : warning.figures) finding[name] = number(value);
     finding["text"] = warning.text;
   }
+  if (!points.notes.empty()) report["notes"] = points.notes;
   return report;
 }
 

@@ -10,9 +10,9 @@
 #include "pencilscan/core/median.h"
 #include "pencilscan/core/name_list.h"
 #include "pencilscan/core/parallel.h"
-#include "pencilscan/grid/gamma_trace.h"
 #include "pencilscan/rig/camera_light.h"
 #include "pencilscan/rig/object_space.h"
+#include "pencilscan/view/unmix.h"
 
 namespace pencilscan {
 
@@ -29,65 +29,130 @@ std::optional<Warning> interpolation_warning(const Rig& rig,
                      "are more accurate"};
 }
 
-std::optional<Warning> gamma_warning(const Rig& rig, const Frame& frame,
-                                     std::span<const CameraDetection> detections,
-                                     std::span<const GridGraph> graphs) {
-  // Pictures whose gamma is stated have .86 to 1.03 of it here (docs/sensors.md, "Gamma").
-  constexpr double kWorthSaying = 1.3;
-  // Of colours that a mosaic or a JPEG leaves out: these look like a factor of up to 1.4.
-  constexpr double kOfFilledIn = 1.5;
-  constexpr double kDeviations = 4;  // of the median of all crossings
-  std::vector<std::vector<double>> logs(rig.cameras.size());
+namespace {
+
+// Crossings say .7 to 1.05 of the gamma that values have: halved and filled-in colours take light
+// from crossings more than from the lines beside them (docs/sensors.md, "Gamma").
+constexpr double kWorthSaying = 1.3;    // above the one that is stated
+constexpr double kOfFilledIn = 2;       // below it, in such colours
+constexpr double kGammaDeviations = 4;  // of the median of all crossings
+
+/// Whether a gamma other than the stated one is beyond doubt.
+bool is_another_gamma(const GammaTrace& trace, double stated, bool has_filled_in) {
+  // Cameras code light with a gamma of one or more. What looks less is paint that is brighter at
+  // the crossings than beside them.
+  if (trace.gamma < 1 / kWorthSaying) return false;
+  const double off = std::log(trace.gamma / stated);
+  const double worth_saying = off < 0 && has_filled_in ? kOfFilledIn : kWorthSaying;
+  return std::abs(off) > std::log(worth_saying) &&
+         std::abs(off) > kGammaDeviations * trace.deviation;
+}
+
+/// Whether values may be light, or are beyond doubt no light of such a gamma.
+bool is_told(const std::optional<GammaTrace>& trace) {
+  if (!trace) return false;
+  const double log_gamma = std::log(trace->gamma);
+  const double unsure = kGammaDeviations * trace->deviation;
+  return log_gamma + unsure < std::log(kWorthSaying) || log_gamma - unsure > 0;
+}
+
+}  // namespace
+
+std::vector<std::optional<GammaTrace>> gammas_of_light(const Rig& rig, const Frame& frame,
+                                                       std::span<const GridGraph> graphs) {
+  std::vector<std::vector<CrossingGamma>> said(rig.cameras.size());
   parallel_for(rig.cameras.size(), [&](std::size_t c) {
-    if (!graphs[c].crossings.empty())
-      logs[c] = log_gammas_at_crossings(graphs[c], linear_light(rig.cameras[c], frame.images[c]));
+    if (graphs[c].crossings.empty()) return;
+    // Colours are halved and filled in as values, before a gamma is taken out.
+    Camera camera = rig.cameras[c];
+    camera.gamma = 1;
+    said[c] = gammas_at_crossings(graphs[c], linear_light(camera, frame.images[c]));
   });
-  // Cameras with too few crossings that say something say it together.
-  std::vector<double> of_few;
-  for (const auto& of_camera : logs)
-    if (!gamma_of_crossings(of_camera))
-      of_few.insert(of_few.end(), of_camera.begin(), of_camera.end());
-  std::vector<double> gammas(rig.cameras.size(), 0);
-  for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
-    if (logs[c].empty()) continue;
-    auto trace = gamma_of_crossings(logs[c]);
-    if (!trace) trace = gamma_of_crossings(of_few);
-    if (!trace) continue;
-    const Camera& camera = rig.cameras[c];
-    // Cameras code light with a gamma of one or more. What looks less is paint that is brighter at
-    // the crossings than beside them.
-    if (camera.gamma * trace->gamma < 1 / kWorthSaying) continue;
-    const double off = std::abs(std::log(trace->gamma));
-    const double worth_saying =
-        detections[c].is_filled_in || camera.mosaic ? kOfFilledIn : kWorthSaying;
-    if (off > std::log(worth_saying) && off > kDeviations * trace->deviation)
-      gammas[c] = camera.gamma * trace->gamma;
+  std::vector<std::optional<GammaTrace>> gammas(rig.cameras.size());
+  std::vector<CrossingGamma> of_few;
+  for (std::size_t c = 0; c < said.size(); ++c) {
+    gammas[c] = gamma_of_crossings(said[c]);
+    if (!gammas[c]) of_few.insert(of_few.end(), said[c].begin(), said[c].end());
   }
+  const std::optional<GammaTrace> together = gamma_of_crossings(of_few);
+  for (std::size_t c = 0; c < said.size(); ++c)
+    if (!gammas[c] && !said[c].empty()) gammas[c] = together;
+  return gammas;
+}
+
+std::optional<Warning> gamma_warning(const Rig& rig, std::span<const CameraDetection> detections,
+                                     std::span<const std::optional<GammaTrace>> gammas) {
   std::string names;
   double first = 0;
   for (std::size_t c = 0; c < gammas.size(); ++c) {
-    if (gammas[c] == 0) continue;
-    if (names.empty()) first = gammas[c];
-    add_name(names, rig.cameras[c].name + " (" + formatted(gammas[c], "%.1f") + ")", ", ");
+    const Camera& camera = rig.cameras[c];
+    const bool has_filled_in = detections[c].is_filled_in || camera.mosaic.has_value();
+    if (!gammas[c] || !is_another_gamma(*gammas[c], camera.gamma, has_filled_in)) continue;
+    const double gamma = gammas[c]->gamma;
+    if (names.empty()) first = gamma;
+    add_name(names, camera.name + " (" + formatted(gamma, "%.1f") + ")", ", ");
   }
   if (names.empty()) return std::nullopt;
   return Warning{WarningCode::kGamma,
                  "where lines cross, light adds up only with another gamma than the rig's: about " +
-                     names + "; state it as \"gamma\" of these cameras, or switch it off there",
+                     names +
+                     " (JPEG shows less than there is; cameras that code pictures for the eye "
+                     "mostly have 2.2); state it as \"gamma\" of these cameras, or switch it off "
+                     "there",
                  {},
                  {{"gamma", first}}};
 }
 
-double signal_to_noise(const PointResult& result) {
-  // A profile of amplitude A and Gaussian width w in noise n a pixel is known in its place to
-  // sigma^2 = 2 w n^2 / (A^2 sqrt(pi)), the bound of Cramer and Rao.
+std::string gamma_note(const Rig& rig, const Frame& frame,
+                       std::span<const std::optional<GammaTrace>> gammas) {
+  std::string names;
+  for (std::size_t c = 0; c < gammas.size(); ++c) {
+    const Camera& camera = rig.cameras[c];
+    const cv::Mat& image = frame.images[c];
+    if (image.empty() || image.depth() != CV_8U || camera.gamma != 1 || camera.sees_texture_only ||
+        is_told(gammas[c]))
+      continue;
+    add_name(names, camera.name, ", ");
+  }
+  if (names.empty()) return names;
+  return "Too few lines cross to tell whether the pictures of " + names +
+         " are linear light: if these cameras code light for the eye, as for JPEG, switch that "
+         "off, or state their \"gamma\" in the rig (mostly 2.2).";
+}
+
+namespace {
+
+/// The share of its pixels in which a camera has samples of each family's presence.
+std::vector<double> sampled_shares(const Rig& rig, const PointResult& result, std::size_t c) {
+  std::vector<double> shares(result.families.size(), 1);
+  if (c >= rig.cameras.size() || !rig.cameras[c].mosaic) return shares;
+  Camera camera = rig.cameras[c];
+  camera.width = camera.height = 2;  // a mosaic repeats itself after so many
+  for (std::size_t f = 0; f < shares.size(); ++f) {
+    const cv::Mat samples =
+        presence_samples(camera, result.detections[c].unmixing, result.families[f]);
+    if (!samples.empty()) shares[f] = cv::countNonZero(samples) / 4.;
+  }
+  return shares;
+}
+
+}  // namespace
+
+double signal_to_noise(const Rig& rig, const PointResult& result) {
+  // A profile of amplitude A and Gaussian width w in noise n of a sample is known in its place to
+  // sigma^2 = 2 w n^2 / (A^2 sqrt(pi) s), the bound of Cramer and Rao, with s samples a pixel.
   std::vector<double> ratios;
-  for (const GridGraph& graph : result.graphs)
-    for (const Curve& curve : graph.curves)
+  for (std::size_t c = 0; c < result.graphs.size(); ++c) {
+    const std::vector<double> shares = sampled_shares(rig, result, c);
+    for (const Curve& curve : result.graphs[c].curves) {
+      const auto family = static_cast<std::size_t>(curve.family);
+      const double share = family < shares.size() ? shares[family] : 1;
       for (const CurvePoint& point : curve.points)
         if (point.sigma_px > 0 && point.width_px > 0)
-          ratios.push_back(std::sqrt(2 * point.width_px * std::numbers::inv_sqrtpi) /
+          ratios.push_back(std::sqrt(2 * point.width_px * std::numbers::inv_sqrtpi / share) /
                            point.sigma_px);
+    }
+  }
   return upper_median(std::move(ratios));
 }
 
@@ -128,7 +193,7 @@ std::optional<Warning> little_light_warning(const Rig& rig, const PointResult& r
   // than half is lost has 5 to 7. How much of a closed surface is measured tells nothing of light:
   // of one that is seen from one side it is always less than half.
   constexpr double kFaint = 7;
-  const double ratio = signal_to_noise(result);
+  const double ratio = signal_to_noise(rig, result);
   if (ratio == 0 || ratio > kFaint) return std::nullopt;
   // Profiles of lines that are closer than four of their deviations overlap: it is the neighbours'
   // light that makes places uncertain then, not noise. A grid of pixels shows no deviation below

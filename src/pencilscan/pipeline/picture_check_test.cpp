@@ -288,6 +288,8 @@ TEST_F(PictureCheck, LightThatIsTooLittleIsNamed) {
 TEST_F(PictureCheck, LightIsJudgedByLinesThatDoNotOverlap) {
   const auto said = [](const Rig& rig, double ratio, double width_px, float amplitude = 0.03F) {
     PointResult result;
+    result.families = color_families(rig);
+    result.detections.resize(1);
     CurvePoint point;
     point.amplitude = amplitude;
     point.width_px = static_cast<float>(width_px);
@@ -308,6 +310,11 @@ TEST_F(PictureCheck, LightIsJudgedByLinesThatDoNotOverlap) {
     for (LinePattern& pattern : projector.patterns) pattern.pitch_px /= 4;
   EXPECT_THAT(said(dense, 6, 1.1), HasSubstr("lines are too close together: 2.1 px"));
   EXPECT_THAT(said(dense, 9, 1.1), IsEmpty());
+  // One sample of four makes places half as sure in the same light.
+  Rig raw = *rig_;
+  raw.cameras[0].mosaic = Mosaic::from_name("RGGB");
+  EXPECT_THAT(said(raw, 4, 1.1), IsEmpty());
+  EXPECT_THAT(said(raw, 3, 1.1), HasSubstr("are 6.0 times as bright as the noise"));
 }
 
 TEST_F(PictureCheck, MosaicsThatAreNotStatedOrOthersAreNamed) {
@@ -371,18 +378,50 @@ TEST_F(PictureCheck, ACameraThatIsLeftOutGivesNoColor) {
 }
 
 TEST(DepthWarning, IsSaidWhereNothingElseExplainsIt) {
-  EXPECT_FALSE(depth_warning(2.4, {}));
-  const auto warning = depth_warning(4.3, {});
-  ASSERT_TRUE(warning);
-  EXPECT_EQ(warning->code, WarningCode::kViewsDisagree);
-  EXPECT_THAT(warning->text, HasSubstr("lie apart by 4.3 times"));
+  const auto depth = [](double scale, std::optional<double> shared) {
+    ConsistencyReport report;
+    report.sigma_scale = scale;
+    report.shared_scale = shared;
+    return report;
+  };
+  EXPECT_FALSE(depth_warning(depth(2.4, 1.0), {}));
+  const auto of_places = depth_warning(depth(4.3, 0.4), {});
+  ASSERT_TRUE(of_places);
+  EXPECT_EQ(of_places->code, WarningCode::kViewsDisagree);
+  EXPECT_THAT(of_places->text, HasSubstr("lie apart by 4.3 times"));
+  EXPECT_THAT(of_places->text, testing::Not(HasSubstr("the rig is a little off")));
+  EXPECT_TRUE(depth_warning(depth(4.3, std::nullopt), {}));
+  const auto of_patches = depth_warning(depth(2.4, 1.3), {});
+  ASSERT_TRUE(of_patches);
+  EXPECT_THAT(of_patches->text, HasSubstr("the rig is a little off"));
   std::vector<Warning> said(1);
   said[0].code = WarningCode::kSaturated;
-  EXPECT_TRUE(depth_warning(4.3, said));
-  for (const WarningCode code : {WarningCode::kRigIsOff, WarningCode::kViewsDisagree}) {
+  EXPECT_TRUE(depth_warning(depth(4.3, 1.3), said));
+  // Noise of colours that are filled in repeats itself, and is no patch.
+  said[0].code = WarningCode::kColorsFilledIn;
+  EXPECT_FALSE(depth_warning(depth(3.1, 0.98), said));
+  EXPECT_TRUE(depth_warning(depth(3.1, 1.3), said));
+  for (const WarningCode code :
+       {WarningCode::kRigIsOff, WarningCode::kViewsDisagree, WarningCode::kGamma}) {
     said[0].code = code;
-    EXPECT_FALSE(depth_warning(4.3, said));
+    EXPECT_FALSE(depth_warning(depth(4.3, 1.3), said));
   }
+}
+
+TEST(GammaFinding, ComesFirstAndExplainsThatViewsDisagree) {
+  const auto codes = [](std::vector<Warning> warnings) {
+    let_gamma_explain(warnings);
+    std::vector<WarningCode> result;
+    for (const Warning& warning : warnings) result.push_back(warning.code);
+    return result;
+  };
+  using Code = WarningCode;
+  using testing::ElementsAre;
+  EXPECT_THAT(
+      codes({{Code::kSaturated}, {Code::kRigIsOff}, {Code::kGamma}, {Code::kViewsDisagree}}),
+      ElementsAre(Code::kGamma, Code::kSaturated, Code::kRigIsOff));
+  EXPECT_THAT(codes({{Code::kSaturated}, {Code::kRigIsOff}}),
+              ElementsAre(Code::kSaturated, Code::kRigIsOff));
 }
 
 TEST(FewNames, IsSaidBelowATenthOfTheLines) {
