@@ -377,7 +377,7 @@ def break_captures(args, program, truth, noise):
                 folders = [copied(f, out / f"capture{k}") for k, f in enumerate(good)]
                 expected = failure(args, program, Draw(truth, number), folders, out, noise)
             row = calibrate(args, program, truth, folders, args.out / f"found_{name}", "--devices", devices,
-                            "--max-tracks", args.broken_tracks)
+                            "--focal-tolerance", 0, "--center-tolerance", 0, "--max-tracks", args.broken_tracks)
             row["expected"] = expected
             row["named"] = all(any(e in reason for reason in row["reasons"]) for e in expected)
             rows[f"{name} {number}"] = row

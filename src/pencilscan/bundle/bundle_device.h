@@ -27,6 +27,7 @@ struct BundleDevice {
   /// infinity: nothing known). fy's is on fy / fx.
   std::array<double, kIntrinsics> prior{};
   std::array<double, kIntrinsics> prior_sigma{};
+  bool is_K_given = false;  ///< priors of fx, cx and cy are those of a K that was given
   HeldInner held;
   bool present = false;  ///< has a pose and takes part
 };

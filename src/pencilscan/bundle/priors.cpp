@@ -54,15 +54,9 @@ void set_priors(const GivenCalibration& known, const std::optional<GivenToleranc
   sigma[kK1] = 0.2;
   sigma[kK2] = 0.5;
   sigma[kP1] = sigma[kP2] = 0.002;
-  if (known.K && tolerance) set_tolerance(known, *tolerance, device);
+  device.is_K_given = known.K && tolerance;
+  if (device.is_K_given) set_tolerance(known, *tolerance, device);
   sigma[kK3] = usual_k3(device);
-}
-
-void hold_given(const GivenCalibration& known, BundleDevice& device) {
-  if (known.K)
-    for (const std::size_t i : {kFx, kFy, kCx, kCy}) device.prior_sigma[i] = 0;
-  if (known.distortion)
-    for (const std::size_t i : {kK1, kK2, kP1, kP2, kK3}) device.prior_sigma[i] = 0;
 }
 
 double usual_k3(const BundleDevice& device) {

@@ -21,8 +21,6 @@ struct GivenTolerance {
 /// out.
 void set_priors(const GivenCalibration& known, const std::optional<GivenTolerance>& tolerance,
                 bool is_camera, BundleDevice& device);
-/// Holds what was given at its value.
-void hold_given(const GivenCalibration& known, BundleDevice& device);
 
 /// One standard deviation of k3. Lenses that compress angles have one: the equidistant projection
 /// f theta has -1/7 in the series of tan theta, the stereographic one, 2 f tan(theta / 2), -5/64.

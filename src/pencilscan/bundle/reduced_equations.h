@@ -20,6 +20,7 @@ class ReducedEquations {
   static constexpr Eigen::Index kPose = 6;
   static constexpr Eigen::Index kBlock = kPose + kIntrinsics;
   static constexpr int kBoardShapes = 6;  ///< stretch, shear, bend in three ways, size
+  static constexpr int kOfGivenK = 3;     ///< focal lengths; principal points along x and y
 
   ReducedEquations(const BundleProblem& problem, const BundleOptions& adjusted);
 
@@ -31,11 +32,12 @@ class ReducedEquations {
   /// covariance of a robust estimate is E[psi'] ^-2 E[psi^2] (J'J)^-1 (P. J. Huber, "Robust
   /// Statistics", 1981, section 7.6), and H = E[w] J'J.
   [[nodiscard]] double variance_factor() const;
-  /// Covariance of b in H x = b from errors of one view, corner or prior each; 15 D x 15 D.
+  /// Covariance of b in H x = b from errors of one view, corner or prior each; 15 D x 15 D. Of
+  /// given K it has what each errs by alone.
   [[nodiscard]] Eigen::MatrixXd random() const;
   /// Per column one systematic error of one standard deviation, as it enters H x = b; 15 D x N.
   /// Boards may be bent and stretched; `shared_px` is the error that all views in a ninth of an
-  /// image share.
+  /// image share. Given K err alike: they are of one target and one method.
   [[nodiscard]] Eigen::MatrixXd systematic(double shared_px) const;
 
   /// One standard deviation of the errors that views in a ninth of an image share, from what
@@ -89,6 +91,7 @@ class ReducedEquations {
   void add_track(std::size_t t);
   void add_boards();
   void add_priors();
+  void add_given_K(Eigen::Index at, std::size_t intrinsic, double sigma);
 
   const BundleProblem& problem_;
   BundleOptions adjusted_;
@@ -98,6 +101,8 @@ class ReducedEquations {
   Eigen::MatrixXd cells_;        ///< 15 D x (2 * 64 D), the same of cells
   std::vector<Cell> in_cells_;   ///< 64 D
   Eigen::MatrixXd shapes_;       ///< 15 D x 5, per deviation of the board's shape
+  Eigen::MatrixXd of_given_K_;   ///< part of H that is from priors of given K, a diagonal
+  Eigen::MatrixXd given_K_;      ///< 15 D x 3, per deviation of all given K at once
   Eigen::VectorXd patch_views_;  ///< per column of patches_: views, each over its sigma^2, px^-2
   double after_points_ = 0;      ///< shared errors of a pixel in whitened residuals, squared: left
   std::vector<Mat3> rotations_;

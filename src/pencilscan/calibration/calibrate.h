@@ -36,17 +36,13 @@ struct CalibrateOptions {
   double outlier_deviations = 4;     ///< views beyond are dropped
   std::size_t stage_tracks = 3000;   ///< of all stages but the last
   GivenTolerance tolerance{};        ///< of given inner parameters
-  /// Given values are held exactly where the data know them as well and agree, if the scatter grows
-  /// by less than this factor and by this much more.
-  double hold_factor = 1.1;
-  double hold_slack_px = 0.01;
 };
 
 /// What became of given inner parameters.
 enum class GivenUse {
   kNone,         ///< none were given
   kTolerance,    ///< kept within their tolerance
-  kExact,        ///< kept to the last digit: the data agree, and know them as well
+  kExact,        ///< stated without a tolerance, and kept to the last digit
   kContradicted  ///< the data know better: they were a start only
 };
 

@@ -33,8 +33,10 @@ class Calibration {
       : input_(input), options_(options), progress_(progress), rig_(input.rig) {
     known_ = focal_lengths_from_boards(input, rig_);
     result_.tolerance = options.tolerance;
+    const bool is_exact = options.tolerance.focal == 0 && options.tolerance.center_px == 0;
+    const GivenUse kept = is_exact ? GivenUse::kExact : GivenUse::kTolerance;
     for (const GivenCalibration& k : input.known)
-      result_.given.push_back(k.K ? GivenUse::kTolerance : GivenUse::kNone);
+      result_.given.push_back(k.K ? kept : GivenUse::kNone);
   }
 
   CalibrationResult run() {
@@ -46,7 +48,6 @@ class Calibration {
                            result_.problem.tracks);
     candidates_ = result_.problem.tracks;
     if (!solve_with_given()) return finish(false);
-    keep_given_values();
     take_back_views();
     last_stage();
     return finish(true);
@@ -231,57 +232,6 @@ class Calibration {
       triangulate_all(problem, kLeastAngle);
       drop();
     }
-  }
-
-  /// Given values that the data know as well and confirm, and that explain them as well as free
-  /// ones do, are a calibration and are kept exactly.
-  void keep_given_values() {
-    if (!is_any_given()) return;
-    triangulate_all(result_.problem, kLeastAngle);
-    const Uncertainty sigma = uncertainty(result_.problem, result_.adjustment);
-    const auto agrees = given_agrees(input_, options_.tolerance, 1, result_.problem, sigma);
-    const auto better = known_better(input_, options_.tolerance, result_.problem, sigma);
-    const double free_scale = error_scale(result_.problem);
-    for (const int attempt : {0, 1, 2}) {  // all given ones, the cameras' alone, the projectors'
-      std::vector<char> held(input_.known.size(), 0);
-      bool is_plausible = true;
-      for (std::size_t d = 0; d < held.size(); ++d) {
-        const bool in_group = attempt == 0 || (attempt == 1) == (d < input_.rig.cameras.size());
-        if (result_.given[d] == GivenUse::kNone || !in_group) continue;
-        held[d] = better[d];
-        is_plausible = is_plausible && agrees[d] != 0;
-      }
-      if (is_plausible && std::count(held.begin(), held.end(), 1) > 0 && hold(held, free_scale))
-        return;
-    }
-  }
-
-  /// Puts given values back where `held`, if the scatter stays that of free ones.
-  bool hold(const std::vector<char>& held, double free_scale) {
-    BundleProblem before = result_.problem;
-    const BundleOptions adjustment = result_.adjustment;
-    for (std::size_t d = 0; d < held.size(); ++d) {
-      if (held[d] == 0) continue;
-      const BundleDevice exact = bundle_device(device_at(input_.rig, d));
-      BundleDevice& device = result_.problem.devices[d];
-      for (std::size_t i = 0; i < kIntrinsics; ++i)
-        if (i < kK1 || input_.known[d].distortion) device.inner[i] = exact.inner[i];
-      hold_given(input_.known[d], device);
-    }
-    // Twice: the weights of the first round are those of errors not yet adapted to.
-    for (int round = 0; round < 2; ++round) {
-      stage(kAll, options_.stage_tracks, 50);
-      triangulate_all(result_.problem, kLeastAngle);
-    }
-    if (error_scale(result_.problem) <=
-        options_.hold_factor * free_scale + options_.hold_slack_px) {
-      for (std::size_t d = 0; d < held.size(); ++d)
-        if (held[d] != 0) result_.given[d] = GivenUse::kExact;
-      return true;
-    }
-    result_.problem = std::move(before);
-    result_.adjustment = adjustment;
-    return false;
   }
 
   /// What fundamental matrices left, and what they dropped although the rig explains it: one that

@@ -6,6 +6,7 @@
 #include "pencilscan/bundle/bundle_device.h"
 #include "pencilscan/calibration/given_values.h"
 #include "pencilscan/calibration/sample_input.h"
+#include "pencilscan/calibration/scale_deviation.h"
 #include "pencilscan/calibration/verdict.h"
 #include "pencilscan/core/random.h"
 #include "pencilscan/rig/sample_devices.h"
@@ -170,6 +171,59 @@ TEST_F(BeforeAWall, TheSkewOfAGivenKIsKept) {
   EXPECT_EQ(result.given[0], GivenUse::kExact);
   EXPECT_LT(result.rms_px, 0.2);  // 0.1 px in each coordinate
   EXPECT_LT(sample::projection_error(truth_, result.problem), 0.3);
+}
+
+/// What the rig makes of lengths in the volume, as a share too much.
+double scale_error(const Rig& truth, const BundleProblem& found) {
+  Random random(1);
+  Eigen::Matrix3Xd a(3, 100);
+  Eigen::Matrix3Xd b(3, 100);
+  for (Eigen::Index i = 0; i < a.cols(); ++i) {
+    a.col(i) << random.uniform(-90, 90), random.uniform(-90, 90), random.uniform(-90, 90);
+    Track track;
+    for (std::size_t d = 0; d < device_count(truth); ++d)
+      track.views.push_back({d, *device_at(truth, d).project(a.col(i)), 1});
+    b.col(i) = triangulate(found, track, 0.01).value_or(Vec3::Constant(1e6));
+  }
+  return fit_similarity(a, b, true).block<3, 1>(0, 0).norm() - 1;
+}
+
+/// A ring takes up focal lengths that are wrong alike: that they agree with the data proves little.
+TEST(GivenK, ThatAreWrongAlikeStayInTheDeviationOfTheScale) {
+  const Rig truth = sample::ring(4, 4);
+  CalibrationInput input = sample::input_of(truth, sample::tracks_of(truth, {.count = 1500}), true);
+  for (Camera& camera : input.rig.cameras) {
+    camera.K(0, 0) *= 0.9974;
+    camera.K(1, 1) *= 0.9974;
+    camera.K(0, 2) -= 1.5;
+    camera.K(1, 2) += 2;
+  }
+  const auto result = calibrate(input, {.hypotheses = 2});
+  ASSERT_TRUE(result.solved);
+  const Uncertainty sigma = uncertainty(result.problem, result.adjustment);
+  const auto scale = scale_deviation(input, result, sigma);
+  ASSERT_TRUE(scale.has_value());
+  for (std::size_t d = 0; d < truth.cameras.size(); ++d) {
+    EXPECT_EQ(result.given[d], GivenUse::kTolerance);
+    const double focal = truth.cameras[d].K(0, 0);
+    EXPECT_LT(std::abs(result.rig.cameras[d].K(0, 0) - focal), 2 * sigma.devices[d].inner[kFx]);
+  }
+  EXPECT_LT(std::abs(scale_error(truth, result.problem)), 2 * scale->share);
+}
+
+/// Half of the variance of given K does not average out, however many they are.
+TEST(GivenK, OfManyCamerasDoNotGiveAScaleThatMuchBetter) {
+  const Rig truth = sample::ring(4, 4);
+  const CalibrationInput input =
+      sample::input_of(truth, sample::tracks_of(truth, {.count = 1500}), true);
+  auto result = calibrate(input, {.hypotheses = 2});
+  ASSERT_TRUE(result.solved);
+  const auto share = [&] {
+    return scale_deviation(input, result, uncertainty(result.problem, result.adjustment))->share;
+  };
+  const double of_common = share();
+  for (BundleDevice& device : result.problem.devices) device.is_K_given = false;
+  EXPECT_GT(of_common, 1.1 * share());
 }
 
 /// Cameras whose K is given, found without error; then stated otherwise.

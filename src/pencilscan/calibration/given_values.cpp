@@ -72,18 +72,4 @@ std::vector<char> given_agrees(const CalibrationInput& input, const GivenToleran
   return agrees;
 }
 
-std::vector<char> known_better(const CalibrationInput& input, const GivenTolerance& tolerance,
-                               const BundleProblem& problem, const Uncertainty& sigma) {
-  // With the tolerance as a prior half of it is left where the data know as much and a bit more.
-  constexpr double kShare = 0.5;
-  std::vector<char> better(input.known.size(), 0);
-  for (std::size_t d = 0; d < better.size(); ++d)
-    better[d] = input.known[d].K && problem.devices[d].present &&
-                        sigma.devices[d].inner[kFx] <=
-                            kShare * tolerance.focal * problem.devices[d].inner[kFx]
-                    ? 1
-                    : 0;
-  return better;
-}
-
 }  // namespace pencilscan

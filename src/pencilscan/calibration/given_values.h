@@ -37,10 +37,4 @@ inline constexpr double kContradictsDeviations = 3;
                                              const BundleProblem& problem,
                                              const Uncertainty& sigma);
 
-/// Per device: a K is given, and the data know its focal length better than the tolerance says.
-[[nodiscard]] std::vector<char> known_better(const CalibrationInput& input,
-                                             const GivenTolerance& tolerance,
-                                             const BundleProblem& problem,
-                                             const Uncertainty& sigma);
-
 }  // namespace pencilscan
