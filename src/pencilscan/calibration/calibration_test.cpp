@@ -332,6 +332,64 @@ TEST(Judge, PairsThatTheRigExplainsAreRigidWhateverFundamentalMatricesSay) {
   }
 }
 
+/// A ring as it is, every other correspondence of projector proj0 wrong.
+class RingWithWrongCodes : public testing::Test {
+ protected:
+  static constexpr std::size_t kWrong = 3;
+  RingWithWrongCodes() {
+    const Rig truth = ring(3, 3);
+    std::vector<Track> tracks = tracks_of(truth, {.count = 900});
+    Random random(5);
+    for (Track& track : tracks)
+      for (std::size_t i = 1; i < track.views.size(); ++i)
+        if ((track.views[0].device == kWrong || track.views[i].device == kWrong) &&
+            random.below(2) == 0)
+          track.views[i].pixel = Vec2(random.uniform(0, 300), random.uniform(0, 200));
+    input_ = input_of(truth, tracks, true);
+    result_ = exact_ring(input_.tracks, truth);
+    result_.solved = true;
+    result_.placed.assign(6, 1);
+    result_.residuals.resize(6);
+    result_.given.assign(6, GivenUse::kNone);
+    for (const auto& [pair, matches] : matches_by_pair(input_.tracks))
+      result_.pairs.push_back({.camera = pair.first,
+                               .projector = pair.second,
+                               .matches = matches.size(),
+                               .inliers = matches.size() / (pair.second == kWrong ? 2 : 1)});
+  }
+  [[nodiscard]] Verdict verdict(std::vector<Finding> before = {}) const {
+    Uncertainty sigma;
+    sigma.devices.resize(6);
+    return judge(input_, result_, sigma, std::move(before));
+  }
+  static std::string text(const Verdict& verdict) {
+    std::string all;
+    for (const Finding& finding : verdict.findings) all += finding.what + "\n";
+    return all;
+  }
+
+  CalibrationInput input_;
+  CalibrationResult result_;
+};
+
+TEST_F(RingWithWrongCodes, ADeviceThatFitsNoneIsNamedOnceAndMakesItUnusable) {
+  const Verdict found = verdict();
+  EXPECT_EQ(found.grade, Grade::kUnusable);
+  EXPECT_THAT(found.findings[0].what, HasSubstr("the codes of proj0 make no sense"));
+  EXPECT_THAT(text(found), AllOf(Not(HasSubstr("proj0/cam")), Not(HasSubstr("has moved"))));
+}
+
+TEST_F(RingWithWrongCodes, WhatExplainsThatADeviceHasNoPlaceSilencesIt) {
+  result_.placed[kWrong] = 0;
+  result_.problem.devices[kWrong].present = false;
+  EXPECT_THAT(text(verdict()), HasSubstr("proj0 shares too few"));
+  const Finding order{Grade::kUnusable, "wrong order", "", {kWrong}};
+  EXPECT_EQ(verdict({order}).findings[0].what, "wrong order");
+  EXPECT_THAT(text(verdict({order})), Not(HasSubstr("proj0 shares too few")));
+  const Finding of_all{Grade::kUnusable, "wrong order", "", {0, 1, 2, 3, 4, 5}};
+  EXPECT_EQ(text(verdict({of_all})), "wrong order\n");
+}
+
 TEST(CalibrationReport, SaysVerdictLoopAndPlaces) {
   const Rig truth = ring(2, 2);
   const CalibrationInput input = input_of(truth, tracks_of(truth, {.count = 400}), true);

@@ -12,34 +12,88 @@
 #include "pencilscan/core/name_list.h"
 #include "pencilscan/gray/gray_decode.h"
 #include "pencilscan/gray/image_order.h"
+#include "pencilscan/gray/swapped_bits.h"
 #include "pencilscan/planning/units.h"
 #include "pencilscan/rig/device_list.h"
 
 namespace pencilscan {
 namespace {
 
-/// Pairs whose images are in a wrong order, by what explains it.
-using WrongOrders = std::map<std::string, std::vector<std::string>>;
+std::string name_of(const DecodeSummary& pair, const Rig& rig) {
+  return rig.projectors[pair.projector].name + "/" + rig.cameras[pair.camera].name +
+         " (--captures number " + std::to_string(pair.capture + 1) + ")";
+}
 
-std::vector<Finding> findings_of(const WrongOrders& orders, std::size_t pairs) {
+/// Whether all pairs of a device are in one wrong order or another.
+bool is_all_wrong(const std::vector<DecodeSummary>& pairs, std::size_t device, const Rig& rig) {
+  bool has_any = false;
+  for (const DecodeSummary& pair : pairs) {
+    if (pair.camera != device && rig.cameras.size() + pair.projector != device) continue;
+    if (pair.wrong_order.empty()) return false;
+    has_any = true;
+  }
+  return has_any;
+}
+
+/// One finding per wrong order. Where it leaves nothing of a device, the rig is unusable for it.
+std::vector<Finding> order_findings(const std::vector<DecodeSummary>& pairs, const Rig& rig) {
   constexpr std::size_t kNamed = 3;
+  std::map<std::string, std::vector<const DecodeSummary*>> by_order;
+  for (const DecodeSummary& pair : pairs)
+    if (!pair.wrong_order.empty()) by_order[pair.wrong_order].push_back(&pair);
   std::vector<Finding> findings;
-  for (const auto& [order, names] : orders) {
-    std::string who = "all " + std::to_string(pairs) + " pairs";
-    const bool is_all = names.size() == pairs && pairs > 1;
-    if (!is_all) who = name_list(names, kNamed);
-    findings.push_back({is_all ? Grade::kUnusable : Grade::kDoubtful,
-                        "the images of " + who + " are in the wrong order: " + order,
-                        "put them in the documented order; they were left out"});
+  for (const auto& [order, wrong] : by_order) {
+    std::vector<std::string> names;
+    std::vector<char> is_of(device_count(rig), 0);
+    for (const DecodeSummary* pair : wrong) {
+      names.push_back(name_of(*pair, rig));
+      is_of[pair->camera] = is_of[rig.cameras.size() + pair->projector] = 1;
+    }
+    const std::string who = names.size() == pairs.size() && pairs.size() > 1
+                                ? "all " + std::to_string(pairs.size()) + " pairs"
+                                : name_list(names, kNamed);
+    Finding finding{Grade::kDoubtful,
+                    "the images of " + who + " are in the wrong order: " + order,
+                    "put them in the documented order; they were left out",
+                    {}};
+    for (std::size_t d = 0; d < is_of.size(); ++d)
+      if (is_of[d] != 0 && is_all_wrong(pairs, d, rig)) finding.explains.push_back(d);
+    if (!finding.explains.empty()) finding.grade = Grade::kUnusable;
+    findings.push_back(std::move(finding));
   }
   return findings;
+}
+
+/// One program projects all pairs. An order that explains some of them, and in which none of the
+/// others makes less sense, is that of all: codes of rows in the place of columns are smooth, too,
+/// and leave the panel only where the object reaches far enough.
+std::string common_order(const std::vector<DecodeSummary>& decoded,
+                         const std::vector<CapturePair>& pairs, const std::vector<double>& sensible,
+                         const Rig& rig) {
+  std::string order;
+  for (const DecodeSummary& pair : decoded) {
+    if (pair.wrong_order.empty()) continue;
+    if (!order.empty() && order != pair.wrong_order) return {};
+    order = pair.wrong_order;
+  }
+  if (order.empty()) return {};
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    if (!decoded[i].wrong_order.empty()) continue;
+    const CapturePair& pair = pairs[i];
+    const Projector& projector = rig.projectors[pair.projector];
+    const auto in_order =
+        sensible_share_in_order(order, projector.width, projector.height, pair.inverses,
+                                [&](std::size_t k) { return read_gray_image(pair, rig, k); });
+    if (!in_order || *in_order < sensible[i]) return {};
+  }
+  return order;
 }
 
 /// Decodes one pair and adds its correspondences, unless the codes make no sense; looks for the
 /// board where all of the panel is lit.
 DecodeSummary decode_pair(const CapturePair& pair, std::size_t capture, const Rig& rig,
                           TrackBuilder& tracks, ColorCollector& colors, BoardFinder* boards,
-                          WrongOrders& wrong_orders) {
+                          double& sensible) {
   const Projector& projector = rig.projectors[pair.projector];
   const GrayStack stack = read_gray_stack(pair, rig);
   if (boards != nullptr) boards->look(capture, pair.camera, stack.white);
@@ -49,12 +103,9 @@ DecodeSummary decode_pair(const CapturePair& pair, std::size_t capture, const Ri
   summary.wrong_order = explain_wrong_order(
       projector.width, projector.height, pair.inverses,
       [&](std::size_t i) { return read_gray_image(pair, rig, i); }, view);
-  if (!summary.wrong_order.empty()) {
-    wrong_orders[summary.wrong_order].push_back(
-        projector.name + "/" + rig.cameras[pair.camera].name + " (--captures number " +
-        std::to_string(capture + 1) + ")");
-    return summary;
-  }
+  if (summary.wrong_order.empty()) summary.wrong_order = explain_swapped_bits(stack, view);
+  if (!summary.wrong_order.empty()) return summary;
+  sensible = sensible_share(view);
   const std::size_t before = tracks.samples();
   tracks.add(capture, pair.camera, pair.projector, view);
   colors.add(pair, view);
@@ -97,10 +148,11 @@ CapturesCalibration calibrate_captures(const UncalibratedRig& devices,
 
   GrayTrackOptions track_options;
   track_options.max_tracks = options.max_tracks;
-  TrackBuilder tracks(input.rig, track_options);
-  ColorCollector colors(input.rig);
-  WrongOrders wrong_orders;
+  std::optional<TrackBuilder> tracks(std::in_place, input.rig, track_options);
+  std::optional<ColorCollector> colors(std::in_place, input.rig);
   std::vector<std::vector<CapturePair>> captures;
+  std::vector<CapturePair> pairs;
+  std::vector<double> sensible;  // per pair
   for (const std::filesystem::path& folder : folders)
     captures.push_back(list_captures(folder, input.rig));
   for (std::size_t k = 0; k < captures.size(); ++k) {
@@ -108,12 +160,20 @@ CapturesCalibration calibrate_captures(const UncalibratedRig& devices,
       tell("decoding", (static_cast<double>(k) +
                         static_cast<double>(i) / static_cast<double>(captures[k].size())) /
                            static_cast<double>(captures.size()));
-      all.decoded.push_back(decode_pair(captures[k][i], k, input.rig, tracks, colors,
-                                        boards ? &*boards : nullptr, wrong_orders));
+      pairs.push_back(captures[k][i]);
+      sensible.push_back(0);
+      all.decoded.push_back(decode_pair(pairs.back(), k, input.rig, *tracks, *colors,
+                                        boards ? &*boards : nullptr, sensible.back()));
     }
   }
-  std::vector<Finding> findings = findings_of(wrong_orders, all.decoded.size());
-  input.tracks = tracks.tracks();
+  const std::string order = common_order(all.decoded, pairs, sensible, input.rig);
+  if (!order.empty()) {
+    for (DecodeSummary& pair : all.decoded) pair.wrong_order = order;
+    tracks.emplace(input.rig, track_options);
+    colors.emplace(input.rig);
+  }
+  std::vector<Finding> findings = order_findings(all.decoded, input.rig);
+  input.tracks = tracks->tracks();
   if (boards) {
     input.board_views = boards->views();
     input.projected_corners = boards->projected_views();
@@ -132,7 +192,7 @@ CapturesCalibration calibrate_captures(const UncalibratedRig& devices,
   CalibrateOptions calibrate_options;
   calibrate_options.tolerance = options.tolerance;
   all.result = calibrate(input, calibrate_options, progress);
-  all.color = colors.result();
+  all.color = colors->result();
   set_colors(all.color, all.result.rig);
   tell("judging", 0.9);
   all.uncertainty.devices.resize(device_count(input.rig));

@@ -81,8 +81,7 @@ void find_swaps(const CalibrationInput& input, const Matches& matches, const Pai
 
 /// The device that most of the contradicting pairs have in common; of several, the one whose pairs
 /// fit worst altogether.
-Finding name_mover(const CalibrationInput& input, const Matches& matches, const PairFit& fit,
-                   const Captures& bad) {
+std::size_t find_mover(const Matches& matches, const PairFit& fit, const Captures& bad) {
   std::map<std::size_t, std::pair<std::size_t, double>> blame;
   for (const auto& [pair, captures] : bad) {
     ++blame[pair.first].first;
@@ -94,19 +93,23 @@ Finding name_mover(const CalibrationInput& input, const Matches& matches, const 
     for (const std::size_t d : {pair.first, pair.second})
       if (blame.contains(d)) blame[d].second += misfit;
   }
-  const auto mover = std::max_element(
-      blame.begin(), blame.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
+  return std::max_element(blame.begin(), blame.end(),
+                          [](const auto& a, const auto& b) { return a.second < b.second; })
+      ->first;
+}
+
+Finding name_mover(const CalibrationInput& input, std::size_t mover, const Captures& bad) {
   std::vector<std::string> partners;
   std::set<std::size_t> when;
   for (const auto& [pair, captures] : bad) {
-    if (pair.first != mover->first && pair.second != mover->first) continue;
-    const std::size_t partner = pair.first == mover->first ? pair.second : pair.first;
+    if (pair.first != mover && pair.second != mover) continue;
+    const std::size_t partner = pair.first == mover ? pair.second : pair.first;
     partners.push_back(device_at(input.rig, partner).name);
     when.insert(captures.begin(), captures.end());
   }
-  const bool is_camera = mover->first < input.rig.cameras.size();
+  const bool is_camera = mover < input.rig.cameras.size();
   std::string text = std::string(is_camera ? "camera " : "projector ") +
-                     device_at(input.rig, mover->first).name + " has moved: its images " +
+                     device_at(input.rig, mover).name + " has moved: its images " +
                      (is_camera ? "of " : "in ") + name_list(partners) +
                      " do not fit the rest of the rig";
   if (!when.empty()) {
@@ -221,8 +224,10 @@ Contradictions find_contradictions(const CalibrationInput& input, const Calibrat
   for (const PairGeometry& geometry : result.pairs)
     if (geometry.inlier_share() < 0.35) bad.pairs.erase({geometry.camera, geometry.projector});
   for (const DevicePair& pair : bad.pairs) found.unexplained[pair] = bad.captures[pair];
-  if (!bad.pairs.empty())
-    found.findings.push_back(name_mover(input, matches, fit, found.unexplained));
+  if (!bad.pairs.empty()) {
+    found.mover = find_mover(matches, fit, found.unexplained);
+    found.findings.push_back(name_mover(input, *found.mover, found.unexplained));
+  }
   return found;
 }
 

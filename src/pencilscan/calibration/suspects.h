@@ -1,6 +1,7 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <vector>
 
 #include "pencilscan/calibration/capture_moves.h"
@@ -13,6 +14,7 @@ namespace pencilscan {
 /// What contradicts a rig.
 struct Contradictions {
   std::vector<Finding> findings;
+  std::optional<std::size_t> mover;  ///< the device that the last of them says has moved
   /// Pairs that neither swapped folders nor moved devices explain, nor their own images (some fit
   /// no pair of devices at all), with the captures in which they contradict; none: in all.
   std::map<DevicePair, std::vector<std::size_t>> unexplained;

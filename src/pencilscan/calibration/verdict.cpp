@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "pencilscan/bundle/bundle_device.h"
 #include "pencilscan/calibration/flat_scene.h"
@@ -26,7 +27,11 @@ class Judge {
         options_(options),
         scene_(flat_scene(result, options)) {}
 
-  std::vector<Finding> findings() {
+  /// `found_before`: what explains that devices have no place.
+  std::vector<Finding> findings(const std::vector<Finding>& found_before) {
+    for (const Finding& finding : found_before)
+      explained_.insert(finding.explains.begin(), finding.explains.end());
+    if (explained_.size() == result_.placed.size()) return {};  // nothing is left to judge
     judge_scene();
     if (!result_.solved) {
       add(Grade::kUnusable,
@@ -80,7 +85,7 @@ class Judge {
 
   void judge_placement() {
     for (std::size_t d = 0; d < result_.placed.size(); ++d) {
-      if (result_.placed[d] != 0) continue;
+      if (result_.placed[d] != 0 || explained_.contains(d)) continue;
       add(Grade::kUnusable,
           name(d) + " shares too few correspondences with the others to be placed",
           "put an object where " + name(d) + " and its neighbours see it");
@@ -88,21 +93,67 @@ class Judge {
   }
 
   void judge_pairs() {
-    add_all(find_contradictions(input_, result_).findings);
+    struct LowPair {
+      const PairGeometry* pair;
+      double share;
+    };
+    Contradictions contradictions = find_contradictions(input_, result_);
+    std::vector<LowPair> low;
+    std::vector<const PairGeometry*> sound;
     const auto matches = matches_by_pair(input_.tracks);
     const PairFit fit = tolerant_fit(result_);
     for (const PairGeometry& pair : result_.pairs) {
-      if (pair.matches < 24 || pair.inlier_share() >= options_.low_inlier_share) continue;
+      if (pair.matches < 24) continue;
+      if (pair.inlier_share() >= options_.low_inlier_share) {
+        sound.push_back(&pair);
+        continue;
+      }
       // Fundamental matrices know no distortion: before a wide lens the rig explains what they do
       // not.
       const auto list = matches.find({pair.camera, pair.projector});
       const double by_rig =
           list == matches.end() ? 0 : fit.share(list->second, pair.camera, pair.projector);
       const double share = std::max(pair.inlier_share(), by_rig);
-      if (share >= options_.low_inlier_share) continue;
+      if (share >= options_.low_inlier_share)
+        sound.push_back(&pair);
+      else
+        low.push_back({&pair, share});
+    }
+    // A device that none of the others fits, while these fit each other, and that did not just move
+    // between captures: its place is what wrong codes make of it.
+    const auto is_of = [](const PairGeometry& pair, std::size_t d) {
+      return pair.camera == d || pair.projector == d;
+    };
+    for (std::size_t d = 0; d < result_.placed.size(); ++d) {
+      double most = 0;
+      std::size_t count = 0;
+      for (const LowPair& l : low) {
+        if (!is_of(*l.pair, d)) continue;
+        most = std::max(most, l.share);
+        ++count;
+      }
+      const bool fits_any =
+          std::any_of(sound.begin(), sound.end(), [&](const auto* p) { return is_of(*p, d); });
+      const auto& moved = contradictions.moves.clear;
+      const bool has_moved = std::any_of(moved.begin(), moved.end(),
+                                         [&](const CaptureMove& m) { return m.device == d; });
+      if (count < 2 || fits_any || has_moved || sound.empty()) continue;
+      senseless_.insert(d);
+      add(Grade::kUnusable,
+          "the codes of " + name(d) + " make no sense: with none of " + std::to_string(count) +
+              (d < input_.rig.cameras.size() ? " projectors" : " cameras") + " more than " +
+              share_text(most) + " of its correspondences fit a rigid scene",
+          "look at its images: bits may be in the wrong order, or it moved while it was captured");
+    }
+    if (contradictions.mover && senseless_.contains(*contradictions.mover))
+      contradictions.findings.pop_back();
+    add_all(contradictions.findings);
+    for (const LowPair& l : low) {
+      if (senseless_.contains(l.pair->camera) || senseless_.contains(l.pair->projector)) continue;
       add(Grade::kDoubtful,
-          "only " + share_text(share) + " of the correspondences of " + name(pair.projector) + "/" +
-              name(pair.camera) + " fit a rigid scene seen by one camera and one projector",
+          "only " + share_text(l.share) + " of the correspondences of " + name(l.pair->projector) +
+              "/" + name(l.pair->camera) +
+              " fit a rigid scene seen by one camera and one projector",
           "look at these images: something moved, or files are mixed up");
     }
   }
@@ -149,7 +200,7 @@ class Judge {
       for (const std::size_t i : {kFx, kCx, kCy})
         if (u.is_prior[i] && !is_given(result_, d))
           at_prior.push_back(name(d) + " " + kIntrinsicNames[i]);
-      judge_lens(d);
+      if (!senseless_.contains(d)) judge_lens(d);
       const Device& placed = device_at(result_.rig, d);
       const double scale = device.inner[kFx] / placed.width;
       if (scale < 0.3 || scale > 10)
@@ -241,7 +292,9 @@ class Judge {
   const Uncertainty& uncertainty_;
   const VerdictOptions& options_;
   FlatScene scene_;
-  double worst_focal_sigma_ = 0;  ///< over the focal length
+  std::set<std::size_t> explained_;  ///< devices of which nothing is left, as was told before
+  std::set<std::size_t> senseless_;  ///< devices whose correspondences fit no other's
+  double worst_focal_sigma_ = 0;     ///< over the focal length
   std::vector<Finding> findings_;
 };
 
@@ -270,9 +323,9 @@ Verdict judge(const CalibrationInput& input, const CalibrationResult& result,
               const Uncertainty& uncertainty, std::vector<Finding> found_before,
               const VerdictOptions& options) {
   Verdict verdict;
+  std::vector<Finding> found = Judge(input, result, uncertainty, options).findings(found_before);
   verdict.findings = std::move(found_before);
-  for (Finding& finding : Judge(input, result, uncertainty, options).findings())
-    verdict.findings.push_back(std::move(finding));
+  for (Finding& finding : found) verdict.findings.push_back(std::move(finding));
   std::stable_sort(verdict.findings.begin(), verdict.findings.end(),
                    [](const Finding& a, const Finding& b) { return a.grade > b.grade; });
   for (const Finding& finding : verdict.findings)

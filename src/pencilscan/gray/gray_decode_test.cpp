@@ -12,6 +12,7 @@
 #include "pencilscan/core/random.h"
 #include "pencilscan/gray/image_order.h"
 #include "pencilscan/gray/local_map.h"
+#include "pencilscan/gray/swapped_bits.h"
 #include "pencilscan/io/file.h"
 #include "pencilscan/io/image.h"
 #include "pencilscan/io/temporary_folder.h"
@@ -317,6 +318,62 @@ TEST(ImageOrder, WrongOrdersAreNamed) {
               testing::HasSubstr("one before"));
   EXPECT_THAT(explanation([&](std::size_t i) { return right(i < 2 ? 1 : i - 2); }),
               testing::HasSubstr("two before"));
+}
+
+/// A panel of 8 column bits and 7 row bits: pictures 2 to 17 and 18 to 31.
+class SwappedBits : public testing::TestWithParam<bool> {
+ protected:
+  /// With the bits in positions i and j of the sequence in each other's place.
+  [[nodiscard]] static std::string explanation(std::size_t i, std::size_t j, double noise) {
+    const bool inverses = GetParam();
+    const std::size_t step = inverses ? 2 : 1;
+    const GrayImageSource right = images_of({.noise = noise, .inverses = inverses});
+    const GrayStack stack =
+        make_gray_stack(kPanelWidth, kPanelHeight, inverses, [&](std::size_t image) {
+          if (image < 2) return right(image);
+          const std::size_t bit = (image - 2) / step;
+          return right(2 + (bit == i ? j : bit == j ? i : bit) * step + (image - 2) % step);
+        });
+    return explain_swapped_bits(stack, decode_gray_stack(stack));
+  }
+};
+
+TEST_P(SwappedBits, AreNamedByTheirPictures) {
+  const bool inverses = GetParam();
+  EXPECT_EQ(explanation(2, 3, 0.004), std::string("those of column bits 4 and 5 are exchanged ") +
+                                          (inverses ? "(006, 007 and 008, 009)" : "(004 and 005)"));
+  EXPECT_EQ(explanation(9, 11, 0.004),
+            std::string("those of row bits 3 and 5 are exchanged ") +
+                (inverses ? "(020, 021 and 024, 025)" : "(011 and 013)"));
+}
+
+TEST_P(SwappedBits, AreNotSeenInARightCapture) {
+  EXPECT_EQ(explanation(0, 0, 0.004), "");
+  EXPECT_EQ(explanation(0, 0, 0.03), "");
+}
+
+INSTANTIATE_TEST_SUITE_P(WithInverses, SwappedBits, testing::Bool());
+
+/// Rows that are read as columns vary smoothly, too. Read the other way round, right ones do not.
+TEST(ImageOrder, AnOrderMakesAsMuchSenseAsItIsRight) {
+  const std::string rows_first = "the row bits come before the column bits";
+  std::vector<cv::Mat> drawn;
+  for (std::size_t i = 0; i < 32; ++i) drawn.push_back(images_of({})(i));
+  const GrayImageSource right = [&](std::size_t i) { return drawn[i]; };
+  const GrayImageSource wrong = [&](std::size_t i) {
+    return right(i < 2 ? i : i < 16 ? i + 16 : i - 14);
+  };
+  const auto documented = [&](const GrayImageSource& images) {
+    return sensible_share(
+        decode_gray_stack(make_gray_stack(kPanelWidth, kPanelHeight, true, images)));
+  };
+  const auto in_order = [&](const GrayImageSource& images) {
+    return sensible_share_in_order(rows_first, kPanelWidth, kPanelHeight, true, images).value();
+  };
+  EXPECT_GE(in_order(wrong), documented(wrong));
+  EXPECT_LT(in_order(right), documented(right));
+  EXPECT_FALSE(
+      sensible_share_in_order("no such order", kPanelWidth, kPanelHeight, true, right).has_value());
 }
 
 /// Light on the white image alone makes all that is unlit look lit.

@@ -14,8 +14,6 @@ namespace {
 constexpr double kSenselessShare = 0.35;
 constexpr double kSensibleShare = 0.5;
 
-double sensible_share(const DecodedView& view) { return view.valid_share() * smooth_share(view); }
-
 /// Rows taken for columns are smooth, too, but most panels are no squares.
 bool leaves_panel(const DecodedView& view) {
   constexpr double kMuch = 0.03;  // of the lit pixels; of a right capture, next to none
@@ -84,7 +82,30 @@ constexpr std::array<WrongOrder, 8> kWrongOrders{{
      }},
 }};
 
+GrayStack stack_in_order(const WrongOrder& order, int panel_width, int panel_height, bool inverses,
+                         const GrayImageSource& image) {
+  const auto columns = static_cast<std::size_t>(gray_code_bits(panel_width));
+  const auto rows = static_cast<std::size_t>(gray_code_bits(panel_height));
+  const std::size_t step = inverses ? 2 : 1;
+  const std::size_t count = 2 + step * (columns + rows);
+  return make_gray_stack(panel_width, panel_height, inverses,
+                         [&](std::size_t i) { return image(order.file(i, count, columns, step)); });
+}
+
 }  // namespace
+
+double sensible_share(const DecodedView& view) { return view.valid_share() * smooth_share(view); }
+
+std::optional<double> sensible_share_in_order(const std::string& order, int panel_width,
+                                              int panel_height, bool inverses,
+                                              const GrayImageSource& image,
+                                              const GrayDecodeOptions& options) {
+  const auto found = std::find_if(kWrongOrders.begin(), kWrongOrders.end(),
+                                  [&](const WrongOrder& known) { return order == known.words; });
+  if (found == kWrongOrders.end()) return std::nullopt;
+  return sensible_share(decode_gray_stack(
+      stack_in_order(*found, panel_width, panel_height, inverses, image), options));
+}
 
 std::string explain_wrong_order(int panel_width, int panel_height, bool inverses,
                                 const GrayImageSource& image, const DecodedView& decoded,
@@ -92,16 +113,10 @@ std::string explain_wrong_order(int panel_width, int panel_height, bool inverses
   const double sensible = sensible_share(decoded);
   if (sensible > kSenselessShare && decoded.inverted_share < 0.5 && !leaves_panel(decoded))
     return {};
-  const auto columns = static_cast<std::size_t>(gray_code_bits(panel_width));
-  const auto rows = static_cast<std::size_t>(gray_code_bits(panel_height));
-  const std::size_t step = inverses ? 2 : 1;
-  const std::size_t count = 2 + step * (columns + rows);
   std::string explanation;
   double most = std::max(kSensibleShare, sensible);
   for (const WrongOrder& order : kWrongOrders) {
-    const GrayStack stack =
-        make_gray_stack(panel_width, panel_height, inverses,
-                        [&](std::size_t i) { return image(order.file(i, count, columns, step)); });
+    const GrayStack stack = stack_in_order(order, panel_width, panel_height, inverses, image);
     if (!white_is_brightest(stack)) continue;
     const DecodedView view = decode_gray_stack(stack, options);
     const double share = sensible_share(view);

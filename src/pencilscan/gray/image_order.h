@@ -2,6 +2,7 @@
 
 #include <functional>
 #include <opencv2/core.hpp>
+#include <optional>
 #include <string>
 
 #include "pencilscan/gray/gray_decode.h"
@@ -17,5 +18,15 @@ using GrayImageSource = std::function<cv::Mat(std::size_t)>;
                                               const GrayImageSource& image,
                                               const DecodedView& decoded,
                                               const GrayDecodeOptions& options = {});
+
+/// Lit pixels whose codes make sense: they vary smoothly. A share.
+[[nodiscard]] double sensible_share(const DecodedView& view);
+/// The same with the images in the wrong order that explain_wrong_order() has these words for;
+/// nothing where it has not.
+[[nodiscard]] std::optional<double> sensible_share_in_order(const std::string& order,
+                                                            int panel_width, int panel_height,
+                                                            bool inverses,
+                                                            const GrayImageSource& image,
+                                                            const GrayDecodeOptions& options = {});
 
 }  // namespace pencilscan
