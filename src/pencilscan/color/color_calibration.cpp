@@ -145,6 +145,7 @@ void ColorCollector::combine_gammas(ColorCalibration& result) const {
 }
 
 void ColorCollector::remark_on(ColorCalibration& result) const {
+  if (pairs_.empty()) return;  // no pair was decoded
   const auto say = [&](std::string remark) { result.remarks.push_back(std::move(remark)); };
   const bool in_color = std::any_of(pairs_.begin(), pairs_.end(),
                                     [](const auto& pair) { return pair.second.in_color; });

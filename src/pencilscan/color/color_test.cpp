@@ -286,6 +286,12 @@ TEST(ColorSamples, OffsetsOfChannelsAreThoseOfTheirImages) {
   }
 }
 
+/// Whether captures of which nothing was decoded are grey nobody knows.
+TEST(ColorCalibration, SaysNothingOfCapturesThatWereLeftOut) {
+  const Rig rig = sample::ring(1, 2);
+  EXPECT_TRUE(ColorCollector(rig).result().remarks.empty());
+}
+
 TEST(ColorCalibration, WritesWhatWasFoundAndFillsPairsWithoutSolids) {
   Rig rig = sample::ring(1, 2);
   ColorCalibration color;
