@@ -85,6 +85,26 @@ TEST_F(SurfaceCheckTest, LabelsThatTheSurfaceContradictsGoAndTheOthersStay) {
   EXPECT_EQ(undecided_points(labeling_.undecided[0], labeling_.runs[0])[2], points_of_wrong);
 }
 
+TEST_F(SurfaceCheckTest, APixelHasOnePointOfALineThoughOneLiesAtItsEdge) {
+  Curve beside = graph_.curves.front();
+  for (std::size_t i = 0; i < beside.points.size(); ++i) {
+    float& row = graph_.curves.front().points[i].position.y();
+    row = std::round(row);
+    beside.points[i].position = {graph_.curves.front().points[i].position.x(),
+                                 std::nextafter(row + 0.5F, 0.F)};
+    beside.points[i].sigma_px *= 2;
+  }
+  LabeledRun run = labeling_.runs[0].front();
+  labeling_.runs[0] = {run};
+  const std::vector<MeasuredPoint> alone = points();
+  run.curve = static_cast<int>(graph_.curves.size());
+  graph_.curves.push_back(beside);
+  labeling_.runs[0].push_back(run);
+  const std::vector<MeasuredPoint> both = points();
+  ASSERT_EQ(both.size(), alone.size());
+  for (std::size_t i = 0; i < both.size(); ++i) EXPECT_EQ(both[i].v, alone[i].v);
+}
+
 TEST_F(SurfaceCheckTest, WhatWasNotMeasuredContradictsNothing) {
   name_wrongly(graph_.curves.size() / 3);
   mesh_.confidence.assign(mesh_.vertices.size(), 0.F);

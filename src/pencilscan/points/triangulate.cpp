@@ -94,8 +94,7 @@ class OnePerPixel {
   /// `points` from `first` on are of one line.
   void operator()(std::size_t first, std::vector<MeasuredPoint>& points) {
     const auto bits = [](float pixel) {
-      constexpr float kMargin = 1024;  // curves may leave the image a little
-      return static_cast<std::uint32_t>(std::clamp(pixel + kMargin + 0.5F, 0.F, 65535.F));
+      return std::min<std::uint32_t>(pixel_number(pixel), 0xFFFF);
     };
     line_.assign(points.begin() + static_cast<std::ptrdiff_t>(first), points.end());
     places_.clear();
