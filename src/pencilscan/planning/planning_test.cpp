@@ -185,6 +185,31 @@ TEST(RigCheck, MirrorSymmetricDiagonalLinesHaveCoplanarAxes) {
   EXPECT_LT(check.coverage.skew_grid, 0.5 * check.coverage.grid);
 }
 
+TEST(RigCheck, TheGridOfOneProjectorNeedsNoSecondOneWhereItsLinesHaveACode) {
+  RingOptions options;
+  options.cameras = 1;
+  options.projectors = 1;
+  options.arc_rad = 60 * kDegree;
+  Rig rig = make_ring(options);
+  std::vector<LinePattern>& patterns = rig.projectors[0].patterns;
+  patterns.push_back(patterns.front());
+  patterns.back().axis = Axis::kRow;
+  patterns.back().colors = {PatternColor("red"), PatternColor("yellow")};
+  const auto said = [&] {
+    const RigCheck check = check_rig(rig);
+    const auto at = std::find_if(check.warnings.begin(), check.warnings.end(),
+                                 [](const RigWarning& w) { return w.kind == "coplanar_axes"; });
+    return at == check.warnings.end() ? std::string() : at->text;
+  };
+  EXPECT_THAT(said(), testing::HasSubstr("the code of their colours tells lines apart"));
+  for (LinePattern& pattern : patterns) {
+    pattern.alphabet = 1;
+    pattern.sequence = {0};
+    pattern.colors.resize(1);
+  }
+  EXPECT_THAT(said(), testing::HasSubstr("no code tells their lines apart"));
+}
+
 TEST(RigCheck, SensitivityIsTheSineOfTheTriangulationAngleForLinesAcrossTheBaseline) {
   RingOptions options = one_height();
   options.cameras = 1;

@@ -182,6 +182,11 @@ class Collector {
              "; mix directions of lines, and let neighbouring projectors overlap");
   }
 
+  /// The colours tell lines apart at all.
+  [[nodiscard]] bool has_code(const LineFamily& family) const {
+    return pattern(family).period() > 1;
+  }
+
   /// Coplanar axes among the pairs that make up the grid, and what is left without them.
   void check_axes() {
     const double grid = of_lit(check_.coverage.grid);
@@ -195,10 +200,14 @@ class Collector {
       // all that there is, or where colours differ.
       if (axes.same_color && !severe) continue;
       if (axes.first.projector == axes.second.projector) {
-        warn(severe, "coplanar_axes",
-             name(axes.first) + " and " + name(axes.second) +
-                 " come from one projector: their crossings say nothing about depth; a second "
-                 "projector or the single-projector method is needed");
+        const bool coded = has_code(axes.first) && has_code(axes.second);
+        warn(
+            severe, "coplanar_axes",
+            name(axes.first) + " and " + name(axes.second) +
+                " come from one projector: their crossings say nothing about depth; " +
+                (coded ? "the code of their colours tells lines apart (method joint), and a second "
+                         "projector would add crossings that do"
+                       : "no code tells their lines apart: give them one, or add a projector"));
         continue;
       }
       warn(severe, "coplanar_axes",
