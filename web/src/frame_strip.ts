@@ -1,5 +1,6 @@
 // Thumbnails of all frames in a row; only those in sight are there.
 import type {App} from './app';
+import {isWrong} from './fault';
 import {figureText} from './figure_text';
 import {h} from './dom';
 
@@ -12,14 +13,16 @@ export class FrameStrip {
     const {results} = app.source.index;
     const sequence = new Set(results.map((r) => r.name)).size > 1;
     const partial = results.some((r) => r.detail === 'shape');
+    const isOpenedLater = partial && results[0]?.detail === 'shape' && results.some((r) => r.detail !== 'shape');
     const best = results.reduce((most, r) => Math.max(most, r.summary.points ?? 0), 1);
     this.items = results.map((r, i) => {
       const {points, measured_share: share, warnings} = r.summary;
+      const isFaulty = r.missing.some(({kind}) => isWrong(kind));
       const about = [share === undefined ? '' : `${figureText('measured_share', share)} measured`,
         points === undefined ? '' : `${figureText('points', points)} points`,
         warnings ? `${warnings} warnings` : '',
         partial ? (r.detail === 'full' ? 'with images and points' : 'shape only') : '',
-        r.missing.length ? 'parts are missing' : ''].filter(Boolean).join(', ');
+        isFaulty ? 'parts are unreadable or in doubt' : r.missing.length ? 'parts are absent' : ''].filter(Boolean).join(', ');
       const title = [r.run, r.name].filter(Boolean).join(' / ');
       return h('button', {type: 'button', class: 'frame', title: `${title}: ${about}`,
         'aria-label': `${title}: ${about}`, onclick: () => app.show(i)},
@@ -27,10 +30,10 @@ export class FrameStrip {
       h('span', {class: 'quality', 'aria-hidden': 'true'},
         h('i', {style: `width:${100 * (share ?? (points ?? 0) / best)}%`})),
       h('span', {class: 'name'}, partial && r.detail === 'full' ? h('i', {class: 'whole'}) : null, sequence ? (r.run ? `${r.run} ${r.name}` : r.name) : r.run || r.name,
-        warnings || r.missing.length ? h('b', {class: 'alert', 'aria-hidden': 'true'}, '!') : null));
+        warnings || isFaulty ? h('b', {class: 'alert', 'aria-hidden': 'true'}, '!') : null));
     });
     this.element = h('div', {class: 'frames', role: 'group', 'aria-label': sequence ? 'Frames' : 'Runs'}, ...this.items);
-    this.note = partial ? h('span', {class: 'tool-label'}, h('i', {class: 'whole'}), 'with images and points') : null;
+    this.note = partial ? h('span', {class: 'tool-label'}, h('i', {class: 'whole'}), `with images and points${isOpenedLater ? '; the page opened at the first of them' : ''}`) : null;
     this.lazyThumbs();
   }
 
