@@ -17,10 +17,49 @@ PathLike = Union[str, "os.PathLike[str]"]
 
 def path_of(path: PathLike) -> bytes:
     """A path as the system takes it: its text need not be UTF-8."""
+    if not isinstance(path, (str, bytes, os.PathLike)):
+        raise InputError("path", "", f"{path!r}"[:80], "must be a path")
     name = os.fsencode(path)
     if b"\0" in name:
         raise InputError(os.fsdecode(name), "", "", "must be a path: without a zero byte")
     return name
+
+
+def rig_text(rig: dict) -> str:
+    """A dictionary with the keys of rig.json as text; NumPy's arrays and numbers become lists and numbers."""
+
+    def plain(value: Any, field: str) -> Any:
+        if isinstance(value, (np.ndarray, np.generic)):
+            value = value.tolist()
+        if isinstance(value, dict):
+            return {key: plain(v, f"{field}.{key}" if field else str(key)) for key, v in value.items()}
+        if isinstance(value, (list, tuple)):
+            return [plain(v, f"{field}[{i}]") for i, v in enumerate(value)]
+        if isinstance(value, float) and not math.isfinite(value):
+            raise InputError("rig", field, str(value), "must be finite")
+        if not isinstance(value, (str, int, float, type(None))):
+            raise InputError("rig", field, f"{value!r}"[:80], "must be what rig.json can hold")
+        return value
+
+    return json.dumps(plain(rig, ""))
+
+
+def check_whole(file: str, name: str, value: Any, first: int, last: int) -> None:
+    """InputError unless `value` is a whole number from `first` to `last`."""
+    if not isinstance(value, (int, np.integer)) or not first <= value <= last:
+        raise InputError(file, name, str(value), f"must be a whole number from {first} to {last}")
+
+
+def check_name(name: str, value: Any) -> None:
+    """InputError unless an option is a text."""
+    if not isinstance(value, str):
+        raise InputError("options", name, f"{value!r}"[:80], "must be a name in quotes")
+
+
+def finished(progress: Any) -> None:
+    """Tells `progress` that everything is done; its answer can end nothing any more."""
+    if progress is not None:
+        progress("done", 1.0)
 
 
 class Rig:
@@ -30,9 +69,12 @@ class Rig:
     """
 
     def __init__(self, rig: Union[dict, str, PathLike]) -> None:
-        """From a dictionary with the keys of rig.json, or the path of such a file."""
+        """From a dictionary with the keys of rig.json, or the path of such a file.
+
+        Matrices and vectors may be NumPy arrays.
+        """
         if isinstance(rig, dict):
-            self._core = _core.Rig(json.dumps(rig), "rig")
+            self._core = _core.Rig(rig_text(rig), "rig")
         else:
             self._core = _core.read_rig(path_of(rig))
 
@@ -114,8 +156,16 @@ def as_pictures(rig: Rig, images: Any, argument: str = "images") -> _core.Pictur
                 "must have none: no pixel can be left out; image.filled(0) makes them black",
             )
     return _core.Pictures(
-        {name: image for name, image in images.items() if image is not None}, argument
+        {name: _in_own_byte_order(image) for name, image in images.items() if image is not None},
+        argument,
     )
+
+
+def _in_own_byte_order(image: Any) -> Any:
+    """TIFF and PNG readers give numbers in the order of the file."""
+    if isinstance(image, np.ndarray) and not image.dtype.isnative:
+        return image.astype(image.dtype.newbyteorder("="))
+    return image
 
 
 def read_rig(path: PathLike) -> Rig:
@@ -174,8 +224,8 @@ def ring(
         if not holds:
             raise InputError("ring", field, str(value), rule)
 
-    require(1 <= cameras <= 256, "cameras", cameras, "must be 1 to 256")
-    require(1 <= projectors <= 256, "projectors", projectors, "must be 1 to 256")
+    check_whole("ring", "cameras", cameras, 1, 256)
+    check_whole("ring", "projectors", projectors, 1, 256)
     require(volume_radius_mm > 0, "volume_radius_mm", volume_radius_mm, "must be > 0")
     require(distance_mm > volume_radius_mm, "distance_mm", distance_mm,
             "must be larger than volume_radius_mm")
@@ -186,8 +236,8 @@ def ring(
     require(len(colors) > 0 and all(not isinstance(of_one, str) and len(of_one) > 0 for of_one in colors),
             "colors", colors, "must be one or more lists of at least one colour")
     longest = max(len(entry) for entry in colors)
-    require(1 <= order <= 20 and longest**order <= 2**20, "order", order,
-            "must be 1 to 20, and colours^order <= 2^20")
+    require(isinstance(order, (int, np.integer)) and 1 <= order <= 20 and longest**order <= 2**20,
+            "order", order, "must be a whole number, 1 to 20, and colours^order <= 2^20")
     options = _core.RingOptions()
     options.cameras = cameras
     options.projectors = projectors

@@ -11,7 +11,9 @@ import numpy as np
 
 from . import _core
 from ._errors import InputError, StageError
-from ._rig import PathLike, Rig, as_pictures, as_rig, path_of
+from ._rig import (
+    PathLike, Rig, as_pictures, as_rig, check_name, check_whole, finished, path_of, rig_text,
+)
 
 Progress = Callable[[str, float], Optional[bool]]
 MeshLike = Union["Mesh", PathLike, tuple, Any]
@@ -117,8 +119,11 @@ def _whole(faces: Any) -> np.ndarray:
 
 def _check_range(name: str, value: int, last: int) -> None:
     """InputError unless 0 <= value <= last, before the library says it in terms of its own."""
-    if not isinstance(value, (int, np.integer)) or not 0 <= value <= last:
-        raise InputError("options", name, str(value), f"must be a whole number from 0 to {last}")
+    check_whole("options", name, value, 0, last)
+
+
+def _check_threads(threads: int) -> None:
+    _check_range("threads", threads, 2**31 - 1)
 
 
 def read_mesh(path: PathLike) -> Mesh:
@@ -186,6 +191,16 @@ class _Table:
         return f"<pencilscan.{type(self).__name__}: {len(self)} of {', '.join(self.names)}>"
 
 
+def _typed_as_files(arrays: dict, *names: str) -> dict:
+    """`names` as int32, which the files have: views of uint32, copies (to read) of uint16."""
+    typed = dict(arrays)
+    for name in names:
+        array = typed[name]
+        typed[name] = array.view(np.int32) if array.itemsize == 4 else array.astype(np.int32)
+        typed[name].setflags(write=False)
+    return typed
+
+
 class Points(_Table):
     """Measured curve pixels: one array per property of points.ply, views of one memory.
 
@@ -197,7 +212,7 @@ class Points(_Table):
         Camera pixel; also as u, v.
     camera, projector, pattern : (n,) uint8
         Places in `rig.cameras`, `rig.projectors`, and in the projector's patterns.
-    line : (n,) uint16
+    line : (n,) int32
         Which line of the pattern.
     sigma : (n,) float32
         mm, one standard deviation along the camera ray.
@@ -235,6 +250,9 @@ class Points(_Table):
     green: np.ndarray
     blue: np.ndarray
 
+    def __init__(self, arrays: dict) -> None:
+        super().__init__(_typed_as_files(arrays, "line"))
+
 
 class Curves(_Table):
     """Points of all detected curves, one array per property of curves.ply.
@@ -245,14 +263,14 @@ class Curves(_Table):
         Camera pixel, sub-pixel; also as u, v.
     sigma_px, amplitude : (n,) float32
         One standard deviation across the curve, px; height of the line above its surroundings.
-    camera, curve : (n,) uint8, uint32
+    camera, curve : (n,) uint8, int32
         Which camera; which curve of it. Points of a curve follow each other.
     family, color, color_lead : (n,) uint8, uint8, float32
         Set of colours, likeliest colour in it, log-likelihood by which it leads.
     state : (n,) uint8
         0 labelled, 1 nothing crosses it, 2 ambiguous, 3 contradicted, 4 outside the volume,
         5 undecided.
-    projector, pattern, line, confidence
+    projector, pattern, line, confidence : (n,) uint8, uint8, int32, float32
         The label where state is 0.
     """
 
@@ -272,9 +290,12 @@ class Curves(_Table):
     line: np.ndarray
     confidence: np.ndarray
 
+    def __init__(self, arrays: dict) -> None:
+        super().__init__(_typed_as_files(arrays, "curve", "line"))
+
 
 class Crossings(_Table):
-    """Where two curves of a camera cross: uv (n, 2) float32, camera, curve_a, curve_b."""
+    """Where two curves of a camera cross: uv (n, 2) float32, camera uint8, curve_a, curve_b int32."""
 
     uv: np.ndarray
     u: np.ndarray
@@ -282,6 +303,9 @@ class Crossings(_Table):
     camera: np.ndarray
     curve_a: np.ndarray
     curve_b: np.ndarray
+
+    def __init__(self, arrays: dict) -> None:
+        super().__init__(_typed_as_files(arrays, "curve_a", "curve_b"))
 
 
 class CameraDepth(NamedTuple):
@@ -332,6 +356,8 @@ class Result:
     def write(self, folder: PathLike) -> None:
         """points.ply, curves.ply, report.json, mesh.ply and mesh_measured.ply, as the program.
 
+        report.json lacks `picture` of the cameras: there are no files whose hash it would be.
+
         Without a mesh, those of an earlier result in the folder are removed.
         """
         self._core.write(path_of(folder))
@@ -374,7 +400,7 @@ def reconstruct(
         False: points and curves alone, much faster.
     progress
         Called as progress(stage, done) with the stage at work and the share of stages that are
-        done, in the caller's thread. False ends the call with Cancelled. Ctrl-C works without it.
+        done, in the caller's thread; last as progress("done", 1.0). False ends the call with Cancelled. Ctrl-C works without it.
     depth
         Dense depth between the curves (joint only); else the surface rests on the curves.
     depth_maps
@@ -399,10 +425,12 @@ def reconstruct(
 
     Other Python threads run meanwhile.
     """
+    _check_threads(threads)
+    check_name("frame", frame)
     if callable(method):
-        from ._stages import detect, measure
+        from ._stages import detect_curves, measure
 
-        detection = detect(
+        detection = detect_curves(
             rig, images, identities=True, plain=plain, frame=frame, threads=threads,
             progress=progress,
         )
@@ -410,13 +438,17 @@ def reconstruct(
             detection, method(detection), mesh, progress, depth=depth, depth_maps=depth_maps,
             threads=threads,
         )
+    check_name("method", method)
+    check_name("multiview_cost", multiview_cost)
     rig = as_rig(rig)
-    return Result(
+    result = Result(
         _core.reconstruct(
             rig._core, as_pictures(rig, images), as_pictures(rig, plain, "plain"),
             method, multiview_cost, mesh, depth, depth_maps, frame, threads, progress,
         )
     )
+    finished(progress)
+    return result
 
 
 class SimulatedFrame(dict):
@@ -486,6 +518,7 @@ def simulate(
     )
     simulated = SimulatedFrame(images)
     simulated.truth = Mesh._of(truth, scene._core.unit_known)
+    finished(progress)
     return simulated
 
 
@@ -524,6 +557,7 @@ def evaluate(
     text = _core.judge(
         _as_mesh(truth)._core, as_rig(rig)._core, core, points, measured, align, seed, progress
     )
+    finished(progress)
     return json.loads(text)
 
 
@@ -632,7 +666,7 @@ def calibrate(
     if isinstance(devices, Rig):
         text = devices._core.text()
     elif isinstance(devices, dict):
-        text = json.dumps(devices)
+        text = rig_text(devices)
     else:
         path = path_of(devices)
     try:
@@ -650,4 +684,5 @@ def calibrate(
         error = StageError("unusable: " + "; ".join(reasons))
         error.report = json.loads(report)  # type: ignore[attr-defined]
         raise error
+    finished(progress)
     return CalibratedRig._with(core, verdict, reasons, json.loads(figures), json.loads(report))

@@ -8,8 +8,8 @@ import numpy as np
 
 from . import _core
 from ._errors import InputError
-from ._rig import PathLike, Rig, as_pictures, as_rig
-from ._scan import Crossings, Curves, Progress, Result, _Table
+from ._rig import PathLike, Rig, as_pictures, as_rig, check_name, finished
+from ._scan import Crossings, Curves, Progress, Result, _check_threads, _Table, _typed_as_files
 
 
 class GridCurves(_Table):
@@ -17,7 +17,7 @@ class GridCurves(_Table):
 
     Attributes
     ----------
-    camera, curve : (n,) uint8, uint32
+    camera, curve : (n,) uint8, int32
         Which camera; which curve of it.
     component : (n,) int32
         Connected component of the camera's grid graph; -1 where nothing crosses the curve.
@@ -36,6 +36,9 @@ class GridCurves(_Table):
     pattern: np.ndarray
     local_id: np.ndarray
     id_probability: np.ndarray
+
+    def __init__(self, arrays: dict) -> None:
+        super().__init__(_typed_as_files(arrays, "curve"))
 
 
 class Detection:
@@ -161,6 +164,22 @@ def detect(
     identities
         Decide projector, pattern and local ID of each curve in any case.
     """
+    detection = detect_curves(
+        rig, images, method, identities=identities, plain=plain, frame=frame, threads=threads,
+        progress=progress,
+    )
+    finished(progress)
+    return detection
+
+
+def detect_curves(
+    rig: Any, images: Any, method: str = "joint", *, identities: bool, plain: Any, frame: str,
+    threads: int, progress: Optional[Progress],
+) -> Detection:
+    """`detect` as a part of more: its end is not the end."""
+    _check_threads(threads)
+    check_name("method", method)
+    check_name("frame", frame)
     rig = as_rig(rig)
     return Detection(
         _core.detect(
@@ -185,9 +204,14 @@ def label(
     InputError
         The method needs identities, and the curves were detected without.
     """
-    return Labels._of(
+    _check_threads(threads)
+    check_name("method", method)
+    check_name("multiview_cost", multiview_cost)
+    labels = Labels._of(
         _core.label(detection._core, method, multiview_cost, threads, progress)
     )
+    finished(progress)
+    return labels
 
 
 def measure(
@@ -222,9 +246,12 @@ def measure(
     """
     if not isinstance(labels, Labels):
         raise InputError("labels", "", type(labels).__name__, "must be pencilscan.Labels")
-    return Result(
+    _check_threads(threads)
+    result = Result(
         _core.measure(
             detection._core, labels._core, "joint" if guided else "multiview", mesh, depth,
             depth_maps, threads, progress,
         )
     )
+    finished(progress)
+    return result

@@ -107,6 +107,13 @@ class PackageTest(unittest.TestCase):
         self.assertEqual(points.xyz.dtype, np.float32)
         self.assertEqual(points.xyz.shape, (len(stored), 3))
 
+    def test_whole_numbers_have_the_types_of_the_files(self) -> None:
+        result = self.scene.result
+        for array in (result.points.line, result.curves.line, result.curves.curve,
+                      result.crossings.curve_a, result.crossings.curve_b):
+            self.assertEqual(array.dtype, np.int32)
+            self.assertFalse(array.flags.writeable)
+
     def test_the_figures_are_the_programs(self) -> None:
         folder = self.scene.folder
         run("evaluate", "--truth", folder / "ball.ply", "--rig", folder / "rig.json", "--result",
@@ -306,7 +313,8 @@ class PackageTest(unittest.TestCase):
     def test_progress_comes_in_order_in_the_callers_thread(self) -> None:
         done = [entry[1] for entry in self.scene.stages]
         self.assertEqual(done, sorted(done))
-        self.assertLess(done[-1], 1)
+        self.assertEqual(self.scene.stages[-1][:2], ("done", 1.0))
+        self.assertLess(done[-2], 1)
         self.assertIn("surface", {entry[0] for entry in self.scene.stages})
         self.assertEqual({entry[2] for entry in self.scene.stages}, {threading.get_ident()})
 
@@ -389,6 +397,34 @@ class PackageTest(unittest.TestCase):
         self.assertIn("> 0", error.rule)
         self.assertIsInstance(error, ValueError)
         self.assertEqual(self.complaint(lambda: ps.Rig(contents)).field, "cameras[1].K[0][0]")
+
+    def test_arguments_of_a_wrong_type_are_named(self) -> None:
+        rig, frame = self.scene.rig, self.scene.frame
+        for options in ({"method": None}, {"threads": 2.5}, {"threads": -1},
+                        {"multiview_cost": 3}, {"frame": 1}):
+            error = self.complaint(lambda: ps.reconstruct(rig, frame, **options))
+            self.assertEqual((error.file, error.field), ("options", *options))
+        for options in ({"cameras": 2.5}, {"projectors": "2"}, {"order": 1.5}):
+            error = self.complaint(lambda: ps.ring(**options))
+            self.assertEqual((error.file, error.field), ("ring", *options))
+        self.assertEqual(self.complaint(lambda: ps.Rig([1])).value, "[1]")
+
+    def test_a_rig_may_hold_arrays(self) -> None:
+        contents = self.scene.rig.to_dict()
+        for device in contents["cameras"]:
+            device["width"] = np.int64(device["width"])
+            for key in ("K", "R", "t"):
+                device[key] = np.array(device[key])
+        self.assertEqual(ps.Rig(contents), self.scene.rig)
+        contents["cameras"][1]["t"][2] = np.nan
+        error = self.complaint(lambda: ps.Rig(contents))
+        self.assertEqual((error.field, error.rule), ("cameras[1].t[2]", "must be finite"))
+
+    def test_pictures_of_another_byte_order_are_read(self) -> None:
+        wide = {name: image.astype(np.uint16) * 257 for name, image in self.scene.frame.items()}
+        swapped = {name: image.astype(">u2") for name, image in wide.items()}
+        for name, view in _core.Pictures(wide).views().items():
+            self.assertTrue((ps._rig.as_pictures(self.scene.rig, swapped).views()[name] == view).all())
 
     def test_complaints_can_be_sent_to_another_process(self) -> None:
         # A worker of a multiprocessing.Pool whose error cannot be read lets its caller wait forever.
