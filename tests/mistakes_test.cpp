@@ -442,6 +442,10 @@ TEST_F(Newcomer, MayJudgeAScanAndIsToldOfAWrongTruth) {
     EXPECT_THAT(judged.output, Not(HasSubstr("label_error")));
     EXPECT_THAT(judged.error, Not(HasSubstr("warning")));
   }
+  // The folder of a run instead of that of a frame.
+  write("run/000000/points.ply", "");
+  EXPECT_THAT(run("evaluate --result run --rig r.json --truth s/truth/mesh.ply").error,
+              HasSubstr("give the folder of a frame, as run/000000"));
   write("small.obj",
         "v -0.6 -0.6 -0.5\nv 0.6 -0.6 -0.5\nv 0 0.7 -0.5\nv 0 0 0.8\n"
         "f 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n");

@@ -50,6 +50,16 @@ struct Result {
   fs::path points_path;
 };
 
+/// Of the output folder of a run: which of its folders is meant; else empty.
+std::string frame_hint(const fs::path& run) {
+  std::string first;
+  for (const auto& entry : fs::directory_iterator(run)) {
+    const std::string name = entry.path().filename().string();
+    if (fs::exists(entry.path() / "points.ply") && (first.empty() || name < first)) first = name;
+  }
+  return first.empty() ? "" : ": give the folder of a frame, as " + (run / first).string();
+}
+
 Result read_result(const fs::path& path) {
   Result result;
   if (!fs::exists(path)) throw InputError(path.string(), "", "", "no such file or folder");
@@ -65,7 +75,8 @@ Result read_result(const fs::path& path) {
   const fs::path points = path / "points.ply";
   const fs::path mesh = path / "mesh_measured.ply";
   if (!fs::exists(points) && !fs::exists(mesh)) {
-    throw InputError(path.string(), "", "", "must hold points.ply or mesh_measured.ply");
+    throw InputError(path.string(), "", "",
+                     "must hold points.ply or mesh_measured.ply" + frame_hint(path));
   }
   for (const fs::path& file : {points, mesh}) {
     if (!fs::exists(file)) {

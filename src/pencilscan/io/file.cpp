@@ -216,6 +216,11 @@ struct DuplicateKeyFinder {
   std::string duplicate;
   bool too_deep = false;
 
+  /// That of the value at work.
+  [[nodiscard]] std::string last_key() const {
+    return open.empty() || open.back().empty() ? std::string() : open.back().back();
+  }
+
   bool operator()(int depth, nlohmann::json::parse_event_t event, nlohmann::json& parsed) {
     using Event = nlohmann::json::parse_event_t;
     if (depth > kDeepestLevel) {
@@ -249,6 +254,8 @@ nlohmann::json parse_json(const std::string& text, const std::string& name) {
     if (!finder.duplicate.empty())
       throw InputError(name, finder.duplicate, "", "this key must not stand twice");
     return value;
+  } catch (const nlohmann::json::out_of_range& error) {  // a number that no double holds, as 1e999
+    throw InputError(name, finder.last_key(), "", "must be finite: " + without_tag(error.what()));
   } catch (const nlohmann::json::exception& error) {
     throw InputError(name, "", "",
                      "must be JSON (which has no NaN or Infinity): " + without_tag(error.what()));

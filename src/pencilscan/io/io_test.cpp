@@ -225,6 +225,8 @@ TEST_F(Io, JsonErrorsNameTheFileAndThePlace) {
   EXPECT_THAT(message, ::testing::HasSubstr("line 1"));
   EXPECT_THAT(error_of([&] { return read_json(put("b.json", "{\"k\": 1, \"k\": 2}")); }),
               ::testing::HasSubstr("k: this key must not stand twice"));
+  EXPECT_THAT(error_of([&] { return read_json(put("c.json", "{\"a\": 1, \"t\": [0, 1e999]}")); }),
+              ::testing::HasSubstr("t: must be finite"));
   EXPECT_THAT(error_of([&] { return read_json(folder_ / "none.json"); }),
               ::testing::HasSubstr("does not exist"));
   EXPECT_THAT(error_of([&] { return read_json(put("c.json", "")); }),
