@@ -126,14 +126,15 @@ def reconstruct(
 ) -> Reconstruction: ...
 def simulate(
     rig: Rig, mesh: Mesh, noise: str, seed: int, fit: bool, up: str, bits: int, albedo: float,
-    smooth: bool, frame: int, rotate_rad: float, translate_mm: Sequence[float], progress: Progress,
+    smooth: bool, frame: int, rotate_rad: float, translate_mm: Sequence[float], threads: int,
+    progress: Progress,
 ) -> tuple[dict[str, NDArray[Any]], Mesh]: ...
 def judge(
     truth: Mesh, rig: Rig, result: Optional[Reconstruction], points_path: bytes,
-    measured: Optional[Mesh], align: str, seed: int, progress: Progress,
+    measured: Optional[Mesh], align: str, seed: int, threads: int, progress: Progress,
 ) -> str: ...
 def calibrate(
     devices_path: Optional[bytes], devices_text: str, captures: list[bytes],
     known: Optional[tuple[str, str, float]], board: str, max_tracks: int, seed: int,
-    progress: Progress,
+    threads: int, progress: Progress,
 ) -> tuple[Rig, str, list[str], str, str]: ...

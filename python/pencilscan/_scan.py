@@ -259,6 +259,9 @@ class Curves(_Table):
 
     Attributes
     ----------
+    xyz, rgb : (n, 3) float32, uint8
+        For viewers: the camera's picture before the object, world, mm, and the colour of the labelled
+        line; also as x, y, z, red, green, blue.
     uv : (n, 2) float32
         Camera pixel, sub-pixel; also as u, v.
     sigma_px, amplitude : (n,) float32
@@ -274,6 +277,10 @@ class Curves(_Table):
         The label where state is 0.
     """
 
+    xyz: np.ndarray
+    x: np.ndarray
+    y: np.ndarray
+    z: np.ndarray
     uv: np.ndarray
     u: np.ndarray
     v: np.ndarray
@@ -289,6 +296,10 @@ class Curves(_Table):
     pattern: np.ndarray
     line: np.ndarray
     confidence: np.ndarray
+    rgb: np.ndarray
+    red: np.ndarray
+    green: np.ndarray
+    blue: np.ndarray
 
     def __init__(self, arrays: dict) -> None:
         super().__init__(_typed_as_files(arrays, "curve", "line"))
@@ -479,6 +490,7 @@ def simulate(
     frame: int = 0,
     rotate_deg: float = 0,
     translate_mm: Sequence[float] = (0, 0, 0),
+    threads: int = 0,
     progress: Optional[Progress] = None,
 ) -> SimulatedFrame:
     """What the cameras of a rig would see of a mesh: the pictures of `pencilscan simulate`.
@@ -503,9 +515,10 @@ def simulate(
         Interpolated normals; False: one normal per face (cubes).
     frame, rotate_deg, translate_mm
         Of a moving object: the frame's number, its turn about the vertical and its shift per frame.
-    progress
+    threads, progress
         As in `reconstruct`.
     """
+    _check_threads(threads)
     _check_range("seed", seed, 2**64 - 1)
     _check_range("frame", frame, 2**31 - 1)
     shift = tuple(float(x) for x in translate_mm)
@@ -514,7 +527,7 @@ def simulate(
     scene = as_rig(rig)
     images, truth = _core.simulate(
         scene._core, _as_mesh(mesh)._core, noise, seed, fit, up, bits, albedo, smooth, frame,
-        rotate_deg * np.pi / 180, shift, progress,
+        rotate_deg * np.pi / 180, shift, threads, progress,
     )
     simulated = SimulatedFrame(images)
     simulated.truth = Mesh._of(truth, scene._core.unit_known)
@@ -529,6 +542,7 @@ def evaluate(
     align: str = "none",
     *,
     seed: int = 1,
+    threads: int = 0,
     progress: Optional[Progress] = None,
 ) -> dict:
     """Measures a result against the truth: the figures of `pencilscan evaluate --json`.
@@ -545,7 +559,10 @@ def evaluate(
         Move the result onto the truth first: none, rigid, similarity.
     seed
         Of the surface samples.
+    threads, progress
+        As in `reconstruct`.
     """
+    _check_threads(threads)
     core, points, measured = None, b"", None
     if isinstance(result, Result):
         core = result._core
@@ -555,7 +572,8 @@ def evaluate(
         points, measured = _result_files(path_of(result))
     _check_range("seed", seed, 2**64 - 1)
     text = _core.judge(
-        _as_mesh(truth)._core, as_rig(rig)._core, core, points, measured, align, seed, progress
+        _as_mesh(truth)._core, as_rig(rig)._core, core, points, measured, align, seed, threads,
+        progress,
     )
     finished(progress)
     return json.loads(text)
@@ -633,6 +651,7 @@ def calibrate(
     board: str = "",
     max_tracks: int = 0,
     seed: int = 1,
+    threads: int = 0,
     progress: Optional[Progress] = None,
 ) -> CalibratedRig:
     """The rig from Gray-code captures, as `pencilscan calibrate`.
@@ -652,12 +671,15 @@ def calibrate(
         Surface points to use at most; 0: the program's default.
     seed
         Of everything random.
+    threads, progress
+        As in `reconstruct`.
 
     Raises
     ------
     StageError
         The captures determine no usable rig; the report is its attribute `report`.
     """
+    _check_threads(threads)
     _check_range("max_tracks", max_tracks, 2**63 - 1)
     _check_range("seed", seed, 2**64 - 1)
     if isinstance(captures, (str, bytes, os.PathLike)):
@@ -672,7 +694,7 @@ def calibrate(
     try:
         core, verdict, reasons, figures, report = _core.calibrate(
             path, text, [path_of(folder) for folder in captures], known_distance, board,
-            max_tracks, seed, progress,
+            max_tracks, seed, threads, progress,
         )
     except InputError as error:
         file = "options" if error.file == "command line" else _argument_names(error.file)

@@ -92,6 +92,15 @@ py::dict point_arrays(const ResultPtr& result) {
 py::dict curve_arrays(const CurveFile& curves, const py::object& owner) {
   using C = CurveSample;
   Fields<C> fields(curves.samples, owner);
+  static_assert(offsetof(C, y) == offsetof(C, x) + sizeof(float) &&
+                offsetof(C, z) == offsetof(C, y) + sizeof(float) &&
+                offsetof(C, v) == offsetof(C, u) + sizeof(float) &&
+                offsetof(C, green) == offsetof(C, red) + 1 &&
+                offsetof(C, blue) == offsetof(C, green) + 1);
+  fields.add("xyz", &C::x, 3);
+  fields.add("x", &C::x);
+  fields.add("y", &C::y);
+  fields.add("z", &C::z);
   fields.add("uv", &C::u, 2);
   fields.add("u", &C::u);
   fields.add("v", &C::v);
@@ -107,6 +116,10 @@ py::dict curve_arrays(const CurveFile& curves, const py::object& owner) {
   fields.add("pattern", &C::pattern);
   fields.add("line", &C::line);
   fields.add("confidence", &C::confidence);
+  fields.add("rgb", &C::red, 3);
+  fields.add("red", &C::red);
+  fields.add("green", &C::green);
+  fields.add("blue", &C::blue);
   return fields.arrays();
 }
 

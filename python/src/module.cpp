@@ -18,6 +18,8 @@
 #include <variant>
 #include <vector>
 
+#include "pencilscan/core/parallel.h"
+
 namespace pencilscan::python {
 namespace {
 
@@ -225,11 +227,17 @@ void add_rig(py::module_& module) {
 
 // ---- simulation, judgement, calibration ---------------------------------------------------------
 
+/// Of the whole process while it lives; 0: as it is.
+std::unique_ptr<ThreadLimit> thread_limit(int threads) {
+  return threads > 0 ? std::make_unique<ThreadLimit>(threads) : nullptr;
+}
+
 void add_simulation(py::module_& module) {
   module.def("simulate", [](const Rig& rig, const TriangleMesh& mesh, const std::string& noise,
                             std::uint64_t seed, bool fit, const std::string& up, int bits,
                             double albedo, bool smooth, int frame, double rotate_rad,
-                            const std::array<double, 3>& translate_mm, const py::object& progress) {
+                            const std::array<double, 3>& translate_mm, int threads,
+                            const py::object& progress) {
     SimulationOptions options;
     options.noise = noise;
     options.seed = seed;
@@ -245,6 +253,7 @@ void add_simulation(py::module_& module) {
     SimulatedFrame simulated;
     {
       const Unlocked unlocked;
+      const auto limit = thread_limit(threads);
       simulated = simulate(rig, mesh, options);
     }
     py::dict images;
@@ -256,12 +265,14 @@ void add_simulation(py::module_& module) {
 void add_judgement(py::module_& module) {
   module.def("judge", [](const TriangleMesh& truth, const Rig& rig, const Reconstruction* result,
                          const std::string& points_path, const TriangleMesh* measured,
-                         const std::string& align, std::uint64_t seed, const py::object& progress) {
+                         const std::string& align, std::uint64_t seed, int threads,
+                         const py::object& progress) {
     JudgementOptions options;
     options.align = align;
     options.seed = seed;
     options.progress = listener(progress);
     const Unlocked unlocked;
+    const auto limit = thread_limit(threads);
     if (result != nullptr) return judge(truth, rig, *result, options);
     std::vector<MeasuredPoint> points;
     if (!points_path.empty()) points = read_points(points_path);
@@ -276,7 +287,7 @@ void add_calibration(py::module_& module) {
                              const std::optional<std::tuple<std::string, std::string, double>>&
                                  known,
                              const std::string& board, std::size_t max_tracks, std::uint64_t seed,
-                             const py::object& progress) {
+                             int threads, const py::object& progress) {
     RigCalibrationOptions options;
     if (known)
       options.known_distance = {{std::get<0>(*known), std::get<1>(*known)}, std::get<2>(*known)};
@@ -287,6 +298,7 @@ void add_calibration(py::module_& module) {
     CalibratedRig found;
     {
       const Unlocked unlocked;
+      const auto limit = thread_limit(threads);
       const UncalibratedRig devices =
           devices_path ? read_devices(*devices_path) : devices_from_text(devices_text);
       found = calibrate_rig(devices, {captures.begin(), captures.end()}, options);

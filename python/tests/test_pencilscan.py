@@ -113,6 +113,17 @@ class PackageTest(unittest.TestCase):
                       result.crossings.curve_a, result.crossings.curve_b):
             self.assertEqual(array.dtype, np.int32)
             self.assertFalse(array.flags.writeable)
+        self.assertEqual(result.curves.xyz.shape, (len(result.curves), 3))
+        self.assertEqual(result.curves.rgb.shape, (len(result.curves), 3))
+
+    def test_every_stage_takes_threads(self) -> None:
+        one = ps.simulate(self.scene.rig, self.scene.folder / "ball.ply", threads=1)
+        for name, image in self.scene.frame.items():
+            self.assertTrue((one[name] == image).all(), name)
+        for call in (lambda n: ps.simulate(self.scene.rig, self.scene.frame.truth, threads=n),
+                     lambda n: ps.evaluate(self.scene.frame.truth, self.scene.rig, self.scene.result, threads=n),
+                     lambda n: ps.calibrate("captures", self.scene.rig, threads=n)):
+            self.assertEqual(self.complaint(lambda: call(-1)).field, "threads")
 
     def test_the_figures_are_the_programs(self) -> None:
         folder = self.scene.folder
