@@ -52,6 +52,13 @@ class Reference {
     if (values_.size() > kReference) values_.pop_front();
     know(std::vector<double>(values_.begin(), values_.end()));
   }
+  /// The same values, all shifted to this median.
+  [[nodiscard]] Reference moved_to(double median) const {
+    Reference result = *this;
+    for (double& value : result.values_) value += median - median_;
+    result.median_ = median;
+    return result;
+  }
   /// Of these values alone.
   [[nodiscard]] Reference around(std::span<const double> values) const {
     Reference result(least_spread_, threshold_);
@@ -100,7 +107,8 @@ class Levels {
   /// The values `next` are no longer as before.
   void change(std::span<const double> next) {
     const bool is_return = returns(median_of(next));
-    Reference left = std::exchange(now_, is_return ? *before_ : empty_);
+    // While it lasted, slow motion of the object went on.
+    Reference left = std::exchange(now_, is_return ? before_->moved_to(median_of(next)) : empty_);
     before_.reset();
     if (!is_return && left.is_known()) before_ = std::move(left);
     for (const double value : next) add(value);
@@ -117,6 +125,15 @@ class Levels {
   Reference now_;
   std::optional<Reference> before_;
 };
+
+/// How many of the values `next`, none of which is out, lead back to what was before: a level may
+/// be so noisy that what was before lies within its spread. 0: they do not.
+std::size_t length_of_quiet_return(std::span<const double> next, const Levels& levels) {
+  if (next.size() < kFewest || !levels.now().is_known()) return 0;
+  const auto first = next.first(kFewest);
+  const auto returns = [&](double value) { return levels.returns(value); };
+  return std::all_of(first.begin(), first.end(), returns) ? kFewest : 0;
+}
 
 /// How many of the values `next` are the beginning of a change to `side`; 0: they are none.
 std::size_t length_of_change(std::span<const double> next, const Levels& levels, int side) {
@@ -142,14 +159,14 @@ std::vector<Change> search(std::span<const double> values, const Reference& empt
     while (!first.empty() && first.front().at < k) first = first.subspan(1);
     const bool is_told = !first.empty() && first.front().at == k;
     const int side = levels.side(values[k]);
-    if (side == 0 && !is_told) {
-      levels.add(values[k]);
+    const std::span<const double> rest = values.subspan(k);
+    const std::size_t length = is_told     ? std::min(kFramesOfChange, rest.size())
+                               : side == 0 ? length_of_quiet_return(rest, levels)
+                                           : length_of_change(rest, levels, side);
+    if (length == 0) {
+      if (side == 0) levels.add(values[k]);
       continue;
     }
-    const std::span<const double> rest = values.subspan(k);
-    const std::size_t length =
-        is_told ? std::min(kFramesOfChange, rest.size()) : length_of_change(rest, levels, side);
-    if (length == 0) continue;
     const auto next = rest.first(length);
     const double after = median_of(next);
     changes.push_back(

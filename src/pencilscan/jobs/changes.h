@@ -18,10 +18,12 @@ namespace pencilscan {
 ///
 /// Three of four values out in a row, none of them nearer to what was before than half of T, are a
 /// change from the first of them on. It ends with the first value of a later change to what was
-/// before it. After a change the median starts anew. Until it is known, three values in a row that
-/// fit the values before the change and not those from there are its end, at the end of all values
-/// fewer. A step among the first values is looked for backwards from the fifteenth: it needs three
-/// values before it.
+/// before it, from where the running median goes on. After a change the median starts anew. Until
+/// it is known, three values in a row that fit the values before the change and not those from
+/// there are its end, at the end of all values fewer. Later, eight in a row are that fit the values
+/// before it and lie nearer to them than to the median since: of a level that is so noisy that what
+/// was before lies within its spread, no single value is out. A step among the first values is
+/// looked for backwards from the fifteenth: it needs three values before it.
 ///
 /// An outlier is one or two values in a row, each more than T spreads from the median of the
 /// kReference values next to it of its own level: those of before a change and after its end are of

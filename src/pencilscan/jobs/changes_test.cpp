@@ -121,6 +121,31 @@ TEST(Changes, ALongOneEndsWhereItEndsAndTheEndOfAllIsNoOutlier) {
   }
 }
 
+// A camera most of whose names are wrong: what was before lies within the spread.
+TEST(Changes, ANoisyOneEndsWhereItEnds) {
+  std::size_t ends = 0;
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    std::vector<double> values = with_step(100, 120, 0.6, seed);
+    Random random(seed + 100);
+    for (std::size_t k = 100; k < 120; ++k) values[k] += random.normal(0, 0.13);
+    const ChangeReport report = find_changes(values, {0.05, 20 * kValues});
+    ASSERT_THAT(report.changes, SizeIs(1)) << seed;
+    EXPECT_EQ(report.changes[0].at, 100U) << seed;
+    ends += report.changes[0].end == 120U ? 1U : 0U;
+  }
+  EXPECT_GE(ends, 18U);  // its last values may be as those before
+}
+
+// The object turns on while a projector is off.
+TEST(Changes, AfterItsEndSlowMotionIsNone) {
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    std::vector<double> values = with_step(100, 120, -0.4, seed);
+    for (std::size_t k = 100; k < kValues; ++k)
+      values[k] += 0.005 * static_cast<double>(std::min<std::size_t>(k - 100, 60));
+    EXPECT_THAT(places(find_changes(values, {0.12, 20 * kValues})), ElementsAre(100, 120)) << seed;
+  }
+}
+
 // A factor of .7 where .75 counts: every second value is back among what noise explains.
 TEST(Changes, ASmallStepThatNoiseHidesHereAndThereIsNoOutlier) {
   const std::vector<double> values = {-1.36, -1.30, -1.33, -1.29, -1.29, -1.43, -1.28,

@@ -338,10 +338,53 @@ std::vector<Found> find_all(std::span<const FrameRow> rows, const SequenceDevice
   return found;
 }
 
+constexpr std::size_t kFramesApart = 5;  ///< of changes that have one cause
+
+/// Takes out what another change explains:
+///   1. the light of a picture, or its named share, that goes with a projector, off or on again,
+///   2. a shift with which a camera's crossings meet while they miss by far more than they did:
+///      then its names are those of other lines.
+void drop_explained(std::vector<Found>& found) {
+  const std::vector<Found> all = found;
+  const auto goes_with_projector = [&](const Found& f, const Found& projector) {
+    const auto is_at = [&](std::size_t at) {
+      return std::max(at, f.change.at) - std::min(at, f.change.at) <= kFramesApart;
+    };
+    if (is_at(projector.change.at) && rises(f) == rises(projector)) return true;
+    return projector.change.end && is_at(*projector.change.end) && rises(f) != rises(projector);
+  };
+  const auto explains = [&](const Found& f, const Found& cause) {
+    if (f.series->kind == "level" || f.series->kind == "labelled")
+      return cause.series->kind == "projector" && goes_with_projector(f, cause);
+    const bool is_within = cause.change.at + kFramesApart < f.change.at &&
+                           (!cause.change.end || f.change.at < *cause.change.end);
+    return is_shift(f) && cause.series->kind == "crossings" && rises(cause) && is_within &&
+           cause.series->device == f.series->device;
+  };
+  std::erase_if(found, [&](const Found& f) {
+    return std::any_of(all.begin(), all.end(),
+                       [&](const Found& cause) { return explains(f, cause); });
+  });
+}
+
+/// Takes out crossings of a device that frames themselves name, from the same or an earlier one on
+/// to no earlier one than the last that these tell of.
+void drop_said(std::vector<SequenceEvent>& events) {
+  const std::vector<SequenceEvent> all = events;
+  const auto says = [](const SequenceEvent& said, const SequenceEvent& event) {
+    return (said.kind == "device-is-off" || said.kind == "wrong-picture") &&
+           said.device == event.device && said.first <= event.first && said.last >= event.last;
+  };
+  std::erase_if(events, [&](const SequenceEvent& event) {
+    return event.kind == "crossings" &&
+           std::any_of(all.begin(), all.end(),
+                       [&](const SequenceEvent& said) { return says(said, event); });
+  });
+}
+
 /// Takes out of `found` what changed in the same figure and direction within a few frames of the
 /// first one, and before one of these figures changes again.
 std::vector<Found> take_together(std::vector<Found>& found) {
-  constexpr std::size_t kFramesApart = 5;
   const Found first = found.front();
   const auto goes_with = [&](const Found& f) {
     const bool is_kind = f.series->kind == first.series->kind && rises(f) == rises(first);
@@ -396,6 +439,7 @@ WatchReport watch_sequence(std::span<const FrameRow> rows, const SequenceDevices
   std::stable_sort(found.begin(), found.end(), [](const Found& a, const Found& b) {
     return std::tie(a.change.at, a.series->kind) < std::tie(b.change.at, b.series->kind);
   });
+  drop_explained(found);
   while (!found.empty()) {
     const std::vector<Found> together = take_together(found);
     const Found& first = together.front();
@@ -412,6 +456,7 @@ WatchReport watch_sequence(std::span<const FrameRow> rows, const SequenceDevices
     }
   }
   std::ranges::move(finding_events(rows), std::back_inserter(report.events));
+  drop_said(report.events);
   std::ranges::move(repetitions_of(rows, devices), std::back_inserter(report.events));
   std::stable_sort(
       report.events.begin(), report.events.end(),
