@@ -108,6 +108,23 @@ std::optional<Warning> device_warning(const Rig& rig,
                  {{"median_px", crossings.median_px}, {"expected_px", crossings.expected_px}}};
 }
 
+Warning turned_warning(const Rig& rig, const TurnedCamera& turned) {
+  const std::string& name = rig.cameras[turned.camera].name;
+  return {WarningCode::kDeviceIsOff,
+          "camera " + name + ": lines that the other cameras measured lie " +
+              formatted(turned.median_px, "%.2f") +
+              " px (median) beside its curves of their colours, " +
+              formatted(turned.expected_px, "%.2f") + " px with its picture shifted by " +
+              formatted(turned.shift_px, "%.1f") +
+              " px: it was moved or zoomed after the calibration, or was calibrated badly, and its "
+              "lines may be named wrong; rig check --frames says by how much, --refine-rig can "
+              "correct it",
+          name,
+          {{"median_px", turned.median_px},
+           {"expected_px", turned.expected_px},
+           {"shift_px", turned.shift_px}}};
+}
+
 Warning another_moment_warning(const Rig& rig, std::size_t camera, const ViewsApart& apart,
                                bool is_left_out) {
   const std::string& name = rig.cameras[camera].name;

@@ -8,6 +8,7 @@
 
 #include "pencilscan/core/warning.h"
 #include "pencilscan/pipeline/frame.h"
+#include "pencilscan/pipeline/lost_cameras.h"
 #include "pencilscan/pipeline/view_agreement.h"
 
 namespace pencilscan {
@@ -23,6 +24,9 @@ namespace pencilscan {
 [[nodiscard]] std::string misses_text(const Device& device, const CrossingDisagreement& crossings);
 [[nodiscard]] std::optional<Warning> device_warning(
     const Rig& rig, std::span<const CrossingDisagreement> device_crossings);
+
+/// That one camera stands a little elsewhere, by what the others measure.
+[[nodiscard]] Warning turned_warning(const Rig& rig, const TurnedCamera& turned);
 
 /// That what one camera sees lies apart from what the others see, and that it was left out, or not.
 [[nodiscard]] Warning another_moment_warning(const Rig& rig, std::size_t camera,

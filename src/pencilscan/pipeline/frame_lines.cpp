@@ -7,6 +7,7 @@
 #include "pencilscan/pipeline/frame.h"
 #include "pencilscan/pipeline/light_warnings.h"
 #include "pencilscan/pipeline/line_naming.h"
+#include "pencilscan/pipeline/lost_cameras.h"
 #include "pencilscan/pipeline/picture_check.h"
 
 // Of a frame's way: what its pictures say of themselves, and the solution.
@@ -70,6 +71,9 @@ std::optional<Rig> label_lines(const Rig& rig, const Frame& frame, const PointOp
     result.warnings.push_back(std::move(*naming.warning));
   } else if (std::optional<Warning> warning = device_warning(rig, result.device_crossings)) {
     result.warnings.push_back(std::move(*warning));
+  } else if (const auto turned = turned_camera(rig, result.families, result.graphs, result.labeling,
+                                               result.device_crossings)) {
+    result.warnings.push_back(turned_warning(rig, *turned));
   }
   return std::move(naming.corrected);
 }

@@ -10,6 +10,8 @@
 #include <utility>
 
 #include "pencilscan/core/evenly_picked.h"
+#include "pencilscan/core/median.h"
+#include "pencilscan/core/parallel.h"
 #include "pencilscan/joint/joint.h"
 #include "pencilscan/pipeline/naming_doubt.h"
 #include "pencilscan/pipeline/pose_search.h"
@@ -115,33 +117,45 @@ class SeenCurves {
   std::optional<PointGrid> grid_;
 };
 
-/// What the other cameras measured and this one should see from about where it stands: places of
-/// lines, an even share, by family.
+/// Adds what `points` show of lines that this camera should see from about where it stands.
+/// `layer`: of the frame's first family.
+void add_places(const Rig& rig, const std::vector<ColorFamily>& families,
+                std::span<const MeasuredPoint> points, std::size_t camera, std::size_t layer,
+                std::vector<PlaceOfLine>& places) {
+  const Vec3 center = rig.cameras[camera].center();
+  for (const MeasuredPoint& p : points) {
+    const PatternRef ref{p.projector, p.pattern};
+    const auto family = static_cast<std::size_t>(family_of(families, ref));
+    const LinePattern& lines = rig.projectors[p.projector].patterns[p.pattern];
+    const Vec3 x = position_of(p);
+    if (about_facing(rig, p).dot((center - x).normalized()) < kLeastCosine) continue;
+    const int color =
+        families[family].color_of_symbol(lines)[static_cast<std::size_t>(lines.symbol(p.line))];
+    places.push_back({x, family, layer + family, bit_of_color(color)});
+  }
+}
+
+/// An even share, by family.
+std::vector<PlaceOfLine> some_places(std::span<const PlaceOfLine> places) {
+  std::vector<PlaceOfLine> some = evenly_picked(places, kMostPlaces);
+  std::stable_sort(some.begin(), some.end(),
+                   [](const PlaceOfLine& a, const PlaceOfLine& b) { return a.family < b.family; });
+  return some;
+}
+
+/// What the other cameras measured and this one should see.
 std::vector<PlaceOfLine> places_of_lines(const Rig& rig, std::span<const FrameCurves> frames,
                                          std::span<const Labeling> labelings, std::size_t camera) {
-  const Vec3 center = rig.cameras[camera].center();
   TriangulationOptions options;
   options.used_of_seven = 1;
   std::vector<PlaceOfLine> places;
   std::size_t layer = 0;
   for (std::size_t f = 0; f < frames.size(); ++f) {
-    const std::vector<ColorFamily>& families = frames[f].families;
-    for (const MeasuredPoint& p : triangulate(rig, frames[f].graphs, labelings[f], options)) {
-      const PatternRef ref{p.projector, p.pattern};
-      const auto family = static_cast<std::size_t>(family_of(families, ref));
-      const LinePattern& lines = rig.projectors[p.projector].patterns[p.pattern];
-      const Vec3 x = position_of(p);
-      if (about_facing(rig, p).dot((center - x).normalized()) < kLeastCosine) continue;
-      const int color =
-          families[family].color_of_symbol(lines)[static_cast<std::size_t>(lines.symbol(p.line))];
-      places.push_back({x, family, layer + family, bit_of_color(color)});
-    }
-    layer += families.size();
+    add_places(rig, frames[f].families, triangulate(rig, frames[f].graphs, labelings[f], options),
+               camera, layer, places);
+    layer += frames[f].families.size();
   }
-  std::vector<PlaceOfLine> some = evenly_picked(places, kMostPlaces);
-  std::stable_sort(some.begin(), some.end(),
-                   [](const PlaceOfLine& a, const PlaceOfLine& b) { return a.family < b.family; });
-  return some;
+  return some_places(places);
 }
 
 /// Of right ones .80 and more is shown, of pictures of other places or moments .18
@@ -167,12 +181,86 @@ std::optional<FoundCamera> found_pose(const PoseSearch<SeenCurves>& search) {
   return FoundCamera{0, settled, share};
 }
 
+double margin_of(const Rig& rig) { return std::max(1.0, kBesideLine * line_spacing(rig)); }
+
+/// The curves of one camera in one frame, by family.
+SeenCurves seen_curves(const Camera& camera, const GridGraph& graph,
+                       const std::vector<ColorFamily>& families, double margin_px) {
+  SeenCurves seen(camera, margin_px);
+  for (std::size_t k = 0; k < families.size(); ++k)
+    seen.add_layer(graph, static_cast<int>(k), families[k].colors.size());
+  seen.sort();
+  return seen;
+}
+
+/// How a camera would have to turn for its curves to lie where the others measured lines.
+std::optional<TurnedCamera> turn_of(const Rig& rig, const SeenCurves& seen,
+                                    const std::vector<PlaceOfLine>& places, std::size_t c) {
+  constexpr double kFar = 2;  // margins; what has no line there is hidden or not drawn
+  const double margin_px = margin_of(rig);
+  PoseSearchOptions nearby;
+  nearby.reach = 0;
+  nearby.most_roll_degrees = 0;
+  const PoseSearch<SeenCurves> search(rig.cameras[c], places, seen, margin_px, nearby);
+  if (!search.has_places()) return std::nullopt;
+  const std::vector<PictureWay> ways = search.ways();
+  const PictureWay best =
+      *std::max_element(ways.begin(), ways.end(),
+                        [](const PictureWay& a, const PictureWay& b) { return a.share < b.share; });
+  const auto given = search.pixels_of({});
+  const auto turned = search.pixels_of(search.settle({best.rotation_px, Vec3::Zero()}));
+  const auto distance = [&](const Vec2& pixel, const PlaceOfLine& place) {
+    const auto line = seen.nearest(pixel, place, kFar * margin_px);
+    return line ? std::abs(line->normal.dot(line->position - pixel)) : kFar * margin_px;
+  };
+  TurnedCamera result;
+  result.camera = c;
+  std::vector<double> shifts;
+  std::vector<double> before;
+  std::vector<double> after;
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    if (!given[i] || !turned[i] || !rig.cameras[c].contains(*given[i])) continue;
+    shifts.push_back((*turned[i] - *given[i]).norm());
+    before.push_back(distance(*given[i], places[i]));
+    after.push_back(distance(*turned[i], places[i]));
+    const bool is_on = before.back() < margin_px / 2;
+    const bool comes_on = after.back() < margin_px / 2;
+    result.won += comes_on && !is_on ? 1U : 0U;
+    result.lost += is_on && !comes_on ? 1U : 0U;
+  }
+  result.places = shifts.size();
+  if (shifts.empty()) return std::nullopt;
+  result.shift_px = upper_median(std::move(shifts));
+  result.median_px = upper_median(std::move(before));
+  result.expected_px = upper_median(std::move(after));
+  return result;
+}
+
+/// That a camera is off, and not that the others measured little: cameras of right rigs have shifts
+/// up to .1 px (a film of 320x240, every sixth of 120 frames), one turned by 2 px wins half of its
+/// places and loses a fiftieth.
+bool is_off(const TurnedCamera& turn, double margin_px) {
+  constexpr double kClearly = 3;     // three in four of those that change
+  constexpr double kLeastWon = 0.1;  // of the places
+  return turn.shift_px > margin_px / 2 &&
+         static_cast<double>(turn.won) > kClearly * static_cast<double>(turn.lost) &&
+         static_cast<double>(turn.won - turn.lost) > kLeastWon * static_cast<double>(turn.places);
+}
+
+/// A camera's crossings are enough, and meet with its picture where it is.
+bool meets_where_it_stands(const CrossingDisagreement& crossings) {
+  constexpr double kMeetsPx = 0.25;   // half of a bump that is to be told from it
+  constexpr double kAsClosely = 1.2;  // the misses that noise lets expect are known to a fifth
+  return crossings.shift_px && crossings.shift_px->norm() < kMeetsPx &&
+         crossings.median_px <= kAsClosely * crossings.expected_px;
+}
+
 /// Those of some cameras that are found by what all others measure.
 std::vector<FoundCamera> found_by_others(const Rig& rig, std::span<const FrameCurves> frames,
                                          std::span<const std::size_t> lost,
                                          const PoseSearchOptions& options) {
   const std::vector<Labeling> of_others = labels_without(rig, frames, lost);
-  const double margin_px = std::max(1.0, kBesideLine * line_spacing(rig));
+  const double margin_px = margin_of(rig);
   std::vector<FoundCamera> found;
   for (const std::size_t c : lost) {
     SeenCurves seen(rig.cameras[c], margin_px);
@@ -241,6 +329,58 @@ std::vector<FoundCamera> find_lost_cameras(const Rig& rig, std::span<const Frame
       best = std::move(found);
   }
   return best;
+}
+
+std::optional<TurnedCamera> turned_camera(const Rig& rig, const std::vector<ColorFamily>& families,
+                                          const std::vector<GridGraph>& graphs,
+                                          const Labeling& labeling,
+                                          std::span<const CrossingDisagreement> device_crossings) {
+  constexpr double kMostSigma = 0.5;  // px, of a point in this camera
+  const double margin_px = margin_of(rig);
+  TriangulationOptions options;
+  options.used_of_seven = 2;
+  const std::vector<MeasuredPoint> points = triangulate(rig, graphs, labeling, options);
+  const std::size_t cameras = rig.cameras.size();
+  std::vector<std::optional<SeenCurves>> seen(cameras);
+  parallel_for(cameras, [&](std::size_t c) {
+    seen[c] = seen_curves(rig.cameras[c], graphs[c], families, margin_px);
+  });
+  // By what all other cameras but one measured.
+  const auto turn = [&](std::size_t c, std::size_t without) {
+    const Camera& camera = rig.cameras[c];
+    std::vector<MeasuredPoint> of_others;
+    for (const MeasuredPoint& p : points) {
+      if (p.camera == c || p.camera == without) continue;
+      const double depth = (camera.device_from_world * position_of(p)).z();
+      if (double{p.sigma} * camera.focal_px() < kMostSigma * depth) of_others.push_back(p);
+    }
+    std::vector<PlaceOfLine> places;
+    add_places(rig, families, of_others, c, 0, places);
+    return turn_of(rig, *seen[c], some_places(places), c);
+  };
+  std::optional<TurnedCamera> most;
+  const auto won = [](const TurnedCamera& t) {
+    return (static_cast<double>(t.won) - static_cast<double>(t.lost)) /
+           static_cast<double>(t.places);
+  };
+  for (std::size_t c = 0; c < cameras; ++c) {
+    if (graphs[c].curves.empty()) continue;
+    const std::optional<TurnedCamera> found = turn(c, c);
+    if (found && is_off(*found, margin_px) && (!most || won(*found) > won(*most))) most = found;
+  }
+  if (!most) return std::nullopt;
+  if (most->camera < device_crossings.size() &&
+      meets_where_it_stands(device_crossings[most->camera]))
+    return std::nullopt;
+  std::size_t right = 0;
+  for (std::size_t c = 0; c < cameras; ++c) {
+    if (c == most->camera || graphs[c].curves.empty()) continue;
+    const std::optional<TurnedCamera> found = turn(c, most->camera);
+    if (!found) continue;
+    if (is_off(*found, margin_px)) return std::nullopt;
+    ++right;
+  }
+  return right >= 2 ? most : std::nullopt;
 }
 
 }  // namespace pencilscan

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -42,5 +43,25 @@ struct FoundCamera {
                                                          std::span<const FrameCurves> frames,
                                                          std::span<const Labeling> labelings,
                                                          const PoseSearchOptions& options = {});
+
+/// A camera that stands so little off that many of its lines still get names, of other lines.
+struct TurnedCamera {
+  std::size_t camera = 0;
+  double shift_px = 0;     ///< of its picture, median over the places on lines that it should see
+  double median_px = 0;    ///< of these from its nearest line of their colour
+  double expected_px = 0;  ///< the same after the turn
+  std::size_t places = 0;
+  std::size_t won = 0;   ///< of these, on a line after the turn and not as the rig has it
+  std::size_t lost = 0;  ///< the other way round
+};
+
+/// The one camera whose curves lie beside the lines that the others measured, in one frame, as far
+/// as a line spacing to each side, and on them after a turn; nothing where there are several, or
+/// where no two other cameras show that they agree. A camera whose crossings meet where it stands
+/// is not among them: its picture is of another moment. `rig`: in footprints, with registered
+/// patterns; `device_crossings`: of the labels.
+[[nodiscard]] std::optional<TurnedCamera> turned_camera(
+    const Rig& rig, const std::vector<ColorFamily>& families, const std::vector<GridGraph>& graphs,
+    const Labeling& labeling, std::span<const CrossingDisagreement> device_crossings);
 
 }  // namespace pencilscan
