@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <map>
 #include <set>
 #include <utility>
 
@@ -12,10 +13,48 @@ int curve_of(const PieceGraph& graph, int piece) {
   return graph.pieces[static_cast<std::size_t>(piece)].curve;
 }
 
+/// The label that a piece was given; null: none.
+const PieceLabel* decided(const LabelledPieces& pieces, const std::vector<Decision>& decisions,
+                          int piece) {
+  const auto p = static_cast<std::size_t>(piece);
+  const int label = decisions[p].label;
+  return label < 0 ? nullptr : &pieces.labels[p][static_cast<std::size_t>(label)];
+}
+
+/// Per piece, 1 where a crossing bears its line out: by itself, or in a pair (held_pieces()).
+struct Crossed {
+  std::vector<char> is_crossed;
+  std::vector<char> is_paired;
+};
+
+Crossed crossed_by_lines(const LabelledPieces& pieces, const JointOptions& options,
+                         const std::vector<Decision>& decisions) {
+  const CrossingCost crossing_cost(pieces, options);
+  std::vector<const PieceCrossing*> agreeing;
+  std::map<int, std::set<int>> agrees_with;  // curves
+  for (const PieceCrossing& x : pieces.graph.crossings) {
+    const PieceLabel* a = decided(pieces, decisions, x.a);
+    const PieceLabel* b = decided(pieces, decisions, x.b);
+    // Below 0 the crossing is likelier where both lines are right than by chance.
+    if (a == nullptr || b == nullptr || crossing_cost(*a, *b, x) >= 0) continue;
+    agreeing.push_back(&x);
+    agrees_with[curve_of(pieces.graph, x.a)].insert(curve_of(pieces.graph, x.b));
+    agrees_with[curve_of(pieces.graph, x.b)].insert(curve_of(pieces.graph, x.a));
+  }
+  Crossed crossed{std::vector<char>(decisions.size(), 0), std::vector<char>(decisions.size(), 0)};
+  for (const PieceCrossing* x : agreeing) {
+    const bool is_pair = agrees_with[curve_of(pieces.graph, x->a)].size() == 1 &&
+                         agrees_with[curve_of(pieces.graph, x->b)].size() == 1;
+    std::vector<char>& by = is_pair ? crossed.is_paired : crossed.is_crossed;
+    for (const int p : {x->a, x->b}) by[static_cast<std::size_t>(p)] = 1;
+  }
+  return crossed;
+}
+
 }  // namespace
 
 std::vector<char> held_pieces(const PieceGraph& graph, const std::vector<std::vector<int>>& linked,
-                              std::vector<char> is_crossed,
+                              std::vector<char> is_crossed, const std::vector<char>& is_paired,
                               const std::function<bool(std::span<const int> group)>& is_ambiguous) {
   std::vector<char> is_held = std::move(is_crossed);
   // Along curves.
@@ -41,7 +80,9 @@ std::vector<char> held_pieces(const PieceGraph& graph, const std::vector<std::ve
     is_seen[first] = 1;
     std::vector<int> group{static_cast<int>(first)};
     std::set<int> holding;
+    bool has_pair = false;
     for (std::size_t k = 0; k < group.size(); ++k) {
+      has_pair = has_pair || is_paired[static_cast<std::size_t>(group[k])] != 0;
       for (const int q : linked[static_cast<std::size_t>(group[k])]) {
         const auto j = static_cast<std::size_t>(q);
         if (by_itself[j] != 0) holding.insert(curve_of(graph, q));
@@ -50,7 +91,7 @@ std::vector<char> held_pieces(const PieceGraph& graph, const std::vector<std::ve
         group.push_back(q);
       }
     }
-    if (holding.empty() || (holding.size() == 1 && is_ambiguous(group))) continue;
+    if ((holding.empty() && !has_pair) || (holding.size() < 2 && is_ambiguous(group))) continue;
     for (const int p : group) is_held[static_cast<std::size_t>(p)] = 1;
   }
   return is_held;
@@ -88,17 +129,12 @@ bool is_ambiguous_group(const LabelledPieces& pieces, const std::vector<Decision
 
 Anchors find_anchors(const LabelledPieces& pieces, std::span<const NextPiece> beside,
                      const JointOptions& options, const std::vector<Decision>& decisions) {
-  const auto label_of = [&](int p) -> const PieceLabel* {
-    const auto k = static_cast<std::size_t>(p);
-    return decisions[k].label < 0 ? nullptr
-                                  : &pieces.labels[k][static_cast<std::size_t>(decisions[k].label)];
-  };
   Anchors anchors;
   anchors.linked.resize(decisions.size());
   anchors.neighbors.resize(decisions.size(), 0);
   const auto link = [&](int a, int b, int lines_apart) {
-    const PieceLabel* la = label_of(a);
-    const PieceLabel* lb = label_of(b);
+    const PieceLabel* la = decided(pieces, decisions, a);
+    const PieceLabel* lb = decided(pieces, decisions, b);
     if (la == nullptr || lb == nullptr || !(la->pattern == lb->pattern) ||
         std::abs(la->line - lb->line) != lines_apart)
       return;
@@ -109,17 +145,9 @@ Anchors find_anchors(const LabelledPieces& pieces, std::span<const NextPiece> be
   };
   for (const NextPiece& next : beside) link(next.a, next.b, 1);
   for (const auto& [a, b] : pieces.graph.continuations) link(a, b, 0);
-  std::vector<char> is_crossed(decisions.size(), 0);
-  const CrossingCost crossing_cost(pieces, options);
-  for (const PieceCrossing& x : pieces.graph.crossings) {
-    const PieceLabel* la = label_of(x.a);
-    const PieceLabel* lb = label_of(x.b);
-    // Below 0 the crossing is likelier where both lines are right than by chance.
-    if (la == nullptr || lb == nullptr || crossing_cost(*la, *lb, x) >= 0) continue;
-    is_crossed[static_cast<std::size_t>(x.a)] = is_crossed[static_cast<std::size_t>(x.b)] = 1;
-  }
-  anchors.is_held = held_pieces(pieces.graph, anchors.linked, std::move(is_crossed),
-                                [&](std::span<const int> group) {
+  Crossed crossed = crossed_by_lines(pieces, options, decisions);
+  anchors.is_held = held_pieces(pieces.graph, anchors.linked, std::move(crossed.is_crossed),
+                                crossed.is_paired, [&](std::span<const int> group) {
                                   return is_ambiguous_group(pieces, decisions, options, group);
                                 });
   return anchors;

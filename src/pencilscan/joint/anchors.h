@@ -11,15 +11,17 @@ namespace pencilscan {
 
 /// Which pieces crossings hold; 1: held. `linked`: per piece, the pieces that its line follows
 /// from, on its own curve and beside it. `is_crossed`: per piece, 1 where a crossing bears its line
-/// out.
+/// out. `is_paired`: per piece, 1 where a crossing does so whose two curves agree with no other.
+/// Each of them may have chosen the line that meets the other's, among all of its colours.
 ///   1. A crossed piece is held.
 ///   2. A piece is held where links along its own curve lead to a crossed piece.
 ///   3. The other pieces form groups, by their links. All pieces of a group are held where a held
 ///      curve is linked to it. A group that `is_ambiguous` needs two such curves: a single one may
-///      go on along the wrong line, and the whole group with it.
+///      go on along the wrong line, and the whole group with it. Pairs hold their group, too, but
+///      not one that `is_ambiguous`, however many they are.
 [[nodiscard]] std::vector<char> held_pieces(
     const PieceGraph& graph, const std::vector<std::vector<int>>& linked,
-    std::vector<char> is_crossed,
+    std::vector<char> is_crossed, const std::vector<char>& is_paired,
     const std::function<bool(std::span<const int> group)>& is_ambiguous);
 
 /// True where a group of pieces could as well show other lines, because codes repeat and projectors

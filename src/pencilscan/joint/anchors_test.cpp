@@ -22,6 +22,7 @@ struct Curves {
     }
     linked.resize(graph.pieces.size());
     is_crossed.resize(graph.pieces.size(), 0);
+    is_paired.resize(graph.pieces.size(), 0);
     for (int c = 0; c < count; ++c) {
       link(3 * c, 3 * c + 1);
       link(3 * c + 1, 3 * c + 2);
@@ -38,8 +39,8 @@ struct Curves {
   }
   /// Per curve, how many of its pieces are held.
   [[nodiscard]] std::vector<int> held() const {
-    const std::vector<char> is_held =
-        held_pieces(graph, linked, is_crossed, [&](std::span<const int>) { return is_ambiguous; });
+    const std::vector<char> is_held = held_pieces(
+        graph, linked, is_crossed, is_paired, [&](std::span<const int>) { return is_ambiguous; });
     std::vector<int> count(graph.pieces.size() / 3, 0);
     for (std::size_t p = 0; p < is_held.size(); ++p) count[p / 3] += is_held[p];
     return count;
@@ -48,6 +49,7 @@ struct Curves {
   PieceGraph graph;
   std::vector<std::vector<int>> linked;
   std::vector<char> is_crossed;
+  std::vector<char> is_paired;
   bool is_ambiguous = true;
 };
 
@@ -122,6 +124,48 @@ TEST(AmbiguousGroup, HasMoreLinesThanACodeWord) {
   const LabelledPieces pieces = two_readings(3);
   const std::vector<Decision> decisions(3, Decision{0, 8.F});
   EXPECT_FALSE(is_ambiguous_group(pieces, decisions, {}, std::vector<int>{0, 1, 2}));
+}
+
+TEST(HeldPieces, PairsDoNotHoldAnAmbiguousGroup) {
+  Curves curves(4, {{0, 1}, {1, 2}, {2, 3}});
+  curves.is_paired[0] = curves.is_paired[9] = 1;
+  EXPECT_EQ(curves.held(), std::vector<int>({0, 0, 0, 0}));
+  curves.is_ambiguous = false;
+  EXPECT_EQ(curves.held(), std::vector<int>({3, 3, 3, 3}));
+}
+
+TEST(Anchors, PairsOfCurvesThatAgreeWithNoOtherDoNotHoldLinesAPeriodOff) {
+  // Four curves of one pattern side by side, which may as well show other lines, and two of another
+  // pattern. All lie at one depth.
+  LabelledPieces pieces = two_readings(6);
+  for (std::size_t c = 0; c < 6; ++c) {
+    for (PieceLabel& label : pieces.labels[c]) {
+      label.q = {0, 0, 1};
+      label.inverse_depth_per_px = 0.001F;
+    }
+    if (c >= 4) pieces.labels[c][0].pattern = {2, 0};
+  }
+  const auto cross = [&](int a, int b) {
+    PieceCrossing crossing;
+    crossing.a = a;
+    crossing.b = b;
+    pieces.graph.crossings.push_back(crossing);
+  };
+  std::vector<NextPiece> beside(3);
+  for (int c = 0; c < 3; ++c) {
+    beside[static_cast<std::size_t>(c)].a = c;
+    beside[static_cast<std::size_t>(c)].b = c + 1;
+  }
+  const auto held = [&] {
+    const std::vector<char> all =
+        find_anchors(pieces, beside, {}, std::vector<Decision>(6, Decision{0, 8.F})).is_held;
+    return std::vector<char>(all.begin(), all.begin() + 4);
+  };
+  cross(0, 4);
+  cross(3, 5);
+  EXPECT_EQ(held(), std::vector<char>({0, 0, 0, 0}));
+  cross(3, 4);  // 4 agrees with two now
+  EXPECT_EQ(held(), std::vector<char>({1, 1, 1, 1}));
 }
 
 }  // namespace
