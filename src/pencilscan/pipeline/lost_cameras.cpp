@@ -336,11 +336,18 @@ std::optional<TurnedCamera> turned_camera(const Rig& rig, const std::vector<Colo
                                           const Labeling& labeling,
                                           std::span<const CrossingDisagreement> device_crossings) {
   constexpr double kMostSigma = 0.5;  // px, of a point in this camera
+  const std::size_t cameras = rig.cameras.size();
+  // A camera whose crossings meet is where it stands: of a right rig, most frames end here.
+  std::vector<std::size_t> doubtful;
+  for (std::size_t c = 0; c < cameras; ++c) {
+    const bool meets = c < device_crossings.size() && meets_where_it_stands(device_crossings[c]);
+    if (!meets && !graphs[c].curves.empty()) doubtful.push_back(c);
+  }
+  if (doubtful.empty()) return std::nullopt;
   const double margin_px = margin_of(rig);
   TriangulationOptions options;
   options.used_of_seven = 2;
   const std::vector<MeasuredPoint> points = triangulate(rig, graphs, labeling, options);
-  const std::size_t cameras = rig.cameras.size();
   std::vector<std::optional<SeenCurves>> seen(cameras);
   parallel_for(cameras, [&](std::size_t c) {
     seen[c] = seen_curves(rig.cameras[c], graphs[c], families, margin_px);
@@ -358,20 +365,17 @@ std::optional<TurnedCamera> turned_camera(const Rig& rig, const std::vector<Colo
     add_places(rig, families, of_others, c, 0, places);
     return turn_of(rig, *seen[c], some_places(places), c);
   };
+  std::vector<std::optional<TurnedCamera>> turns(doubtful.size());
+  parallel_for(doubtful.size(), [&](std::size_t k) { turns[k] = turn(doubtful[k], doubtful[k]); });
   std::optional<TurnedCamera> most;
   const auto won = [](const TurnedCamera& t) {
     return (static_cast<double>(t.won) - static_cast<double>(t.lost)) /
            static_cast<double>(t.places);
   };
-  for (std::size_t c = 0; c < cameras; ++c) {
-    if (graphs[c].curves.empty()) continue;
-    const std::optional<TurnedCamera> found = turn(c, c);
+  for (const std::optional<TurnedCamera>& found : turns) {
     if (found && is_off(*found, margin_px) && (!most || won(*found) > won(*most))) most = found;
   }
   if (!most) return std::nullopt;
-  if (most->camera < device_crossings.size() &&
-      meets_where_it_stands(device_crossings[most->camera]))
-    return std::nullopt;
   std::size_t right = 0;
   for (std::size_t c = 0; c < cameras; ++c) {
     if (c == most->camera || graphs[c].curves.empty()) continue;

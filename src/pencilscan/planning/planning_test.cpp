@@ -195,19 +195,11 @@ TEST(RigCheck, TheGridOfOneProjectorNeedsNoSecondOneWhereItsLinesHaveACode) {
   patterns.push_back(patterns.front());
   patterns.back().axis = Axis::kRow;
   patterns.back().colors = {PatternColor("red"), PatternColor("yellow")};
-  const auto said = [&] {
-    const RigCheck check = check_rig(rig);
-    const auto at = std::find_if(check.warnings.begin(), check.warnings.end(),
-                                 [](const RigWarning& w) { return w.kind == "coplanar_axes"; });
-    return at == check.warnings.end() ? std::string() : at->text;
-  };
-  EXPECT_THAT(said(), testing::HasSubstr("the code of their colours tells lines apart"));
-  for (LinePattern& pattern : patterns) {
-    pattern.alphabet = 1;
-    pattern.sequence = {0};
-    pattern.colors.resize(1);
-  }
-  EXPECT_THAT(said(), testing::HasSubstr("no code tells their lines apart"));
+  const RigCheck check = check_rig(rig);
+  const auto at = std::find_if(check.warnings.begin(), check.warnings.end(),
+                               [](const RigWarning& w) { return w.kind == "coplanar_axes"; });
+  ASSERT_NE(at, check.warnings.end());
+  EXPECT_THAT(at->text, testing::HasSubstr("the code of their colours tells lines apart"));
 }
 
 TEST(RigCheck, SensitivityIsTheSineOfTheTriangulationAngleForLinesAcrossTheBaseline) {
