@@ -175,16 +175,7 @@ TEST_F(BeforeAWall, TheSkewOfAGivenKIsKept) {
 
 /// What the rig makes of lengths in the volume, as a share too much.
 double scale_error(const Rig& truth, const BundleProblem& found) {
-  Random random(1);
-  Eigen::Matrix3Xd a(3, 100);
-  Eigen::Matrix3Xd b(3, 100);
-  for (Eigen::Index i = 0; i < a.cols(); ++i) {
-    a.col(i) << random.uniform(-90, 90), random.uniform(-90, 90), random.uniform(-90, 90);
-    Track track;
-    for (std::size_t d = 0; d < device_count(truth); ++d)
-      track.views.push_back({d, *device_at(truth, d).project(a.col(i)), 1});
-    b.col(i) = triangulate(found, track, 0.01).value_or(Vec3::Constant(1e6));
-  }
+  const auto [a, b] = sample::points_of_both(truth, found);
   return fit_similarity(a, b, true).block<3, 1>(0, 0).norm() - 1;
 }
 

@@ -2,6 +2,7 @@
 
 // What calibration takes in, for tests and benchmarks, made without images.
 
+#include <utility>
 #include <vector>
 
 #include "pencilscan/bundle/sample_tracks.h"
@@ -56,9 +57,9 @@ inline CalibrationInput input_of(const Rig& truth, std::vector<Track> tracks, bo
   return input;
 }
 
-/// Distances of projections of points in the volume, median, px. Free of gauge: the similarity that
-/// takes the points to where the found rig measures them comes first.
-inline double projection_error(const Rig& truth, const BundleProblem& found) {
+/// Points in the volume, and where the found rig measures them, 3 x 100 each.
+inline std::pair<Eigen::Matrix3Xd, Eigen::Matrix3Xd> points_of_both(const Rig& truth,
+                                                                    const BundleProblem& found) {
   Random random(1);
   Eigen::Matrix3Xd a(3, 100);
   Eigen::Matrix3Xd b(3, 100);
@@ -69,6 +70,13 @@ inline double projection_error(const Rig& truth, const BundleProblem& found) {
       track.views.push_back({d, *device_at(truth, d).project(a.col(i)), 1});
     b.col(i) = triangulate(found, track, 0.01).value_or(Vec3::Constant(1e6));
   }
+  return {a, b};
+}
+
+/// Distances of projections of points in the volume, median, px. Free of gauge: the similarity that
+/// takes the points to where the found rig measures them comes first.
+inline double projection_error(const Rig& truth, const BundleProblem& found) {
+  const auto [a, b] = points_of_both(truth, found);
   const Eigen::Matrix4d S = fit_similarity(a, b, true);
   std::vector<double> errors;
   for (Eigen::Index i = 0; i < a.cols(); ++i) {

@@ -10,6 +10,7 @@
 #include "pencilscan/core/random.h"
 #include "pencilscan/detection/curve_rendering.h"
 #include "pencilscan/labeling/two_projector_scene.h"
+#include "pencilscan/points/pixel_lattice.h"
 #include "pencilscan/points/settle.h"
 #include "pencilscan/points/triangulate.h"
 
@@ -507,8 +508,7 @@ TEST_F(LabeledScene, CurveOfAWallKeepsItsNameBesideTheObject) {
 TEST_F(LabeledScene, FewerPointsAreThoseOfTheLatticeInOrder) {
   const std::vector<MeasuredPoint> all = points();
   const auto place = [](const MeasuredPoint& p) {
-    const auto pixel = [](float x) { return static_cast<int>(x + 1024 + 0.5F); };
-    return std::tuple(p.projector, p.pattern, p.line, pixel(p.v), pixel(p.u));
+    return std::tuple(p.projector, p.pattern, p.line, pixel_number(p.v), pixel_number(p.u));
   };
   for (std::size_t i = 1; i < all.size(); ++i) ASSERT_LT(place(all[i - 1]), place(all[i]));
   TriangulationOptions options;
