@@ -117,7 +117,7 @@ TEST_F(Program, RigRulesNameFieldAndValue) {
   expect_bad_rig("\"unit\": \"mm\"", "\"unit\": \"mm\", \"units\": 1", "units = 1: unknown key");
   expect_bad_rig("\"unit\": \"mm\",", "", "unit: this key is missing");
   expect_bad_rig("2300.0", "NaN", "must be JSON (which has no NaN or Infinity)");
-  expect_bad_rig("2300.0", "1e999", "must be JSON");
+  expect_bad_rig("2300.0", "1e999", "K: must be finite");
   expect_bad_rig("2300.0", "-1", "cameras[0].K[0][0] = -1: must be > 0");
   expect_bad_rig("\"R\": [[", "\"R\": [[7, 0, 0], [", "cameras[0].R");
   expect_bad_rig("\"cam1\"", "\"cam0\"", "cameras[1].name = \"cam0\": names must differ");

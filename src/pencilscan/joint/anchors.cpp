@@ -21,7 +21,9 @@ const PieceLabel* decided(const LabelledPieces& pieces, const std::vector<Decisi
   return label < 0 ? nullptr : &pieces.labels[p][static_cast<std::size_t>(label)];
 }
 
-/// Per piece, 1 where a crossing bears its line out: by itself, or in a pair (held_pieces()).
+/// Per piece, 1 where a crossing bears its line out: by itself, or in a pair (held_pieces()). Lines
+/// of a room go on where the object's end, and give chance more of them to choose from: without a
+/// room, pairs are as good as others.
 struct Crossed {
   std::vector<char> is_crossed;
   std::vector<char> is_paired;
@@ -43,7 +45,8 @@ Crossed crossed_by_lines(const LabelledPieces& pieces, const JointOptions& optio
   }
   Crossed crossed{std::vector<char>(decisions.size(), 0), std::vector<char>(decisions.size(), 0)};
   for (const PieceCrossing* x : agreeing) {
-    const bool is_pair = agrees_with[curve_of(pieces.graph, x->a)].size() == 1 &&
+    const bool is_pair = pieces.shows_room &&
+                         agrees_with[curve_of(pieces.graph, x->a)].size() == 1 &&
                          agrees_with[curve_of(pieces.graph, x->b)].size() == 1;
     std::vector<char>& by = is_pair ? crossed.is_paired : crossed.is_crossed;
     for (const int p : {x->a, x->b}) by[static_cast<std::size_t>(p)] = 1;

@@ -11,7 +11,8 @@ namespace pencilscan {
 
 /// Which pieces crossings hold; 1: held. `linked`: per piece, the pieces that its line follows
 /// from, on its own curve and beside it. `is_crossed`: per piece, 1 where a crossing bears its line
-/// out. `is_paired`: per piece, 1 where a crossing does so whose two curves agree with no other.
+/// out. `is_paired`: per piece, 1 where a crossing does so whose two curves agree with no other
+/// (before a room).
 /// Each of them may have chosen the line that meets the other's, among all of its colours.
 ///   1. A crossed piece is held.
 ///   2. A piece is held where links along its own curve lead to a crossed piece.

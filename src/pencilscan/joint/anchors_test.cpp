@@ -138,6 +138,7 @@ TEST(Anchors, PairsOfCurvesThatAgreeWithNoOtherDoNotHoldLinesAPeriodOff) {
   // Four curves of one pattern side by side, which may as well show other lines, and two of another
   // pattern. All lie at one depth.
   LabelledPieces pieces = two_readings(6);
+  pieces.shows_room = true;
   for (std::size_t c = 0; c < 6; ++c) {
     for (PieceLabel& label : pieces.labels[c]) {
       label.q = {0, 0, 1};
