@@ -164,8 +164,16 @@ def _as_mesh(mesh: MeshLike) -> Mesh:
 class _Table:
     """Arrays of one length by name, as attributes too."""
 
+    # int32 in the files: views of uint32, copies (to read) of uint16.
+    _int32: tuple = ()
+
     def __init__(self, arrays: dict) -> None:
-        self._arrays = arrays
+        self._arrays = dict(arrays)
+        for name in self._int32:
+            array = self._arrays[name]
+            array = array.view(np.int32) if array.itemsize == 4 else array.astype(np.int32)
+            array.setflags(write=False)
+            self._arrays[name] = array
 
     def __getattr__(self, name: str) -> np.ndarray:
         if name.startswith("_"):  # copies ask for some before there are arrays
@@ -189,16 +197,6 @@ class _Table:
 
     def __repr__(self) -> str:
         return f"<pencilscan.{type(self).__name__}: {len(self)} of {', '.join(self.names)}>"
-
-
-def _typed_as_files(arrays: dict, *names: str) -> dict:
-    """`names` as int32, which the files have: views of uint32, copies (to read) of uint16."""
-    typed = dict(arrays)
-    for name in names:
-        array = typed[name]
-        typed[name] = array.view(np.int32) if array.itemsize == 4 else array.astype(np.int32)
-        typed[name].setflags(write=False)
-    return typed
 
 
 class Points(_Table):
@@ -250,8 +248,7 @@ class Points(_Table):
     green: np.ndarray
     blue: np.ndarray
 
-    def __init__(self, arrays: dict) -> None:
-        super().__init__(_typed_as_files(arrays, "line"))
+    _int32 = ("line",)
 
 
 class Curves(_Table):
@@ -301,8 +298,7 @@ class Curves(_Table):
     green: np.ndarray
     blue: np.ndarray
 
-    def __init__(self, arrays: dict) -> None:
-        super().__init__(_typed_as_files(arrays, "curve", "line"))
+    _int32 = ("curve", "line")
 
 
 class Crossings(_Table):
@@ -315,8 +311,7 @@ class Crossings(_Table):
     curve_a: np.ndarray
     curve_b: np.ndarray
 
-    def __init__(self, arrays: dict) -> None:
-        super().__init__(_typed_as_files(arrays, "curve_a", "curve_b"))
+    _int32 = ("curve_a", "curve_b")
 
 
 class CameraDepth(NamedTuple):

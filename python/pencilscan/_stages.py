@@ -9,7 +9,7 @@ import numpy as np
 from . import _core
 from ._errors import InputError
 from ._rig import PathLike, Rig, as_pictures, as_rig, check_name, finished
-from ._scan import Crossings, Curves, Progress, Result, _check_threads, _Table, _typed_as_files
+from ._scan import Crossings, Curves, Progress, Result, _check_threads, _Table
 
 
 class GridCurves(_Table):
@@ -37,8 +37,7 @@ class GridCurves(_Table):
     local_id: np.ndarray
     id_probability: np.ndarray
 
-    def __init__(self, arrays: dict) -> None:
-        super().__init__(_typed_as_files(arrays, "curve"))
+    _int32 = ("curve",)
 
 
 class Detection:

@@ -92,11 +92,43 @@ class Judge {
     }
   }
 
-  void judge_pairs() {
-    struct LowPair {
-      const PairGeometry* pair;
-      double share;
+  /// A pair whose correspondences fit no rigid scene, and the share that does.
+  struct LowPair {
+    const PairGeometry* pair;
+    double share;
+  };
+
+  /// A device that none of the others fits, while these fit each other, and that did not just move
+  /// between captures: its place is what wrong codes make of it.
+  void judge_codes(const std::vector<LowPair>& low, const std::vector<const PairGeometry*>& sound,
+                   const std::vector<CaptureMove>& moved) {
+    if (sound.empty()) return;
+    const auto is_of = [](const PairGeometry& pair, std::size_t d) {
+      return pair.camera == d || pair.projector == d;
     };
+    for (std::size_t d = 0; d < result_.placed.size(); ++d) {
+      double most = 0;
+      std::size_t count = 0;
+      for (const LowPair& l : low) {
+        if (!is_of(*l.pair, d)) continue;
+        most = std::max(most, l.share);
+        ++count;
+      }
+      const bool fits_any =
+          std::any_of(sound.begin(), sound.end(), [&](const auto* p) { return is_of(*p, d); });
+      const bool has_moved = std::any_of(moved.begin(), moved.end(),
+                                         [&](const CaptureMove& m) { return m.device == d; });
+      if (count < 2 || fits_any || has_moved) continue;
+      senseless_.insert(d);
+      add(Grade::kUnusable,
+          "the codes of " + name(d) + " make no sense: with none of " + std::to_string(count) +
+              (d < input_.rig.cameras.size() ? " projectors" : " cameras") + " more than " +
+              share_text(most) + " of its correspondences fit a rigid scene",
+          "look at its images: bits may be in the wrong order, or it moved while it was captured");
+    }
+  }
+
+  void judge_pairs() {
     Contradictions contradictions = find_contradictions(input_, result_);
     std::vector<LowPair> low;
     std::vector<const PairGeometry*> sound;
@@ -119,32 +151,7 @@ class Judge {
       else
         low.push_back({&pair, share});
     }
-    // A device that none of the others fits, while these fit each other, and that did not just move
-    // between captures: its place is what wrong codes make of it.
-    const auto is_of = [](const PairGeometry& pair, std::size_t d) {
-      return pair.camera == d || pair.projector == d;
-    };
-    for (std::size_t d = 0; d < result_.placed.size(); ++d) {
-      double most = 0;
-      std::size_t count = 0;
-      for (const LowPair& l : low) {
-        if (!is_of(*l.pair, d)) continue;
-        most = std::max(most, l.share);
-        ++count;
-      }
-      const bool fits_any =
-          std::any_of(sound.begin(), sound.end(), [&](const auto* p) { return is_of(*p, d); });
-      const auto& moved = contradictions.moves.clear;
-      const bool has_moved = std::any_of(moved.begin(), moved.end(),
-                                         [&](const CaptureMove& m) { return m.device == d; });
-      if (count < 2 || fits_any || has_moved || sound.empty()) continue;
-      senseless_.insert(d);
-      add(Grade::kUnusable,
-          "the codes of " + name(d) + " make no sense: with none of " + std::to_string(count) +
-              (d < input_.rig.cameras.size() ? " projectors" : " cameras") + " more than " +
-              share_text(most) + " of its correspondences fit a rigid scene",
-          "look at its images: bits may be in the wrong order, or it moved while it was captured");
-    }
+    judge_codes(low, sound, contradictions.moves.clear);
     if (contradictions.mover && senseless_.contains(*contradictions.mover))
       contradictions.findings.pop_back();
     add_all(contradictions.findings);

@@ -109,14 +109,8 @@ MergedLines::MergedLines(const Camera& camera, std::span<const Curve> curves,
     : curves_(curves),
       runs_(runs),
       unexplained_(unexplained),
-      named_(camera.width, camera.height, 4),
+      named_(places_of_runs(camera, curves, runs, subtracted)),
       predicted_(camera.width, camera.height, 3) {
-  for (std::size_t r = 0; r < runs.size(); ++r) {
-    const auto curve = static_cast<std::size_t>(runs[r].curve);
-    if (subtracted[curve] == 0) continue;
-    for (int i = runs[r].begin; i < runs[r].end; ++i)
-      named_.add(curves[curve].points[static_cast<std::size_t>(i)].position, {r, i});
-  }
   for (const PredictedPoint& p : predicted) predicted_.add(p.position, p);
 }
 
@@ -140,7 +134,7 @@ std::vector<MergedLines::Neighbour> MergedLines::neighbours_of(const Curve& gues
   std::set<std::pair<std::size_t, int>> points;  // of runs and their curves, in order
   for (const CurvePoint& g : guess.points) {
     bool any = false;
-    named_.around(g.position, reach, [&](const NamedPoint& n) {
+    named_.around(g.position, reach, [&](const RunPoint& n) {
       const LabeledRun& run = runs_[n.run];
       const Curve& curve = curves_[static_cast<std::size_t>(run.curve)];
       const CurvePoint& p = curve.points[static_cast<std::size_t>(n.point)];

@@ -5,8 +5,7 @@
 #include <vector>
 
 #include "pencilscan/guided/predicted_lines.h"
-#include "pencilscan/labeling/labeling.h"
-#include "pencilscan/view/places.h"
+#include "pencilscan/guided/run_places.h"
 
 namespace pencilscan {
 
@@ -31,10 +30,6 @@ class MergedLines {
   [[nodiscard]] Fit fit(const Curve& guess, const LineName& name) const;
 
  private:
-  struct NamedPoint {
-    std::size_t run;
-    int point;  ///< of the run's curve
-  };
   /// A stretch of a named curve beside the guess.
   struct Neighbour {
     Curve fitted;    ///< as it is
@@ -48,7 +43,7 @@ class MergedLines {
   std::span<const Curve> curves_;
   std::span<const LabeledRun> runs_;
   std::span<const cv::Mat> unexplained_;
-  Places<NamedPoint> named_;
+  Places<RunPoint> named_;
   Places<PredictedPoint> predicted_;
 };
 

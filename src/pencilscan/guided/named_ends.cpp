@@ -36,14 +36,7 @@ float ContinuedLine::amplitude_within() const {
 
 NamedEnds::NamedEnds(const Camera& camera, std::span<const Curve> curves,
                      std::span<const LabeledRun> runs, const std::vector<char>& subtracted)
-    : curves_(curves), runs_(runs), named_(camera.width, camera.height, 4) {
-  for (std::size_t r = 0; r < runs.size(); ++r) {
-    const auto curve = static_cast<std::size_t>(runs[r].curve);
-    if (subtracted[curve] == 0) continue;
-    for (int i = runs[r].begin; i < runs[r].end; ++i)
-      named_.add(curves[curve].points[static_cast<std::size_t>(i)].position, {r, i});
-  }
-}
+    : curves_(curves), runs_(runs), named_(places_of_runs(camera, curves, runs, subtracted)) {}
 
 /// Points of the curve that shows a line beyond the end of a guess, the nearest first.
 std::vector<CurvePoint> NamedEnds::beyond(const CurvePoint& end, const Vector2f& outward,
@@ -53,8 +46,8 @@ std::vector<CurvePoint> NamedEnds::beyond(const CurvePoint& end, const Vector2f&
   constexpr float kAlong = 4;
   constexpr float kAcross = 1.5F;
   float nearest = kAlong;
-  const NamedPoint* found = nullptr;
-  named_.around(end.position, kAlong, [&](const NamedPoint& n) {
+  const RunPoint* found = nullptr;
+  named_.around(end.position, kAlong, [&](const RunPoint& n) {
     const LabeledRun& run = runs_[n.run];
     if (!(LineName{run.label.pattern, run.label.line} == name)) return;
     const CurvePoint& p =

@@ -3,8 +3,7 @@
 #include <span>
 #include <vector>
 
-#include "pencilscan/labeling/labeling.h"
-#include "pencilscan/view/places.h"
+#include "pencilscan/guided/run_places.h"
 
 namespace pencilscan {
 
@@ -33,18 +32,13 @@ class NamedEnds {
   [[nodiscard]] ContinuedLine continued(Curve guess, const LineName& name, int most) const;
 
  private:
-  struct NamedPoint {
-    std::size_t run;
-    int point;  ///< of the run's curve
-  };
-
   [[nodiscard]] std::vector<CurvePoint> beyond(const CurvePoint& end,
                                                const Eigen::Vector2f& outward, const LineName& name,
                                                int most) const;
 
   std::span<const Curve> curves_;
   std::span<const LabeledRun> runs_;
-  Places<NamedPoint> named_;
+  Places<RunPoint> named_;
 };
 
 }  // namespace pencilscan

@@ -40,6 +40,15 @@ class Watch : public ::testing::Test {
       row.device_crossing_expected_px.assign(6, kUnknownFigure);
     }
   }
+  void let_crossings_say_shifts() {
+    Random random(3);
+    for (FrameRow& row : rows_) {
+      for (CameraRow& camera : row.cameras) {
+        camera.shift_x_px = random.normal(0, 0.02);
+        camera.shift_y_px = random.normal(0, 0.02);
+      }
+    }
+  }
   WatchReport watch() {
     find_device_light(rows_, devices_);
     return watch_sequence(rows_, devices_);
@@ -157,13 +166,7 @@ TEST_F(Watch, ALampOfThreeFramesEnds) {
 }
 
 TEST_F(Watch, ACameraThatIsPutBackSoonIsBack) {
-  Random random(3);
-  for (FrameRow& row : rows_) {
-    for (CameraRow& camera : row.cameras) {
-      camera.shift_x_px = random.normal(0, 0.02);
-      camera.shift_y_px = random.normal(0, 0.02);
-    }
-  }
+  let_crossings_say_shifts();
   for (std::size_t k = 30; k < 34; ++k) {
     rows_[k].cameras[1].shift_x_px += 0.5;
     rows_[k].cameras[1].shift_y_px -= 0.5;
@@ -227,13 +230,7 @@ TEST_F(Watch, WhatGoesWithAProjectorIsNoEventThatOutlastsIt) {
 
 // Names are those of other lines: the shift that these few meet with is of no line.
 TEST_F(Watch, WhatFramesSayOfACameraIsSaidOnce) {
-  Random random(3);
-  for (FrameRow& row : rows_) {
-    for (CameraRow& camera : row.cameras) {
-      camera.shift_x_px = random.normal(0, 0.02);
-      camera.shift_y_px = random.normal(0, 0.02);
-    }
-  }
+  let_crossings_say_shifts();
   for (std::size_t k = 150; k < 180; ++k) {
     rows_[k].device_crossing_px[2] += 0.5;
     if (k >= 160) rows_[k].cameras[2].shift_y_px -= 0.3;

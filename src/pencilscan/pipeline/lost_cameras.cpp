@@ -49,23 +49,12 @@ class SeenCurves {
   SeenCurves(const Camera& camera, double margin_px)
       : width_(camera.width), height_(camera.height), margin_(static_cast<int>(margin_px)) {}
 
-  void add_layer(const GridGraph& graph, int family, std::size_t colors) {
-    std::vector<std::uint8_t>& layer =
-        layers_.emplace_back(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_));
-    for (const Curve& curve : graph.curves) {
-      if (curve.family != family) continue;
-      for (std::size_t i = 0; i < curve.points.size(); ++i) {
-        const float* code = curve.code.data() + i * colors;
-        const auto best = std::max_element(code, code + colors) - code;
-        const Eigen::Vector2f at = curve.points[i].position;
-        paint(static_cast<int>(std::lround(at.x())), static_cast<int>(std::lround(at.y())),
-              bit_of_color(best), layer);
-        points_.push_back(curve.points[i]);
-        places_.push_back(place_of(at.cast<double>(), layers_.size() - 1, bit_of_color(best)));
-      }
-    }
+  /// The camera's curves in a frame, a layer per family.
+  void add_frame(const GridGraph& graph, const std::vector<ColorFamily>& families) {
+    for (std::size_t k = 0; k < families.size(); ++k)
+      add_layer(graph, static_cast<int>(k), families[k].colors.size());
   }
-  /// When all layers are there.
+  /// When all frames are there.
   void sort() { grid_.emplace(places_, margin_); }
   [[nodiscard]] bool shows(const Vec2& pixel, const PlaceOfLine& place) const {
     const double x = pixel.x() + 0.5;
@@ -91,6 +80,22 @@ class SeenCurves {
   [[nodiscard]] static bool tells(int /*axis*/) { return true; }
 
  private:
+  void add_layer(const GridGraph& graph, int family, std::size_t colors) {
+    std::vector<std::uint8_t>& layer =
+        layers_.emplace_back(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_));
+    for (const Curve& curve : graph.curves) {
+      if (curve.family != family) continue;
+      for (std::size_t i = 0; i < curve.points.size(); ++i) {
+        const float* code = curve.code.data() + i * colors;
+        const auto best = std::max_element(code, code + colors) - code;
+        const Eigen::Vector2f at = curve.points[i].position;
+        paint(static_cast<int>(std::lround(at.x())), static_cast<int>(std::lround(at.y())),
+              bit_of_color(best), layer);
+        points_.push_back(curve.points[i]);
+        places_.push_back(place_of(at.cast<double>(), layers_.size() - 1, bit_of_color(best)));
+      }
+    }
+  }
   /// Layers and colours lie farther from each other than nearest() looks: two margins, of which
   /// margin_ is the whole number.
   [[nodiscard]] Vec3 place_of(const Vec2& pixel, std::size_t layer, std::uint8_t color) const {
@@ -183,16 +188,6 @@ std::optional<FoundCamera> found_pose(const PoseSearch<SeenCurves>& search) {
 
 double margin_of(const Rig& rig) { return std::max(1.0, kBesideLine * line_spacing(rig)); }
 
-/// The curves of one camera in one frame, by family.
-SeenCurves seen_curves(const Camera& camera, const GridGraph& graph,
-                       const std::vector<ColorFamily>& families, double margin_px) {
-  SeenCurves seen(camera, margin_px);
-  for (std::size_t k = 0; k < families.size(); ++k)
-    seen.add_layer(graph, static_cast<int>(k), families[k].colors.size());
-  seen.sort();
-  return seen;
-}
-
 /// How a camera would have to turn for its curves to lie where the others measured lines.
 std::optional<TurnedCamera> turn_of(const Rig& rig, const SeenCurves& seen,
                                     const std::vector<PlaceOfLine>& places, std::size_t c) {
@@ -264,10 +259,7 @@ std::vector<FoundCamera> found_by_others(const Rig& rig, std::span<const FrameCu
   std::vector<FoundCamera> found;
   for (const std::size_t c : lost) {
     SeenCurves seen(rig.cameras[c], margin_px);
-    for (const FrameCurves& frame : frames) {
-      for (std::size_t k = 0; k < frame.families.size(); ++k)
-        seen.add_layer(frame.graphs[c], static_cast<int>(k), frame.families[k].colors.size());
-    }
+    for (const FrameCurves& frame : frames) seen.add_frame(frame.graphs[c], frame.families);
     seen.sort();
     const PoseSearch<SeenCurves> search(rig.cameras[c], places_of_lines(rig, frames, of_others, c),
                                         seen, margin_px, options);
@@ -350,7 +342,8 @@ std::optional<TurnedCamera> turned_camera(const Rig& rig, const std::vector<Colo
   const std::vector<MeasuredPoint> points = triangulate(rig, graphs, labeling, options);
   std::vector<std::optional<SeenCurves>> seen(cameras);
   parallel_for(cameras, [&](std::size_t c) {
-    seen[c] = seen_curves(rig.cameras[c], graphs[c], families, margin_px);
+    seen[c].emplace(rig.cameras[c], margin_px).add_frame(graphs[c], families);
+    seen[c]->sort();
   });
   // By what all other cameras but one measured.
   const auto turn = [&](std::size_t c, std::size_t without) {
