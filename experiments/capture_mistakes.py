@@ -92,9 +92,9 @@ def mirrored_projector(captures):
     captures.reorder(lambda i, count: {2: 3, 3: 2}.get(i, i), projector="proj1")
 
 
-def rows_first(captures):
+def rows_first(captures, **which):
     order = [0, 1, *range(2 + 2 * COLUMN_BITS, 2 + 2 * (COLUMN_BITS + ROW_BITS)), *range(2, 2 + 2 * COLUMN_BITS)]
-    captures.reorder(lambda i, count: order[i])
+    captures.reorder(lambda i, count: order[i], **which)
 
 
 def scaled_k(factor):
@@ -114,6 +114,8 @@ MISTAKES = {
     "each picture is one late": lambda c: c.reorder(lambda i, count: max(i - 1, 0)),
     "black before white": lambda c: c.reorder(lambda i, count: 1 - i if i < 2 else i),
     "rows before columns": rows_first,
+    "rows before columns in one capture": lambda c: rows_first(c, capture=1),
+    "two bits of a projector exchanged": lambda c: c.reorder(lambda i, n: {6: 8, 7: 9, 8: 6, 9: 7}.get(i, i), projector="proj1"),
     "one pair is one late from picture 20 on": lambda c: c.reorder(lambda i, n: i - (i > 20), capture=1, projector="proj1",
                                                                    camera="cam1"),
     "two cameras' folders exchanged in one capture": lambda c: c.exchange({"camera": "cam0"}, {"camera": "cam1"}, 1),

@@ -135,6 +135,6 @@ def judge(
 ) -> str: ...
 def calibrate(
     devices_path: Optional[bytes], devices_text: str, captures: list[bytes],
-    known: Optional[tuple[str, str, float]], board: str, max_tracks: int, seed: int,
-    threads: int, progress: Progress,
+    known: Optional[tuple[str, str, float]], board: str, focal_tolerance: Optional[float],
+    center_tolerance: Optional[float], max_tracks: int, seed: int, threads: int, progress: Progress,
 ) -> tuple[Rig, str, list[str], str, str]: ...

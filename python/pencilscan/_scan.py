@@ -644,6 +644,8 @@ def calibrate(
     *,
     known_distance: Optional[tuple[str, str, float]] = None,
     board: str = "",
+    focal_tolerance: Optional[float] = None,
+    center_tolerance: Optional[float] = None,
     max_tracks: int = 0,
     seed: int = 1,
     threads: int = 0,
@@ -662,6 +664,9 @@ def calibrate(
         board the rig has no scale.
     board
         In the captures: "chessboard:9x7:75" or "charuco:10x8:75:56:DICT_5X5_100".
+    focal_tolerance, center_tolerance
+        How far off given focal lengths may be, one standard deviation in per cent (0: they are exact),
+        and given principal points, px; None: the program's default.
     max_tracks
         Surface points to use at most; 0: the program's default.
     seed
@@ -689,7 +694,7 @@ def calibrate(
     try:
         core, verdict, reasons, figures, report = _core.calibrate(
             path, text, [path_of(folder) for folder in captures], known_distance, board,
-            max_tracks, seed, threads, progress,
+            focal_tolerance, center_tolerance, max_tracks, seed, threads, progress,
         )
     except InputError as error:
         file = "options" if error.file == "command line" else _argument_names(error.file)

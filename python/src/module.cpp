@@ -286,12 +286,15 @@ void add_calibration(py::module_& module) {
                              const std::vector<std::string>& captures,
                              const std::optional<std::tuple<std::string, std::string, double>>&
                                  known,
-                             const std::string& board, std::size_t max_tracks, std::uint64_t seed,
-                             int threads, const py::object& progress) {
+                             const std::string& board, std::optional<double> focal_tolerance,
+                             std::optional<double> center_tolerance, std::size_t max_tracks,
+                             std::uint64_t seed, int threads, const py::object& progress) {
     RigCalibrationOptions options;
     if (known)
       options.known_distance = {{std::get<0>(*known), std::get<1>(*known)}, std::get<2>(*known)};
     options.board = board;
+    options.focal_tolerance = focal_tolerance;
+    options.center_tolerance = center_tolerance;
     options.max_tracks = max_tracks;
     options.seed = seed;
     options.progress = listener(progress);

@@ -529,6 +529,10 @@ class PackageTest(unittest.TestCase):
         for options in ({"seed": -1}, {"max_tracks": -1}, {"seed": 1.5}):
             self.assertIn("whole number", str(self.complaint(
                 lambda: ps.calibrate("captures", self.scene.rig, **options))), options)
+        for option, value in (("focal_tolerance", 101), ("center_tolerance", np.nan)):
+            error = self.complaint(
+                lambda: ps.calibrate("captures", self.scene.rig, **{option: value}))
+            self.assertEqual((error.file, error.field), ("options", option))
         self.assertIn("whole number", str(self.complaint(
             lambda: ps.evaluate(ball, self.scene.rig, self.scene.result, seed=-1))))
 
@@ -586,7 +590,8 @@ class PackageTest(unittest.TestCase):
         run("calibrate", "--captures", folder / "scene" / "captures", "--devices",
             folder / "rig.json", "--out", folder / "calibrated.json")
         stages: list = []
-        found = ps.calibrate(folder / "scene" / "captures", rig,
+        captures = folder / "scene" / "captures"
+        found = ps.calibrate(captures, rig,
                              progress=lambda stage, done: stages.append(stage))
         self.assertEqual((folder / "calibrated.json").read_text(), found._core.text())
         self.assertEqual(found.verdict, "good")
@@ -595,9 +600,12 @@ class PackageTest(unittest.TestCase):
             self.assertEqual((again.verdict, again.reasons, again.figures, again.report),
                              (found.verdict, found.reasons, found.figures, found.report))
         self.assertLess(found.figures["rms_px"], 0.2)
+        # K that is stated without a tolerance is kept to the last digit.
+        exact = ps.calibrate(captures, rig, focal_tolerance=0, center_tolerance=0)
+        self.assertEqual([camera["K"] for camera in exact.to_dict()["cameras"]],
+                         [camera["K"] for camera in rig.to_dict()["cameras"]])
         self.assertIn("decoding", stages)
         self.assertIsInstance(found, ps.Rig)
-        captures = folder / "scene" / "captures"
         error = self.complaint(lambda: ps.calibrate(captures, rig, board="chess"))
         self.assertEqual((error.file, error.field, error.value), ("options", "board", "chess"))
         self.assertEqual(self.complaint(lambda: ps.calibrate(folder / "no", rig)).file, "captures")

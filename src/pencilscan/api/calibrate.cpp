@@ -5,6 +5,7 @@
 #include "pencilscan/api/run_stages.h"
 #include "pencilscan/calibration/from_captures.h"
 #include "pencilscan/core/error.h"
+#include "pencilscan/core/formatted.h"
 #include "pencilscan/io/json_text.h"
 #include "pencilscan/rig/device_list.h"
 
@@ -15,6 +16,15 @@ std::size_t device_named(const Rig& rig, const std::string& name) {
   for (std::size_t d = 0; d < device_count(rig); ++d)
     if (device_at(rig, d).name == name) return d;
   throw InputError("options", "known_distance", name, "must be the name of a device");
+}
+
+/// The default where nothing is stated. InputError beyond what the command takes.
+double tolerance(const char* name, std::optional<double> stated, double most, double otherwise) {
+  if (!stated) return otherwise;
+  if (!(*stated >= 0 && *stated <= most))
+    throw InputError("options", name, formatted(*stated, "%g"),
+                     "must be between 0 and " + formatted(most, "%g"));
+  return *stated;
 }
 
 }  // namespace
@@ -34,6 +44,10 @@ CalibratedRig calibrate_rig(const UncalibratedRig& devices,
   }
   of_captures.board = options.board;
   if (options.max_tracks > 0) of_captures.max_tracks = options.max_tracks;
+  const GivenTolerance usual;
+  of_captures.tolerance = {
+      tolerance("focal_tolerance", options.focal_tolerance, 100, 100 * usual.focal) / 100,
+      tolerance("center_tolerance", options.center_tolerance, 10000, usual.center_px)};
   of_captures.seed = options.seed;
   CalibratedRig result;
   constexpr std::array<std::string_view, 2> kStages = {"calibrating", "judging"};

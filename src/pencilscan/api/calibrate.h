@@ -21,6 +21,11 @@ struct DeviceDistance {
 struct RigCalibrationOptions {
   std::optional<DeviceDistance> known_distance;  ///< without it or a board: a rig without scale
   std::string board;  ///< in the captures: "chessboard:9x7:75" or "charuco:10x8:75:56:DICT_5X5_100"
+  /// How far off given focal lengths may be, one standard deviation in per cent, 0 to 100 (0: they
+  /// are exact), and given principal points, px, 0 to 10000; none: as `pencilscan calibrate` has
+  /// it.
+  std::optional<double> focal_tolerance;
+  std::optional<double> center_tolerance;
   std::size_t max_tracks = 0;  ///< surface points to use at most; 0: the default
   std::uint64_t seed = 1;
   StageListener progress;

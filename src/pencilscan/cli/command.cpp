@@ -30,6 +30,23 @@ bool may_hold_figures(const std::filesystem::path& path) {
   return json.is_object() && !json.contains("format");
 }
 
+/// The figures would replace, or be replaced by, what another option of the command names.
+void check_own_file(const CLI::App& command, const std::string& path) {
+  if (path.empty()) return;
+  const auto place_of = [](const std::filesystem::path& named) {
+    std::error_code ignored;
+    return std::filesystem::weakly_canonical(std::filesystem::absolute(named, ignored), ignored);
+  };
+  for (const CLI::Option* option : command.get_options()) {
+    if (option->check_lname("json") || option->get_items_expected_max() == 0) continue;
+    for (const std::string& value : option->results()) {
+      if (place_of(value) != place_of(path)) continue;
+      throw CLI::ValidationError(
+          "--json", refusal(path, "a file of its own, and " + option->get_name() + " names it"));
+    }
+  }
+}
+
 /// "a.b" for nested objects, so that every figure is one line.
 void flatten(const Json& value, const std::string& prefix,
              std::vector<std::pair<std::string, std::string>>& lines) {
@@ -64,6 +81,8 @@ void add_common_options(CLI::App& command, CommonOptions& options, const std::st
                          path,
                          "a new file or figures of an earlier run, and it holds something else");
       });
+  command.parse_complete_callback(
+      [&command, &options] { check_own_file(command, options.json_path); });
   command.footer("Example:\n  " + example);
 }
 

@@ -134,7 +134,7 @@ TEST(RigCheck, HorizontalLinesAtTheHeightOfTheCamerasAreFlagged) {
   }
 }
 
-TEST(RigCheck, WhereNothingCrossesTwoCamerasDecideAndOneDoesNot) {
+TEST(RigCheck, WhereNothingCrossesTwoCamerasOrACodeDecide) {
   RingOptions options;
   options.cameras = 12;
   options.projectors = 2;
@@ -144,9 +144,16 @@ TEST(RigCheck, WhereNothingCrossesTwoCamerasDecideAndOneDoesNot) {
   EXPECT_TRUE(has_any(many, "no_grid"));
   EXPECT_FALSE(has_severe(many, "no_grid"));
   options.cameras = options.projectors = 1;
-  const RigCheck one = check_rig(make_ring(options));
+  Rig rig = make_ring(options);
+  const RigCheck one = check_rig(rig);
   EXPECT_EQ(one.coverage.two_views, 0);
-  EXPECT_TRUE(has_severe(one, "no_grid"));
+  EXPECT_TRUE(has_any(one, "no_grid"));
+  EXPECT_FALSE(has_severe(one, "no_grid"));
+  LinePattern& lines = rig.projectors[0].patterns[0];
+  lines.colors = {PatternColor("white")};
+  lines.sequence = {0};
+  const RigCheck uncoded = check_rig(rig);
+  EXPECT_TRUE(has_severe(uncoded, "no_grid"));
 }
 
 TEST(RigCheck, LinesOfLittleDepthThatTellOthersApartAreNotSevere) {

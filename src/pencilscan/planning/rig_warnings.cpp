@@ -70,6 +70,10 @@ class Collector {
   [[nodiscard]] const LinePattern& pattern(const LineFamily& family) const {
     return rig_.projectors[family.projector].patterns[family.pattern];
   }
+  /// The colours tell lines apart at all.
+  [[nodiscard]] bool has_code(const LineFamily& family) const {
+    return pattern(family).period() > 1;
+  }
 
   void check_conventions() {
     if (auto warning = pose_unit_warning(rig_)) warn(false, "unit", *std::move(warning));
@@ -166,7 +170,25 @@ class Collector {
     return check_.coverage.seen_and_lit > 0 ? share / check_.coverage.seen_and_lit : 0;
   }
 
+  /// Before one projector nothing tells lines apart but their code, and their order.
+  void check_one_projector(std::size_t p) {
+    const Projector& projector = rig_.projectors[p];
+    bool coded = true;
+    for (std::size_t k = 0; k < projector.patterns.size(); ++k) coded = coded && has_code({p, k});
+    warn(!coded, "no_grid",
+         projector.name +
+             (coded ? " is the only projector: nothing crosses its lines but lines of its own, and "
+                      "the code of their colours alone tells which is which; a second projector "
+                      "makes that surer"
+                    : " is the only projector, and no code tells its lines apart: give them "
+                      "one, or add a projector"));
+  }
+
   void check_grid() {
+    std::vector<std::size_t> at_work;
+    for (std::size_t p = 0; p < rig_.projectors.size(); ++p)
+      if (!rig_.projectors[p].patterns.empty()) at_work.push_back(p);
+    if (at_work.size() == 1) return check_one_projector(at_work.front());
     const double grid = of_lit(check_.coverage.grid);
     if (grid >= kEnoughGrid) return;
     const double two_views = of_lit(check_.coverage.two_views);
@@ -182,11 +204,6 @@ class Collector {
              "; mix directions of lines, and let neighbouring projectors overlap");
   }
 
-  /// The colours tell lines apart at all.
-  [[nodiscard]] bool has_code(const LineFamily& family) const {
-    return pattern(family).period() > 1;
-  }
-
   /// Coplanar axes among the pairs that make up the grid, and what is left without them.
   void check_axes() {
     const double grid = of_lit(check_.coverage.grid);
@@ -200,14 +217,13 @@ class Collector {
       // all that there is, or where colours differ.
       if (axes.same_color && !severe) continue;
       if (axes.first.projector == axes.second.projector) {
-        const bool coded = has_code(axes.first) && has_code(axes.second);
-        warn(
-            severe, "coplanar_axes",
-            name(axes.first) + " and " + name(axes.second) +
-                " come from one projector: their crossings say nothing about depth; " +
-                (coded ? "the code of their colours tells lines apart (method joint), and a second "
-                         "projector would add crossings that do"
-                       : "no code tells their lines apart: give them one, or add a projector"));
+        warn(severe, "coplanar_axes",
+             name(axes.first) + " and " + name(axes.second) +
+                 " come from one projector: their crossings say nothing about depth; " +
+                 (has_code(axes.first) && has_code(axes.second)
+                      ? "the code of their colours tells lines apart (method joint), and a second "
+                        "projector would add crossings that do"
+                      : "no code tells their lines apart: give them one, or add a projector"));
         continue;
       }
       warn(severe, "coplanar_axes",
