@@ -84,8 +84,9 @@ def get_requires_for_build_sdist(config_settings=None):
 
 def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):
     name = f"pencilscan-{_version()}-{TAG}.whl"
+    files = _files()  # before the wheel exists: what fails leaves none
     with zipfile.ZipFile(pathlib.Path(wheel_directory) / name, "w", zipfile.ZIP_DEFLATED) as wheel:
-        for path, content in _files().items():
+        for path, content in files.items():
             entry = zipfile.ZipInfo(path, FIXED_TIME)
             entry.compress_type = zipfile.ZIP_DEFLATED
             entry.external_attr = (0o755 if path.endswith(".so") else 0o644) << 16

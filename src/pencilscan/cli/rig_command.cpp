@@ -217,16 +217,25 @@ constexpr const char* kAxesLegend =
     "  crossing  of what shows both: usable, and crossing at a wide angle\n"
     "  parallel  of what shows both: nearly parallel in the image\n";
 
+/// The bytes of a text that take `columns` columns: those that go on a character of UTF-8 take
+/// none.
+int width_of(const std::string& text, int columns) {
+  return columns + static_cast<int>(std::count_if(text.begin(), text.end(), [](char c) {
+           return (static_cast<unsigned char>(c) & 0xC0U) == 0x80U;
+         }));
+}
+
 void print_tables(const Rig& rig, const RigCheck& check) {
   std::printf("What each camera sees of each projector's lines\n");
   std::printf("%-10s %-12s %7s %7s %8s %8s %8s\n", "camera", "projector", "shared", "usable",
               "depth s", "px/mm", "lines px");
   for (const PairCheck& pair : check.pairs) {
     if (pair.shared == 0) continue;
-    std::printf("%-10s %-12s %7zu %6.0f%% %8.2f %8.2f %8.1f\n",
-                rig.cameras[pair.camera].name.c_str(), family_name(rig, pair.family).c_str(),
-                pair.shared, 100 * pair.usable_share, pair.sensitivity_median,
-                pair.px_per_mm_median, pair.spacing_median_px);
+    const std::string& camera = rig.cameras[pair.camera].name;
+    const std::string family = family_name(rig, pair.family);
+    std::printf("%-*s %-*s %7zu %6.0f%% %8.2f %8.2f %8.1f\n", width_of(camera, 10), camera.c_str(),
+                width_of(family, 12), family.c_str(), pair.shared, 100 * pair.usable_share,
+                pair.sensitivity_median, pair.px_per_mm_median, pair.spacing_median_px);
   }
   std::printf("%s", kPairLegend);
   std::printf("\nHow the lines of two projectors meet in the images\n");
@@ -234,11 +243,12 @@ void print_tables(const Rig& rig, const RigCheck& check) {
               "crossing", "parallel");
   for (const AxesCheck& axes : check.axes) {
     if (axes.shared == 0) continue;
-    std::printf("%-12s %-12s %7.1f\u00b0 %8.0f %8.3f %8.0f%% %8.0f%%%s\n",
-                family_name(rig, axes.first).c_str(), family_name(rig, axes.second).c_str(),
-                axes.angle_rad / kDegree, axes.distance_mm, axes.skewness,
-                100 * axes.crossing_share, 100 * axes.parallel_share,
-                axes.same_color ? "  same colour" : "");
+    const std::string first = family_name(rig, axes.first);
+    const std::string second = family_name(rig, axes.second);
+    std::printf("%-*s %-*s %7.1f\u00b0 %8.0f %8.3f %8.0f%% %8.0f%%%s\n", width_of(first, 12),
+                first.c_str(), width_of(second, 12), second.c_str(), axes.angle_rad / kDegree,
+                axes.distance_mm, axes.skewness, 100 * axes.crossing_share,
+                100 * axes.parallel_share, axes.same_color ? "  same colour" : "");
   }
   std::printf("%s\n", kAxesLegend);
   std::fflush(stdout);

@@ -258,8 +258,8 @@ void tell_what_is_lost(const ExportCommand& command, const Rig& rig) {
   for (const Projector& p : rig.projectors)
     if (!p.name.starts_with("proj") &&
         (!is_stereo || std::count(command.stereo.begin(), command.stereo.end(), p.name) > 0))
-      note("the files do not say that " + p.name + " is a projector: give rig import --projector " +
-           p.name);
+      note("the files do not say that " + p.name +
+           " is a projector: give rig import --projector '" + p.name + "'");
 }
 
 void run_export(const ExportCommand& command) {

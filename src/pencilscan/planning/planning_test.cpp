@@ -116,6 +116,12 @@ TEST(RigCheck, DefaultRingHasNoWarning) {
   EXPECT_LT(check.coverage.ambiguous, 0.1);
 }
 
+TEST(RigCheck, ColorsOfACodeThatAreOneHueAreFlagged) {
+  Rig rig = make_ring();
+  rig.projectors[1].patterns[0].colors = {PatternColor(Rgb{0, 0, 1}), PatternColor(Rgb{0, 0, 0.5})};
+  EXPECT_TRUE(has_severe(check_rig(rig), "equal_colors"));
+}
+
 TEST(RigCheck, HorizontalLinesAtTheHeightOfTheCamerasAreFlagged) {
   const RigCheck check = check_rig(make_ring(one_height()));
   EXPECT_TRUE(has_severe(check, "no_depth"));

@@ -87,6 +87,27 @@ class Collector {
       if (projector.patterns.empty()) {
         warn(false, "no_pattern", projector.name + " has no pattern: it measures nothing");
       }
+      for (const LinePattern& lines : projector.patterns) check_colors(projector, lines);
+    }
+  }
+
+  /// Colours of one code that are the same light, or one light at two levels: the picture knows no
+  /// level, since surfaces differ in albedo.
+  void check_colors(const Projector& projector, const LinePattern& lines) {
+    const auto direction = [](const PatternColor& color) {
+      const Rgb& light = color.light();
+      return Vec3(light[0], light[1], light[2]).normalized();
+    };
+    constexpr double kOneDirection = 1e-3;  // as numbers of three digits state it
+    for (std::size_t b = 0; b < lines.colors.size(); ++b) {
+      for (std::size_t a = 0; a < b; ++a) {
+        if ((direction(lines.colors[a]) - direction(lines.colors[b])).norm() > kOneDirection)
+          continue;
+        return warn(true, "equal_colors",
+                    "the colours " + lines.colors[a].text() + " and " + lines.colors[b].text() +
+                        " of " + projector.name +
+                        " are one hue: the code says nothing where it needs both to be told apart");
+      }
     }
   }
 

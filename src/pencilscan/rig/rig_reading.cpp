@@ -1,3 +1,4 @@
+#include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -49,9 +50,12 @@ Mat3 parse_rotation(const JsonField& field) {
   return R;
 }
 
-/// The name becomes a file or folder name.
+/// The name becomes a file or folder name, with endings such as "_raw.png" behind it: file systems
+/// take 255 bytes.
 std::string parse_name(const JsonField& field) {
   std::string name = field.text();
+  constexpr std::size_t kMostBytes = 200;
+  if (name.size() > kMostBytes) field.fail("must have at most 200 bytes: files are named after it");
   const bool usable = !name.empty() && name != "." && name != ".." &&
                       std::none_of(name.begin(), name.end(), [](char c) {
                         return c == '/' || c == '\\' || static_cast<unsigned char>(c) < 0x20;
@@ -252,6 +256,14 @@ Projector parse_projector(const JsonField& field, GivenCalibration* given) {
   return projector;
 }
 
+/// Camera RGB = matrix * projector RGB, solved for the projector's.
+Mat3 parse_color_matrix(const JsonField& field) {
+  const Mat3 matrix = field.matrix3();
+  if (!matrix.fullPivLu().isInvertible())
+    field.fail("must be invertible: it takes different colours for one");
+  return matrix;
+}
+
 Camera parse_camera(const JsonField& field, const std::vector<Projector>& projectors,
                     GivenCalibration* given) {
   check_device_keys(
@@ -281,14 +293,14 @@ Camera parse_camera(const JsonField& field, const std::vector<Projector>& projec
   const JsonField matrix = field.at("color_matrix");
   if (!matrix.is_object()) {
     if (!matrix.is_array()) matrix.fail("must be a 3x3 matrix or an object by projector name");
-    camera.color_matrix = matrix.matrix3();
+    camera.color_matrix = parse_color_matrix(matrix);
     return camera;
   }
   for (const auto& [name, entry] : matrix.members()) {
     const bool known = std::any_of(projectors.begin(), projectors.end(),
                                    [&, &of = name](const Projector& p) { return p.name == of; });
     if (!known) entry.fail("there is no projector of this name");
-    camera.color_matrix_by_projector[name] = entry.matrix3();
+    camera.color_matrix_by_projector[name] = parse_color_matrix(entry);
   }
   return camera;
 }

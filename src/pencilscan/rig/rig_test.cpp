@@ -326,6 +326,9 @@ TEST_F(RigFile, OptionalCameraKeysAreChecked) {
   EXPECT_EQ(camera_error("black_level", -0.1), "cameras[0].black_level = -0.1: must be in [0, 1)");
   EXPECT_THAT(camera_error("role", "x"), HasSubstr("cameras[0].role = \"x\""));
   EXPECT_THAT(camera_error("color_matrix", {{1, 0}, {0, 1}}), HasSubstr("must be a list of 3"));
+  EXPECT_THAT(camera_error("color_matrix", {{1, 0, 0}, {0, 1, 0}, {1, 1, 0}}),
+              HasSubstr("must be invertible"));
+  EXPECT_THAT(camera_error("name", std::string(201, 'x')), HasSubstr("at most 200 bytes"));
   EXPECT_THAT(camera_error("color_matrix", {{"nobody", 1}}),
               HasSubstr("color_matrix.nobody = 1: there is no projector of this name"));
   EXPECT_THAT(error_after([](auto& j) { j["volume"]["radius"] = 0; }),
