@@ -60,11 +60,16 @@ TEST(StatedFloor, LeavesTheObjectAloneWithoutFlapsBesideIt) {
     if (stated == 1) rig.floor = Floor{{0, 0, kFloorHeight}, Vec3::UnitZ()};
     const FrameResult result = reconstruct_frame(rig, frame);
     for (const MeasuredPoint& p : result.points.points) points[stated].add(position_of(p));
+    EXPECT_EQ(result.points.floor.has_value(), stated == 0);
+    if (const auto& found = result.points.floor) {
+      EXPECT_NEAR(found->floor.height(Vec3::Zero()), -kFloorHeight, 0.5);
+    }
     for (const Vec3& x : result.shape.surface.measured.vertices) surface[stated].add(x);
     for (const Vec3& x : result.shape.surface.mesh.vertices)
       lowest[stated] = std::min(lowest[stated], x.z());
   }
-  // Without a word of the floor it is measured like the ball.
+  // Without a word of the floor it is found, its lines have their names, and it is measured like
+  // the ball.
   EXPECT_GT(points[0].on_floor, points[0].on_ball / 50);
   EXPECT_GT(surface[0].on_floor, surface[0].on_ball / 20);
   EXPECT_EQ(points[1].on_floor, 0U);

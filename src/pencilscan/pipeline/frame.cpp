@@ -59,7 +59,10 @@ std::string why_room_alone(const PointResult& result) {
 
 /// What is done once no line's name changes any more.
 void end_points(const Rig& rig, const Frame& frame, PointResult& result) {
-  if (auto warning = volume_warning(rig, lines_cut_by_volume(rig, result.graphs, result.labeling)))
+  Rig above = rig;  // what a floor's lines do is said of the floor
+  if (result.floor) above.floor = result.floor->floor;
+  if (auto warning =
+          volume_warning(rig, lines_cut_by_volume(above, result.graphs, result.labeling)))
     result.warnings.push_back(std::move(*warning));
   if (auto warning = few_names_warning(result)) result.warnings.push_back(std::move(*warning));
   let_gamma_explain(result.warnings);
@@ -167,6 +170,10 @@ FrameResult in_unit_of(const Rig& rig, FrameResult result) {
   }
   ShapeResult& shape = result.shape;
   scale_lengths(unit, shape);
+  if (auto& found = result.points.floor) {
+    found->floor.point *= unit;
+    result.points.warnings.push_back(floor_warning(*found));
+  }
   if (shape.motion.is_seen) result.points.warnings.push_back(motion_warning(rig, shape.motion));
   // Scaling and files round: what lay apart may lie at one place.
   separate_vertices(shape.surface.mesh);

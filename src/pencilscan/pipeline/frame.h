@@ -14,6 +14,7 @@
 #include "pencilscan/grid/grid_graph.h"
 #include "pencilscan/guided/guided_matching.h"
 #include "pencilscan/labeling/measured_point.h"
+#include "pencilscan/pipeline/found_floor.h"
 #include "pencilscan/pipeline/method.h"
 #include "pencilscan/pipeline/stage_clock.h"
 #include "pencilscan/points/settle.h"
@@ -103,6 +104,7 @@ struct PointResult {
   /// The rig as the frame corrects it, which lines were named with, where the one given is off.
   std::optional<Rig> corrected;
   RigInFrame rig_in_frame = RigInFrame::kAsGiven;
+  std::optional<FoundFloor> floor;  ///< that the object stands on, where the rig states none
   bool is_on_surface = false;    ///< matched once more, and settled, on the dense surface
   std::size_t contradicted = 0;  ///< labelled curve points that the dense surface contradicted
   std::vector<MeasuredPoint> points;

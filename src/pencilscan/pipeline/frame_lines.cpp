@@ -78,6 +78,19 @@ std::optional<Rig> label_lines(const Rig& rig, const Frame& frame, const PointOp
   return std::move(naming.corrected);
 }
 
+/// Names lines once more where they show a floor that the rig does not state: as if it did. Nothing
+/// is left out for it, since it may be what a user wants; only names of lines that a period moves
+/// off it are less likely than those on it.
+void label_with_floor(const Rig& rig, const PointOptions& options, PointResult& result) {
+  const SolutionMethod& method = solution_method(options.method);
+  if (!method.capabilities.corrects_rig || result.corrected) return;
+  result.floor = find_floor(rig, named_places(rig, result.graphs, result.labeling));
+  if (!result.floor) return;
+  Rig with_floor = rig;
+  with_floor.floor = result.floor->floor;
+  result.labeling = method.solve(with_floor, result.families, result.graphs, options.method);
+}
+
 }  // namespace
 
 void forget_camera(std::size_t camera, PointResult& result) {
@@ -110,7 +123,10 @@ PointResult check_pictures(const Rig& rig, const Frame& frame, PointResult curve
 PointResult solve_frame(const Rig& rig, const Frame& frame, PointResult curves,
                         const PointOptions& options, const StageClock& clock) {
   PointResult result = std::move(curves);
-  clock("solution", [&] { result.corrected = label_lines(rig, frame, options, result); });
+  clock("solution", [&] {
+    result.corrected = label_lines(rig, frame, options, result);
+    label_with_floor(rig, options, result);
+  });
   return result;
 }
 

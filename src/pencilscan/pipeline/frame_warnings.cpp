@@ -112,6 +112,30 @@ std::optional<Warning> volume_warning(const Rig& rig, const CutLines& lines) {
                  {{"share", lines.share()}}};
 }
 
+Warning floor_warning(const FoundFloor& found) {
+  const auto [point, normal] = found.floor;
+  const auto list = [](const Vec3& x, const char* format) {
+    return "[" + formatted(x.x(), format) + ", " + formatted(x.y(), format) + ", " +
+           formatted(x.z(), format) + "]";
+  };
+  return {
+      WarningCode::kVolumeCuts,
+      "the object stands on a plane that goes on beyond it, with " +
+          formatted(100 * found.share, "%.0f") +
+          " % of what could be named: its lines were named as lines on it, and it is measured as "
+          "the object is; to leave it out, state \"floor\": {\"point\": " +
+          list(point, "%.6g") + ", \"normal\": " + list(normal, "%.6f") + "}",
+      {},
+      {{"share", found.share},
+       {"sides", found.sides},
+       {"floor_x", point.x()},
+       {"floor_y", point.y()},
+       {"floor_z", point.z()},
+       {"normal_x", normal.x()},
+       {"normal_y", normal.y()},
+       {"normal_z", normal.z()}}};
+}
+
 std::optional<Warning> few_names_warning(const PointResult& result) {
   // Another ring's rig, or one with two of the six cameras' names: .3 to 5.5 % (13 frames). Right
   // rigs: 70 % and more (492 frames of drawn and kept-apart rigs), and down to 3 % where one

@@ -30,6 +30,9 @@ namespace pencilscan {
 /// That the volume cuts what was measured.
 [[nodiscard]] std::optional<Warning> volume_warning(const Rig& rig, const CutLines& lines);
 
+/// That the object stands on a plane, and how to state it; lengths in the rig's unit.
+[[nodiscard]] Warning floor_warning(const FoundFloor& found);
+
 /// That hardly any of the lines in the pictures could be named.
 [[nodiscard]] std::optional<Warning> few_names_warning(const PointResult& result);
 
