@@ -105,8 +105,8 @@ struct PointResult {
   std::optional<Rig> corrected;
   RigInFrame rig_in_frame = RigInFrame::kAsGiven;
   std::optional<FoundFloor> floor;  ///< that the object stands on, where the rig states none
-  bool is_on_surface = false;    ///< matched once more, and settled, on the dense surface
-  std::size_t contradicted = 0;  ///< labelled curve points that the dense surface contradicted
+  bool is_on_surface = false;       ///< matched once more, and settled, on the dense surface
+  std::size_t contradicted = 0;     ///< labelled curve points that the dense surface contradicted
   std::vector<MeasuredPoint> points;
   /// Of named lines that the object cannot show: on a stated floor, or outside the volume.
   std::vector<MeasuredPoint> background;
