@@ -52,6 +52,8 @@ const char* to_string(WarningCode code) {
       return "motion";
     case WarningCode::kVolumeCuts:
       return "volume-cuts";
+    case WarningCode::kFloorFound:
+      return "floor-found";
   }
   return "";
 }

@@ -32,6 +32,7 @@ enum class WarningCode {
   kFewNames,        ///< figure "share": of the curve points that got their line
   kMotion,          ///< within the exposure; figures "way_mm", "way_sigma_mm"
   kVolumeCuts,      ///< figure "share": of the named points, those where a line leaves the volume
+  kFloorFound,      ///< figures "floor_x" to "normal_z": a plane that the rig does not state
 };
 
 /// The word for files: "saturated", "rig-is-off" and so on.

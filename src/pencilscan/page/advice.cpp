@@ -19,7 +19,7 @@ struct Known {
 };
 
 /// What to do about warnings, by their code (core/warning.h).
-constexpr std::array<Known, 20> kKnown = {{
+constexpr std::array<Known, 21> kKnown = {{
     {"saturated",
      "Close the aperture or shorten the exposure until the brightest lines stay below "
      "full scale, and capture again."},
@@ -62,6 +62,10 @@ constexpr std::array<Known, 20> kKnown = {{
     {"volume-cuts",
      "Look at where the measured surface ends: if the object goes on there, state a larger volume "
      "in the rig; if that is what it stands on, state its floor."},
+    {"floor-found",
+     "State the floor in the rig, as the warning writes it: it is then left out, and lines close "
+     "to "
+     "it are named by it."},
     {"missing-lines",
      "Look whether the projector shines, and whether its picture is the one that the rig states "
      "(pencilscan pattern writes it)."},

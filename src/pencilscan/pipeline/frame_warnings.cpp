@@ -119,7 +119,7 @@ Warning floor_warning(const FoundFloor& found) {
            formatted(x.z(), format) + "]";
   };
   return {
-      WarningCode::kVolumeCuts,
+      WarningCode::kFloorFound,
       "the object stands on a plane that goes on beyond it, with " +
           formatted(100 * found.share, "%.0f") +
           " % of what could be named: its lines were named as lines on it, and it is measured as "
