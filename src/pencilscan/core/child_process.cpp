@@ -77,6 +77,7 @@ ChildProcess::ChildProcess(const std::vector<std::string>& arguments, const Opti
   if (id_ < 0) throw StageError("no process can be made for " + arguments.front());
   if (id_ == 0) {
     ::prctl(PR_SET_PDEATHSIG, SIGTERM);
+    ::setsid();  // a terminal's Ctrl-C is for its parent, which ends it in order
     if (::getppid() != parent) ::_exit(127);
     ::sigprocmask(SIG_SETMASK, &none, nullptr);
     ::signal(SIGPIPE, SIG_DFL);
@@ -150,9 +151,9 @@ std::optional<int> ChildProcess::wait(Seconds patience) {
 
 void ChildProcess::stop() {
   if (code_ || id_ < 0) return;
-  ::kill(id_, SIGTERM);
+  ::kill(-id_, SIGTERM);  // with what it started itself
   if (wait(kPolite)) return;
-  ::kill(id_, SIGKILL);
+  ::kill(-id_, SIGKILL);
   wait(kPolite);
 }
 

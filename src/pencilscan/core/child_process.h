@@ -10,7 +10,8 @@
 
 namespace pencilscan {
 
-/// Another program, run without a shell. It ends with this object, and with this program.
+/// Another program, run without a shell, in a session of its own: Ctrl-C at a terminal does
+/// not reach it. It ends with this object, and with this program.
 /// Start it from a thread that lives as long: the kernel ends it with the thread that made it.
 class ChildProcess {
  public:

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>
+#include <unistd.h>
 
 #include "pencilscan/core/error.h"
 
@@ -46,6 +47,11 @@ TEST(ChildProcess, AProgramThatIsNotThereIsAFailure) {
   } catch (const StageError& error) {
     EXPECT_THAT(error.what(), HasSubstr("pencilscan-no-such-program cannot be run"));
   }
+}
+
+TEST(ChildProcess, IsOutOfReachOfATerminalsCtrlC) {
+  ChildProcess sleeping({"sleep", "100"});
+  EXPECT_EQ(::getpgid(sleeping.id()), sleeping.id());
 }
 
 TEST(ChildProcess, GetsItsEnvironment) {

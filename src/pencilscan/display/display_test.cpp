@@ -11,6 +11,7 @@
 #include "pencilscan/display/projector_windows.h"
 #include "pencilscan/display/screen_faults.h"
 #include "pencilscan/display/shown_check.h"
+#include "pencilscan/io/file.h"
 #include "pencilscan/io/temporary_folder.h"
 #include "pencilscan/pattern/gray_code.h"
 #include "pencilscan/pattern/solid_color.h"
@@ -151,6 +152,15 @@ TEST(ShownCheck, TellsBlackCoveredAndOther) {
   EXPECT_EQ(compare_shown(scaled, drawn)->kind, "other");
   cv::resize(scaled, scaled, drawn.size());
   EXPECT_EQ(compare_shown(scaled, drawn)->kind, "other");
+}
+
+TEST(DummyScreen, TakesNoNumberOfAnotherServer) {
+  if (!can_display()) GTEST_SKIP() << "built without SDL2 and X";
+  const TemporaryFolder folder("display_numbers");
+  EXPECT_EQ(free_display_number(folder.path()), 0);
+  write_text(folder.path() / ".X11-unix" / "X0", "");  // without a lock
+  write_text(folder.path() / ".X1-lock", "");          // without a socket
+  EXPECT_EQ(free_display_number(folder.path()), 2);
 }
 
 /// Three outputs of different sizes on an X server without hardware.

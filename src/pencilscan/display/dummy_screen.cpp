@@ -8,6 +8,7 @@
 #include <optional>
 #include <random>
 #include <sstream>
+#include <utility>
 
 #include "pencilscan/core/child_process.h"
 #include "pencilscan/core/error.h"
@@ -141,6 +142,18 @@ void lay_out(Display* display, const std::vector<DummyScreen::Output>& outputs) 
 
 }  // namespace
 
+int free_display_number(const fs::path& folder) {
+  int number = 0;
+  const auto taken = [&] {
+    const std::string text = std::to_string(number);
+    std::error_code ignored;  // symlink_status: also of what points nowhere
+    return fs::exists(fs::symlink_status(folder / ".X11-unix" / ("X" + text), ignored)) ||
+           fs::exists(fs::symlink_status(folder / (".X" + text + "-lock"), ignored));
+  };
+  while (taken()) ++number;
+  return number;
+}
+
 struct DummyScreen::State {
   std::unique_ptr<ChildProcess> server;
   std::string display;
@@ -160,19 +173,24 @@ DummyScreen::DummyScreen(const fs::path& folder, const std::vector<Output>& outp
   ChildProcess::Options options;
   options.piped = true;
   options.error_file = (here / "server.txt").string();
-  state_->server = std::make_unique<ChildProcess>(
-      std::vector<std::string>{
-          server_program(), "-displayfd", "1", "-config", (here / "xorg.conf").string(), "-logfile",
-          (here / "server.log").string(), "-auth", state_->authority.string(), "-nolisten", "tcp",
-          "-noreset", "-novtswitch", "-sharevts", "-keeptty"},
-      options);
-  const auto number = state_->server->read_line(kStart);
-  if (!number || number->empty())
-    throw StageError(
-        "an X server without hardware did not start (is xserver-xorg-video-dummy "
-        "installed?); its log is " +
-        (here / "server.log").string());
-  state_->display = ":" + *number;
+  // Somebody else may take the number meanwhile: then there is another one.
+  for (int number = -1; state_->display.empty();) {
+    const int before = std::exchange(number, free_display_number());
+    if (number == before)
+      throw StageError(
+          "an X server without hardware did not start (is xserver-xorg-video-dummy "
+          "installed?); its log is " +
+          (here / "server.log").string());
+    state_->server = std::make_unique<ChildProcess>(
+        std::vector<std::string>{server_program(), ":" + std::to_string(number), "-displayfd", "1",
+                                 "-config", (here / "xorg.conf").string(), "-logfile",
+                                 (here / "server.log").string(), "-auth",
+                                 state_->authority.string(), "-nolisten", "tcp", "-noreset",
+                                 "-novtswitch", "-sharevts", "-keeptty"},
+        options);
+    if (const auto said = state_->server->read_line(kStart); said && !said->empty())
+      state_->display = ":" + *said;
+  }
   enter();
   const std::unique_ptr<Display, int (*)(Display*)> display(XOpenDisplay(state_->display.c_str()),
                                                             XCloseDisplay);

@@ -7,6 +7,11 @@
 
 namespace pencilscan {
 
+/// The least number of a display that nobody has: neither its socket nor its lock is in `folder`.
+/// The server's own choice looks at sockets of its network alone, and takes the file of a server
+/// outside of it.
+[[nodiscard]] int free_display_number(const std::filesystem::path& folder = "/tmp");
+
 /// An X server of its own without hardware (Xorg's driver "dummy"), with as many outputs as asked
 /// for side by side: for tests, and for the virtual laboratory. Ends with this object.
 class DummyScreen {

@@ -45,6 +45,7 @@ struct NightLight::State {};
 NightLight::NightLight(const XScreen&, const DisplayOutput&) { fail(); }
 NightLight::~NightLight() = default;
 
+int free_display_number(const std::filesystem::path&) { fail(); }
 struct DummyScreen::State {};
 DummyScreen::DummyScreen(const std::filesystem::path&, const std::vector<Output>&) { fail(); }
 DummyScreen::~DummyScreen() = default;
