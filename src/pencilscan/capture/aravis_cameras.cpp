@@ -14,6 +14,7 @@
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/formatted.h"
 #include "pencilscan/core/host_clock.h"
+#include "pencilscan/core/stopwatch.h"
 
 namespace pencilscan {
 
@@ -22,6 +23,14 @@ bool has_aravis() { return true; }
 namespace {
 
 constexpr int kAravisBuffers = 16;  ///< pictures that may wait for us: 1.6 s at 10 a second
+/// Between tries to reach a camera that was lost: as long as one waits for a host that is silent.
+constexpr double kReopenEvery = 3;  ///< s
+
+/// Aravis looks for cameras in one thread at a time.
+std::mutex& discovery() {
+  static std::mutex mutex;
+  return mutex;
+}
 
 class AravisCamera final : public CameraDevice {
  public:
@@ -39,6 +48,14 @@ class AravisCamera final : public CameraDevice {
   }
 
  private:
+  /// StageError when it does not answer, or another program holds it.
+  void open();
+  /// Lets the camera go, answering or not.
+  void let_go();
+  /// Opens one that was lost, set and running as it was; StageError when it still cannot be
+  /// reached.
+  void reopen();
+  void begin();
   [[nodiscard]] bool has(const char* feature) {
     Failure failure;
     return arv_camera_is_feature_available(camera_.get(), feature, failure.out()) != 0;
@@ -54,33 +71,75 @@ class AravisCamera final : public CameraDevice {
   void read_layout();
   [[nodiscard]] CameraFrame frame_of(ArvBuffer* buffer) const;
 
-  std::unique_ptr<ArvCamera, Unref> camera_;
+  std::string name_;
+  std::unique_ptr<ArvCamera, Unref> camera_;  ///< null while it is lost and was looked for in vain
   std::unique_ptr<FeatureKeeper> keeper_;
   std::unique_ptr<ArvStream, Unref> stream_;
   CameraInfo info_;
   PixelLayout layout_;
   ArvPixelFormat pixel_format_ = 0;
   std::int64_t utc_minus_host_ = 0;
+  std::optional<CameraSettings> asked_;  ///< of the last configure() that it took
   std::atomic<bool> lost_ = false;
+  std::optional<Stopwatch> since_lost_;  ///< or since it was looked for; empty: nobody was told yet
   bool running_ = false;
 };
 
-AravisCamera::AravisCamera(const std::string& name) {
+void AravisCamera::open() {
   Failure failure;
-  camera_.reset(arv_camera_new(name.c_str(), failure.out()));
+  camera_.reset(arv_camera_new(name_.c_str(), failure.out()));
   if (!camera_)
-    throw StageError("camera " + name + " cannot be opened: " +
+    throw StageError("camera " + name_ + " cannot be opened: " +
                      (failure.failed() ? failure.text() : "it does not answer"));
+  ArvDevice* device = arv_camera_get_device(camera_.get());
+  if (ARV_IS_GV_DEVICE(device) && arv_gv_device_is_controller(ARV_GV_DEVICE(device)) == 0) {
+    camera_.reset();
+    throw StageError("camera " + name_ +
+                     " cannot be opened: another program holds it; close that one, or wait some "
+                     "seconds where it has just ended");
+  }
+  g_signal_connect(device, "control-lost", G_CALLBACK(+[](ArvDevice*, gpointer self) {
+                     static_cast<AravisCamera*>(self)->lost_ = true;
+                   }),
+                   this);
+}
+
+void AravisCamera::let_go() {
+  stream_.reset();
+  if (!camera_) return;
+  g_signal_handlers_disconnect_by_data(arv_camera_get_device(camera_.get()), this);
+  camera_.reset();
+}
+
+void AravisCamera::reopen() {
+  since_lost_ = Stopwatch();
+  let_go();
+  // It may have come back at another address of the network.
+  (void)list_aravis_cameras();
+  {
+    const std::lock_guard lock(discovery());
+    open();
+  }
+  lost_ = false;
+  keeper_->belongs_to(arv_camera_get_device(camera_.get()));
+  try {
+    if (asked_) (void)configure(CameraSettings(*asked_));
+    if (running_) begin();
+  } catch (const std::exception&) {
+    lost_ = true;
+    throw;
+  }
+  since_lost_.reset();
+}
+
+AravisCamera::AravisCamera(const std::string& name) : name_(name) {
+  open();
+  Failure failure;
   info_.address = "aravis:" + name;
   info_.model = text_of(arv_camera_get_vendor_name(camera_.get(), failure.out())) + " ";
   info_.model += text_of(arv_camera_get_model_name(camera_.get(), failure.out()));
   info_.serial = text_of(arv_camera_get_device_serial_number(camera_.get(), failure.out()));
   keeper_ = std::make_unique<FeatureKeeper>(arv_camera_get_device(camera_.get()));
-  g_signal_connect(arv_camera_get_device(camera_.get()), "control-lost",
-                   G_CALLBACK(+[](ArvDevice*, gpointer self) {
-                     static_cast<AravisCamera*>(self)->lost_ = true;
-                   }),
-                   this);
 }
 
 AravisCamera::~AravisCamera() {
@@ -88,8 +147,10 @@ AravisCamera::~AravisCamera() {
     stop();
   } catch (const std::exception&) {  // a camera that is gone has stopped
   }
-  g_signal_handlers_disconnect_by_data(arv_camera_get_device(camera_.get()), this);
-  if (!lost_) keeper_.reset();
+  // A camera that does not answer shall not be asked for every feature in turn.
+  if (lost_) keeper_->leave();
+  keeper_.reset();
+  let_go();
 }
 
 void AravisCamera::switch_off_automatics() {
@@ -179,6 +240,7 @@ void AravisCamera::set_trigger(const CameraSettings& settings) {
 }
 
 CameraSettings AravisCamera::configure(const CameraSettings& settings) {
+  if (lost_) reopen();
   CameraSettings result = settings;
   Failure failure;
   switch_off_automatics();
@@ -196,6 +258,7 @@ CameraSettings AravisCamera::configure(const CameraSettings& settings) {
   // The largest packets that the way to the camera lets through.
   if (arv_camera_is_gv_device(camera_.get()) != 0)
     arv_camera_gv_auto_packet_size(camera_.get(), failure.out());
+  asked_ = settings;
   return result;
 }
 
@@ -211,6 +274,12 @@ void AravisCamera::read_layout() {
 
 void AravisCamera::start() {
   if (running_) return;
+  if (lost_) reopen();
+  begin();
+  running_ = true;
+}
+
+void AravisCamera::begin() {
   read_layout();
   Failure failure;
   stream_.reset(arv_camera_create_stream(camera_.get(), nullptr, nullptr, failure.out()));
@@ -225,7 +294,6 @@ void AravisCamera::start() {
   utc_minus_host_ = utc_minus_host_ns();
   arv_camera_start_acquisition(camera_.get(), failure.out());
   if (failure.failed()) throw StageError(info_.address + ": it does not start: " + failure.text());
-  running_ = true;
 }
 
 void AravisCamera::stop() {
@@ -233,12 +301,12 @@ void AravisCamera::stop() {
   running_ = false;
   Failure failure;
   if (!lost_) arv_camera_stop_acquisition(camera_.get(), failure.out());
-  // A camera that does not answer shall not be asked for every feature in turn.
   if (failure.failed()) lost_ = true;
   stream_.reset();
 }
 
 void AravisCamera::trigger() {
+  if (lost_) return;  // trouble() says so
   Failure failure;
   arv_camera_software_trigger(camera_.get(), failure.out());
   if (failure.failed())
@@ -282,6 +350,16 @@ CameraFrame AravisCamera::frame_of(ArvBuffer* buffer) const {
 }
 
 std::optional<CameraFrame> AravisCamera::next(Seconds patience) {
+  if (lost_ && running_) {
+    // First the news; then it is looked for, which takes a second or some.
+    if (!since_lost_) since_lost_ = Stopwatch();
+    if (since_lost_->seconds() < kReopenEvery) return std::nullopt;
+    try {
+      reopen();
+    } catch (const std::exception&) {  // trouble() says so
+      return std::nullopt;
+    }
+  }
   if (!stream_) return std::nullopt;
   ArvBuffer* buffer = arv_stream_timeout_pop_buffer(
       stream_.get(), static_cast<guint64>(std::max(0.0, patience.count() * 1e6)));
@@ -289,12 +367,6 @@ std::optional<CameraFrame> AravisCamera::next(Seconds patience) {
   CameraFrame frame = frame_of(buffer);
   arv_stream_push_buffer(stream_.get(), buffer);
   return frame;
-}
-
-/// Aravis looks for cameras in one thread at a time.
-std::mutex& discovery() {
-  static std::mutex mutex;
-  return mutex;
 }
 
 }  // namespace

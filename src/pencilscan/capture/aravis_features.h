@@ -48,6 +48,13 @@ class FeatureKeeper {
   ~FeatureKeeper();
   FeatureKeeper(const FeatureKeeper&) = delete;
   FeatureKeeper& operator=(const FeatureKeeper&) = delete;
+  /// The camera was opened anew: what was found at first is put back there.
+  void belongs_to(ArvDevice* device) {
+    device_ = device;
+    gone_ = false;
+  }
+  /// Puts nothing back: it does not answer.
+  void leave() { gone_ = true; }
 
  private:
   struct TriggerValue {

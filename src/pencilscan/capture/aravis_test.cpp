@@ -266,5 +266,38 @@ TEST_F(GigE, APulledCableIsNamed) {
   EXPECT_LT(report.whole, report.frames);
 }
 
+TEST_F(GigE, ACameraThatComesBackIsTakenUpAgain) {
+  add_camera();
+  (void)list_aravis_cameras();
+  const auto live = open_all();
+  live->start();
+  const auto wait_for = [](const std::function<bool()>& what) {
+    const std::int64_t until = host_now_ns() + 20'000'000'000;
+    while (!what() && host_now_ns() < until)
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    return what();
+  };
+  ASSERT_TRUE(wait_for([&] { return live->count(0).whole > 0; }));
+  cameras_.clear();
+  ASSERT_TRUE(wait_for([&] { return !live->group().faults().empty(); }));
+  const std::size_t before = live->count(0).whole;
+  add_camera();
+  EXPECT_TRUE(wait_for([&] { return live->count(0).whole > before + 2; }));
+  EXPECT_TRUE(live->group().faults().empty());
+  EXPECT_EQ(live->latest(0).frame->image.size(), cv::Size(320, 240));  // as it was set
+}
+
+TEST_F(GigE, ACameraOfAnotherProgramIsSaidToBeHeld) {
+  add_camera();
+  (void)list_aravis_cameras();
+  const auto holder = open_aravis_camera("Aravis-Fake-PS0");
+  try {
+    (void)open_aravis_camera("Aravis-Fake-PS0");
+    FAIL();
+  } catch (const StageError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("another program holds it"));
+  }
+}
+
 }  // namespace
 }  // namespace pencilscan

@@ -18,6 +18,22 @@ std::string to_string(PictureStatus status) {
   return "";
 }
 
+std::string trouble_of(const CameraFrame& frame) {
+  if (!frame.remark.empty()) return frame.remark;
+  switch (frame.status) {
+    case PictureStatus::kComplete:
+    case PictureStatus::kLostPackets:
+      return "";
+    case PictureStatus::kAborted:
+      return "the camera or its driver gave pictures up";
+    case PictureStatus::kWrongSize:
+      return "its pictures have another size or pixel format than was agreed";
+    case PictureStatus::kUnreadable:
+      return "its pictures cannot be read";
+  }
+  return "";
+}
+
 std::optional<Trigger> trigger_from_text(const std::string& text) {
   for (const Trigger trigger : {Trigger::kFree, Trigger::kSoftware, Trigger::kWire, Trigger::kPtp})
     if (text == to_string(trigger)) return trigger;

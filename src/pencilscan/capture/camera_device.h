@@ -20,6 +20,9 @@ enum class PictureStatus {
   kUnreadable,   ///< a file that is no picture, a program that failed
 };
 [[nodiscard]] std::string to_string(PictureStatus status);
+struct CameraFrame;
+/// Why it is not complete, as a sentence on its camera; empty for packets that got lost.
+[[nodiscard]] std::string trouble_of(const CameraFrame& frame);
 
 /// One picture of one camera, or the news that there is none.
 struct CameraFrame {
@@ -39,6 +42,8 @@ struct CameraInfo {
   std::string address;  ///< "aravis:Basler-23456789", "v4l2:/dev/video0", "folder:shots"
   std::string model;
   std::string serial;
+  /// Its pictures are files that somebody else makes, when he likes: no network loses them.
+  bool of_files = false;
 };
 
 enum class Trigger {

@@ -234,9 +234,16 @@ void CameraGroup::stop() {
 
 void CameraGroup::trigger() {
   for (auto& member : members_) {
+    {
+      // Triggers that wait for one that is gone would all come at once when it is back.
+      const std::lock_guard lock(member->mutex);
+      if (!member->dead.empty()) continue;
+    }
     member->post([&m = *member] {
       try {
-        if (m.delivering) m.device->trigger();
+        if (!m.delivering) return;
+        m.device->trigger();
+        m.note(m.trouble, "");
       } catch (const std::exception& error) {
         m.note(m.trouble, error.what());
       }

@@ -44,9 +44,8 @@ CameraFrame frame_of_file(const fs::path& path, const CameraSettings& settings) 
   if (settings.width > 0 &&
       (frame.image.cols != settings.width || frame.image.rows != settings.height)) {
     frame.status = PictureStatus::kWrongSize;
-    frame.remark = path.filename().string() + " has " +
-                   size_text(frame.image.cols, frame.image.rows) + " px, not " +
-                   size_text(settings.width, settings.height);
+    frame.remark = "its pictures are " + size_text(frame.image.cols, frame.image.rows) +
+                   ", the rig says " + size_text(settings.width, settings.height);
     frame.image.release();
   }
   return frame;
@@ -57,7 +56,7 @@ class FolderCamera final : public CameraDevice {
   explicit FolderCamera(const fs::path& folder) : folder_(folder) {
     if (!fs::is_directory(folder))
       throw InputError("camera", "folder", folder.string(), "must be a folder");
-    info_ = {"folder:" + folder.string(), "pictures of another program", ""};
+    info_ = {"folder:" + folder.string(), "pictures of another program", "", true};
   }
 
   const CameraInfo& info() const override { return info_; }
@@ -159,7 +158,7 @@ class CommandCamera final : public CameraDevice {
     if (words.empty() || !names_file)
       throw InputError("camera", "command", words.empty() ? "" : words.front(),
                        "must be a program with {file} among its arguments");
-    info_ = {"command:" + words.front(), "pictures of a program", ""};
+    info_ = {"command:" + words.front(), "pictures of a program", "", true};
     fs::create_directories(folder_);
     fs::permissions(folder_, fs::perms::owner_all);
   }
@@ -195,14 +194,16 @@ class CommandCamera final : public CameraDevice {
     const std::int64_t began = host_now_ns();
     ChildProcess program(words);
     const auto code = program.wait(kLongestShot);
+    const bool made = fs::exists(file, ignored);
     CameraFrame frame;
-    if (code == 0) {
+    if (code == 0 && made) {
       frame = frame_of_file(file, settings_);
     } else {
       program.stop();
       frame.status = PictureStatus::kUnreadable;
-      frame.remark = words.front() + (code ? " ended with " + std::to_string(*code)
-                                           : " took longer than half a minute");
+      frame.remark = code ? "its program ended with " + std::to_string(*code) +
+                                (made ? "" : " and made no file")
+                          : "its program took longer than half a minute";
       frame.arrival_ns = host_now_ns();
     }
     frame.timestamp_ns = began;

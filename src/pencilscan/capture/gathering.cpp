@@ -52,6 +52,11 @@ std::int64_t FrameGathering::time_of(std::size_t camera, const CameraFrame& fram
 FrameGathering::Open& FrameGathering::place_for(std::size_t camera, std::int64_t time_ns) {
   Open* nearest = nullptr;
   for (Open& open : open_) {
+    if (options_.still_s > 0) {
+      const auto apart = static_cast<double>(std::abs(time_ns - open.time_ns)) / kNsPerSecond;
+      if (open.heard[camera] == 0 && apart < options_.still_s) return open;
+      continue;
+    }
     if (!together(time_ns, open.time_ns) || open.heard[camera] != 0) continue;
     if (nearest == nullptr ||
         std::abs(time_ns - open.time_ns) < std::abs(time_ns - nearest->time_ns))
@@ -105,6 +110,10 @@ void FrameGathering::add(std::size_t camera, CameraFrame frame) {
   }
   if (frame.status != PictureStatus::kComplete) {
     ++tally.incomplete;
+    if (std::string trouble = trouble_of(frame); !trouble.empty()) {
+      ++tally.unusable;
+      tally.trouble = std::move(trouble);
+    }
     return add_incomplete(camera, frame);
   }
   ++tally.pictures;
@@ -194,7 +203,7 @@ FrameGathering::Spread FrameGathering::spread() const {
 
 std::vector<Fault> FrameGathering::faults(std::int64_t now_ns) const {
   std::vector<Fault> faults;
-  const double silence_s = std::max(kSilence, 5 / options_.rate_hz);
+  const double silence_s = std::max({kSilence, 5 / options_.rate_hz, options_.still_s});
   for (std::size_t c = 0; c < tallies_.size(); ++c) {
     const CameraTally& tally = tallies_[c];
     const std::string& name = options_.cameras[c];
@@ -209,9 +218,14 @@ std::vector<Fault> FrameGathering::faults(std::int64_t now_ns) const {
           (heard == 0 ? "no picture at all"
                       : "no picture since " + formatted(quiet_s, "%.1f") + " s"),
           "check its power, its cable, its trigger; other programs that hold it");
-    if (tally.incomplete > 0)
+    if (tally.unusable > 0)
+      add("unusable",
+          tally.trouble + " (" + std::to_string(tally.unusable) + " of " + std::to_string(heard) +
+              " pictures)",
+          "");
+    if (const std::size_t lost = tally.incomplete - tally.unusable; lost > 0)
       add("lost_packets",
-          std::to_string(tally.incomplete) + " of " + std::to_string(heard) +
+          std::to_string(lost) + " of " + std::to_string(heard) +
               " pictures arrived incomplete: packets were lost on the way",
           "larger packets (MTU 9000), larger receive buffers (sysctl net.core.rmem_max), a network "
           "card of its own, a lower frame rate");

@@ -26,6 +26,9 @@ struct GatheringOptions {
   /// and the offsets of clocks follow from that.
   bool one_trigger = false;
   double patience_s = 0.5;  ///< a picture that comes so long after its time is late, > 0
+  /// Nothing moves: pictures up to so far apart make a set, s, in the order in which they come.
+  /// 0: it moves.
+  double still_s = 0;
 };
 
 /// One picture of every camera of about one moment.
@@ -42,6 +45,8 @@ struct GatheredFrame {
 struct CameraTally {
   std::size_t pictures = 0;    ///< complete ones
   std::size_t incomplete = 0;  ///< lost packets and the like
+  std::size_t unusable = 0;    ///< of the incomplete: for other reasons than packets
+  std::string trouble;         ///< trouble_of() the last of those
   std::size_t skipped = 0;     ///< that the camera counted and nobody saw
   std::size_t late = 0;        ///< after their set was given out
   std::int64_t last_ns = -1;   ///< arrival of the last one, whole or not
@@ -51,8 +56,9 @@ struct CameraTally {
 ///
 /// Never by number: cameras start to count at different times. The time of a picture is its time
 /// stamp on the host's clock (ClockFit); one without a time stamp counts from its arrival. A set
-/// takes what lies within half a period of its first picture. A set is given out, in order of time,
-/// when every camera has a picture in it or its time is over.
+/// takes what lies within half a period of its first picture; the oldest set takes it where nothing
+/// moves. A set is given out, in order of time, when every camera has a picture in it or its time
+/// is over.
 class FrameGathering {
  public:
   /// `clocks`: what is known of the cameras' clocks already; empty: nothing.
@@ -69,6 +75,7 @@ class FrameGathering {
   /// What is wrong so far:
   ///   dead: no picture for two seconds, or five periods
   ///   lost_packets, skipped, late: pictures that are not there, or came too late
+  ///   unusable: pictures that came, and are none for other reasons
   ///   spread: sets whose pictures lie too far apart
   ///   clock: a camera's clock that no crystal explains, or that jumps
   [[nodiscard]] std::vector<Fault> faults(std::int64_t now_ns) const;

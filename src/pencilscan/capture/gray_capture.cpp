@@ -159,6 +159,7 @@ void ProjectorRun::take(std::size_t i, int again) {
 std::string ProjectorRun::why_missing(std::size_t camera) const {
   const LiveCameras::Count count = cameras_.count(camera);
   if (count.incomplete == 0) return "no picture came";
+  if (!count.trouble.empty()) return "no picture can be used: " + count.trouble;
   return "no picture came whole: " + std::to_string(count.incomplete) + " of " +
          std::to_string(count.incomplete + count.whole) + " lack packets that the network lost";
 }

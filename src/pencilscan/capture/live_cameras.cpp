@@ -37,6 +37,7 @@ void LiveCameras::take(std::size_t camera, CameraFrame frame) {
     if (seen.arrivals.size() > kRatePictures) seen.arrivals.pop_front();
     const auto span = static_cast<double>(seen.arrivals.back() - seen.arrivals.front());
     seen.count.rate_hz = span > 0 ? 1e9 * static_cast<double>(seen.arrivals.size() - 1) / span : 0;
+    seen.count.trouble = trouble_of(frame);
     if (frame.status != PictureStatus::kComplete) {
       ++seen.count.incomplete;
       return;

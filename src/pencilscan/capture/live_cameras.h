@@ -46,7 +46,8 @@ class LiveCameras {
   struct Count {
     std::size_t whole = 0;
     std::size_t incomplete = 0;
-    double rate_hz = 0;  ///< of the last pictures; 0: unknown
+    std::string trouble;  ///< trouble_of() the last picture
+    double rate_hz = 0;   ///< of the last pictures; 0: unknown
   };
   [[nodiscard]] Count count(std::size_t camera) const;
   [[nodiscard]] std::vector<ClockFit> clocks() const;

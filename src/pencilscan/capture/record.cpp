@@ -28,11 +28,16 @@ class Session {
         gathering_(gathering_of(cameras.group(), options), cameras.clocks()),
         writer_(cameras.group(), rig, out, utc_minus_host_ns(), true),
         first_ns_(cameras.group().size(), -1),
+        answered_(cameras.group().size(), 0),
         listener_(cameras, [this](std::size_t camera, CameraFrame frame) {
           const std::lock_guard lock(mutex_);
           arrived_.emplace_back(camera, std::move(frame));
         }) {
     report_.missing.assign(cameras.group().size(), 0);
+    bool others_begin = !options.software_trigger;
+    for (std::size_t c = 0; c < cameras.group().size(); ++c)
+      others_begin = others_begin && cameras.group().info(c).of_files;
+    if (others_begin) begin_ns_ = host_now_ns();
   }
 
   RecordReport run(const RecordWatch& watch);
@@ -40,6 +45,7 @@ class Session {
  private:
   static GatheringOptions gathering_of(const CameraGroup& cameras, const RecordOptions& options);
   void collect();
+  [[nodiscard]] bool pulse_is_due() const;
   void pulse();
   void take_in(std::vector<GatheredFrame> frames);
   void note_faults();
@@ -48,7 +54,7 @@ class Session {
   }
   /// Nothing comes any more: waiting longer would be waiting for ever.
   [[nodiscard]] bool silent() const {
-    const double limit = std::max(kLongestSilence, 20 / options_.rate_hz);
+    const double limit = std::max({kLongestSilence, 20 / options_.rate_hz, options_.still_s});
     return last_heard_.seconds() > limit;
   }
   [[nodiscard]] double seconds() const {
@@ -64,6 +70,8 @@ class Session {
   std::int64_t begin_ns_ = -1;          ///< frames before are not recorded
   std::int64_t end_ns_ = INT64_MAX;     ///< nor those after
   std::size_t pulses_ = 0;
+  Stopwatch since_pulse_;
+  std::vector<char> answered_;  ///< per camera: a picture since then, whole or not
   Stopwatch since_start_;
   Stopwatch last_heard_;
   std::mutex mutex_;
@@ -77,16 +85,28 @@ GatheringOptions Session::gathering_of(const CameraGroup& cameras, const RecordO
   gathering.rate_hz = options.rate_hz;
   gathering.max_spread_ms = options.max_spread_ms;
   gathering.one_clock = options.one_clock;
-  gathering.one_trigger = options.one_trigger || options.software_trigger;
+  // Where nothing moves, a set may hold pictures of several pulses.
+  gathering.one_trigger = options.still_s <= 0 && (options.one_trigger || options.software_trigger);
+  gathering.still_s = options.still_s;
+  gathering.patience_s = std::max(gathering.patience_s, options.still_s);
   return gathering;
 }
 
+bool Session::pulse_is_due() const {
+  if (!options_.software_trigger) return false;
+  if (options_.still_s <= 0 || pulses_ == 0)
+    return since_start_.seconds() * options_.rate_hz >= static_cast<double>(pulses_);
+  const double waited = since_pulse_.seconds();
+  const bool all = std::all_of(answered_.begin(), answered_.end(), [](char a) { return a != 0; });
+  return (all && waited * options_.rate_hz >= 1) || waited >= options_.still_s;
+}
+
 void Session::pulse() {
-  if (!options_.software_trigger ||
-      since_start_.seconds() * options_.rate_hz < static_cast<double>(pulses_))
-    return;
+  if (!pulse_is_due()) return;
   cameras_.group().trigger();
   ++pulses_;
+  since_pulse_ = Stopwatch();
+  std::fill(answered_.begin(), answered_.end(), 0);
 }
 
 void Session::collect() {
@@ -99,6 +119,7 @@ void Session::collect() {
   for (auto& [camera, frame] : arrived) {
     const bool first = first_ns_[camera] < 0 && frame.status == PictureStatus::kComplete;
     if (first) first_ns_[camera] = frame.arrival_ns;
+    answered_[camera] = 1;
     gathering_.add(camera, std::move(frame));
   }
   if (begin_ns_ >= 0) return;
@@ -161,8 +182,11 @@ void Session::note_faults() {
                               std::to_string(report_.missing[c]) + " of " +
                                   std::to_string(report_.frames + report_.left_out) +
                                   " frames have no picture of it, though none was lost",
-                              "its frame rate is lower than asked for, or its pictures come at "
-                              "uneven times"});
+                              options_.still_s > 0
+                                  ? "where its pictures take longer, a longer \"patience_s\" in "
+                                    "lab.json"
+                                  : "its frame rate is lower than asked for, or its pictures come "
+                                    "at uneven times"});
   }
   if (report_.disk_drops > 0)
     report_.faults.push_back(

@@ -19,6 +19,9 @@ struct RecordOptions {
   bool one_clock = false;
   bool one_trigger = false;
   bool software_trigger = false;  ///< we set the pace, by trigger()
+  /// Nothing moves: the pictures of a frame may be so far apart, s, and are waited for so long;
+  /// software triggers wait until every camera answered the one before. 0: it moves.
+  double still_s = 0;
   /// Frames with a picture missing, or out of time, are kept (their pictures are what there is);
   /// false: they are left out.
   bool keep_partial = true;
@@ -44,9 +47,10 @@ using RecordWatch = std::function<bool(const RecordReport& so_far)>;
 /// Records until it is over into `out`: recording.zarr where its name ends in ".zarr", else image
 /// folders `out`/000000/<camera>.png. `rig`: its cameras in the order of `cameras`; a mosaic that
 /// it does not state is made colour, as in Gray-code captures. The cameras run. It begins when all
-/// of them have given some pictures, so that their clocks are known, or after two seconds. Whatever
-/// is missing is named in the report. InputError when `out` is there already and not empty;
-/// StageError when the disk is full, or a camera delivers another mosaic than the rig states.
+/// of them have given some pictures, so that their clocks are known, or after two seconds; at once
+/// where all are folders that others fill, which may never get a second picture. Whatever is
+/// missing is named in the report. InputError when `out` is there already and not empty; StageError
+/// when the disk is full, or a camera delivers another mosaic than the rig states.
 [[nodiscard]] RecordReport record(LiveCameras& cameras, const Rig& rig,
                                   const std::filesystem::path& out, const RecordOptions& options,
                                   const RecordWatch& watch = {});

@@ -6,6 +6,7 @@
 #include <thread>
 
 #include "pencilscan/capture/camera_picture.h"
+#include "pencilscan/capture/file_cameras.h"
 #include "pencilscan/capture/live_cameras.h"
 #include "pencilscan/capture/scripted_camera.h"
 #include "pencilscan/core/error.h"
@@ -248,6 +249,70 @@ TEST(Record, SoftwareTriggersSetThePace) {
   EXPECT_THAT(report.faults, IsEmpty());
   EXPECT_NEAR(static_cast<double>(report.frames), 20, 3);
   EXPECT_EQ(report.whole, report.frames);
+}
+
+TEST(Record, OnePicturePerFolderIsAFrameOfWhatDoesNotMove) {
+  const TemporaryFolder folder("record_folders");
+  std::vector<NamedCamera> named;
+  for (const char* name : {"cam0", "cam1"}) {
+    std::filesystem::create_directories(folder.path() / name);
+    named.push_back({name, open_folder_camera(folder.path() / name)});
+  }
+  LiveCameras cameras(std::move(named));
+  cameras.start();
+  std::thread other_program([&] {
+    for (const char* name : {"cam0", "cam1"}) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(400));  // by hand, one after the other
+      write_image(folder.path() / name / "shot.png", cv::Mat(6, 8, CV_32FC3, cv::Scalar::all(1)));
+    }
+  });
+  RecordOptions options;
+  options.frames = 1;
+  options.still_s = 3;
+  const RecordReport report = record(cameras, rig_of(cameras), folder.path() / "out", options);
+  other_program.join();
+  EXPECT_THAT(report.faults, IsEmpty());
+  EXPECT_EQ(report.whole, 1U);
+}
+
+TEST(Record, ASlowCameraIsWaitedForWhereNothingMoves) {
+  const TemporaryFolder folder("record_still");
+  LiveCameras cameras(scripted(2, [](std::size_t c, CameraScript& script) {
+    script.expose = [c](std::int64_t, double, double) {
+      if (c == 1) std::this_thread::sleep_for(std::chrono::milliseconds(1200));
+      return cv::Mat(6, 8, CV_8UC1, cv::Scalar(9));
+    };
+  }));
+  CameraSettings settings = fast();
+  settings.trigger = Trigger::kSoftware;
+  for (std::size_t c = 0; c < 2; ++c) cameras.group().configure(c, settings);
+  cameras.start();
+  RecordOptions options;
+  options.frames = 2;
+  options.software_trigger = true;
+  options.still_s = 10;
+  const RecordReport report = record(cameras, rig_of(cameras), folder.path() / "out", options);
+  EXPECT_THAT(report.faults, IsEmpty());
+  EXPECT_EQ(report.whole, 2U);
+  EXPECT_EQ(report.frames, 2U);
+}
+
+TEST(Record, WhatIsWrongWithFilesIsSaidInsteadOfANetwork) {
+  const TemporaryFolder folder("record_command");
+  std::vector<NamedCamera> named;
+  named.push_back({"cam0", open_command_camera({"false", "{file}"})});
+  LiveCameras cameras(std::move(named));
+  CameraSettings settings = fast();
+  settings.trigger = Trigger::kSoftware;
+  cameras.group().configure(0, settings);
+  cameras.start();
+  RecordOptions options;
+  options.seconds = 0.5;
+  options.software_trigger = true;
+  const RecordReport report = record(cameras, rig_of(cameras), folder.path() / "out", options);
+  ASSERT_EQ(report.faults.size(), 1U);
+  EXPECT_THAT(to_string(report.faults[0]),
+              HasSubstr("cam0: its program ended with 1 and made no file ("));
 }
 
 TEST(Record, AnOldFolderIsRefused) {
