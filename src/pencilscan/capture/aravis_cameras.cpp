@@ -114,8 +114,13 @@ void AravisCamera::let_go() {
 void AravisCamera::reopen() {
   since_lost_ = Stopwatch();
   let_go();
-  // It may have come back at another address of the network.
-  (void)list_aravis_cameras();
+  // It may have come back at another address of the network; one that does not say that it is there
+  // would be waited for.
+  const std::vector<CameraInfo> there = list_aravis_cameras();
+  if (std::none_of(there.begin(), there.end(), [&](const CameraInfo& camera) {
+        return camera.address == info_.address || camera.serial == info_.serial;
+      }))
+    throw StageError(info_.address + ": the camera no longer answers");
   {
     const std::lock_guard lock(discovery());
     open();

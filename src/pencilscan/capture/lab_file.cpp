@@ -1,6 +1,7 @@
 #include "pencilscan/capture/lab_file.h"
 
 #include <algorithm>
+#include <map>
 #include <nlohmann/json.hpp>
 
 #include "pencilscan/capture/aravis_cameras.h"
@@ -130,6 +131,7 @@ std::pair<std::string, LabCamera> lab_camera_from_text(const std::string& text,
     throw InputError("command line", option, text, "must be CAMERA=DEVICE");
   LabCamera camera;
   camera.device = text.substr(sign + 1);
+  camera.of_command_line = true;
   return {text.substr(0, sign), camera};
 }
 
@@ -143,6 +145,49 @@ std::unique_ptr<CameraDevice> open_camera(const LabCamera& camera) {
   throw InputError("camera", "device", camera.device,
                    "must begin with aravis:, v4l2: or folder: (pencilscan capture --list)");
 }
+
+namespace {
+
+/// What is wrong with the device of a camera, where it is stated.
+InputError fault_of(const std::string& name, const LabCamera& camera, const std::string& source,
+                    const std::string& rule) {
+  if (camera.of_command_line) return {"command line", "--camera", name + "=" + camera.device, rule};
+  if (!camera.command.empty())
+    return {source, "cameras." + name + ".command", camera.command.front(), rule};
+  return {source, "cameras." + name + ".device", camera.device, rule};
+}
+
+/// The same for every way to write it.
+std::string device_key(const LabCamera& camera) {
+  const auto folder = folder_of(camera);
+  std::error_code ignored;
+  return folder ? kFolderDevice + fs::weakly_canonical(*folder, ignored).string() : camera.device;
+}
+
+/// InputError where a device is that of two cameras.
+void check_devices_differ(const Lab& lab, const std::string& source) {
+  std::map<std::string, std::string> owners;
+  for (const auto& [name, camera] : lab.cameras) {
+    if (camera.device.empty()) continue;
+    const auto [owner, fresh] = owners.emplace(device_key(camera), name);
+    if (!fresh)
+      throw fault_of(name, camera, source,
+                     "is the device of " + owner->second + ", too: every camera has its own");
+  }
+}
+
+NamedCamera open_named(const std::string& name, const LabCamera& camera,
+                       const std::string& source) {
+  try {
+    return {name, open_camera(camera)};
+  } catch (const InputError& error) {
+    throw fault_of(name, camera, source, error.rule);
+  } catch (const StageError& error) {
+    throw StageError(name + ": " + error.what());
+  }
+}
+
+}  // namespace
 
 CameraSettings settings_for(const Lab& lab, const Camera& camera) {
   CameraSettings settings;
@@ -170,13 +215,14 @@ std::vector<NamedCamera> open_lab_cameras(const Lab& lab, const Rig& rig,
       throw InputError(source, "cameras." + camera.name, "",
                        "this key is missing: which device is it? (or give --camera " + camera.name +
                            "=DEVICE; pencilscan capture --list)");
+  check_devices_differ(lab, source);
   const bool network = std::any_of(lab.cameras.begin(), lab.cameras.end(), [](const auto& entry) {
     return entry.second.device.starts_with(kAravis);
   });
   if (network) (void)list_aravis_cameras();  // finds them all at once
   std::vector<NamedCamera> cameras;
   for (const Camera& camera : rig.cameras)
-    cameras.push_back({camera.name, open_camera(lab.cameras.at(camera.name))});
+    cameras.push_back(open_named(camera.name, lab.cameras.at(camera.name), source));
   return cameras;
 }
 

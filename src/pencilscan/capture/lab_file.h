@@ -22,6 +22,7 @@ struct LabCamera {
   std::optional<double> exposure_ms;
   std::optional<double> gain;
   std::optional<std::string> pixel_format;
+  bool of_command_line = false;  ///< named there, and not in lab.json
 
   friend bool operator==(const LabCamera&, const LabCamera&) = default;
 };
@@ -60,7 +61,9 @@ void write_lab(const Lab& lab, const std::filesystem::path& path);
 /// The settings of a camera of the rig in this laboratory.
 [[nodiscard]] CameraSettings settings_for(const Lab& lab, const Camera& camera);
 
-/// Opens every camera of the rig. InputError when one is not in the laboratory.
+/// Opens every camera of the rig. InputError, with its place in `source` (lab.json) or on the
+/// command line, when one is not in the laboratory, is the device of another, or is none;
+/// StageError with its name when it cannot be opened.
 [[nodiscard]] std::vector<NamedCamera> open_lab_cameras(const Lab& lab, const Rig& rig,
                                                         const std::string& source);
 

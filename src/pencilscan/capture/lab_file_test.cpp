@@ -99,6 +99,33 @@ TEST(Lab, EveryCameraOfTheRigNeedsADevice) {
   EXPECT_THROW((void)open_lab_cameras(lab, rig, "lab.json"), InputError);
 }
 
+TEST(Lab, WhatIsWrongWithADeviceIsSaidWhereItIsStated) {
+  const TemporaryFolder folder("lab_devices");
+  Rig rig;
+  rig.cameras.resize(2);
+  Lab lab;
+  for (const char* name : {"cam0", "cam1"}) {
+    rig.cameras[lab.cameras.size()].name = name;
+    lab.cameras[name].device = "folder:" + folder.path().string();
+  }
+  const auto complaint = [&] {
+    try {
+      (void)open_lab_cameras(lab, rig, "lab.json");
+      return std::string("accepted");
+    } catch (const InputError& error) {
+      return std::string(error.what());
+    }
+  };
+  lab.cameras["cam1"].device += "/.";
+  EXPECT_THAT(complaint(), HasSubstr("lab.json: cameras.cam1.device = folder:"));
+  EXPECT_THAT(complaint(), HasSubstr("is the device of cam0, too"));
+  lab.cameras["cam1"].device = "folder:nosuch";
+  EXPECT_THAT(complaint(),
+              HasSubstr("lab.json: cameras.cam1.device = folder:nosuch: must be a folder"));
+  lab.cameras["cam1"] = lab_camera_from_text("cam1=LAB1", "--camera").second;
+  EXPECT_THAT(complaint(), HasSubstr("command line: --camera = cam1=LAB1: must begin with aravis"));
+}
+
 TEST(Lab, SpreadMayBeAQuarterOfTheExposure) {
   Lab lab;
   EXPECT_EQ(spread_limit_ms(lab), 0);

@@ -53,6 +53,10 @@ Lab lab_of(const CaptureCommand& command) {
   if (!command.lab_path.empty()) lab = read_lab(command.lab_path);
   for (const std::string& text : command.cameras) {
     auto [name, camera] = lab_camera_from_text(text, "--camera");
+    if (const auto before = lab.cameras.find(name);
+        before != lab.cameras.end() && before->second.of_command_line)
+      throw InputError("command line", "--camera", text,
+                       name + " is " + before->second.device + " already");
     lab.cameras[name] = camera;
   }
   if (!command.trigger.empty()) lab.trigger = *trigger_from_text(command.trigger);
@@ -60,18 +64,18 @@ Lab lab_of(const CaptureCommand& command) {
   return lab;
 }
 
-void print_faults(const std::vector<Fault>& faults) {
-  for (const Fault& fault : faults) {
-    std::cerr << "pencilscan: " << to_string(fault) << "\n";
-    if (!fault.advice.empty()) std::cerr << "  what to do: " << fault.advice << "\n";
-  }
+std::string with_advice(const Fault& fault) {
+  return to_string(fault) + (fault.advice.empty() ? "" : "\n  what to do: " + fault.advice);
 }
 
-/// Fails where something is wrong, after everything was printed.
+/// Fails where something is wrong, after everything was printed: with the first fault, the last to
+/// be said.
 void end_with(const std::vector<Fault>& faults) {
-  print_faults(faults);
   std::cout.flush();
-  if (!faults.empty()) throw StageError(to_string(faults.front()));
+  if (faults.empty()) return;
+  for (std::size_t i = 1; i < faults.size(); ++i)
+    std::cerr << "pencilscan: " << with_advice(faults[i]) << "\n";
+  throw StageError(with_advice(faults.front()));
 }
 
 /// Cameras that are opened, set and running.
@@ -90,6 +94,12 @@ Running start(const CaptureCommand& command) {
   const std::string source = command.lab_path.empty() ? "command line" : command.lab_path;
   running.cameras = start_lab_cameras(running.rig, running.lab, source);
   return running;
+}
+
+std::unique_ptr<ProjectorScreen> open_screen_of(const Running& running,
+                                                const CaptureCommand& command) {
+  return open_lab_screen(running.rig, running.lab, command.rig_path,
+                         command.lab_path.empty() ? "the file of --lab" : command.lab_path);
 }
 
 Json describe(const RecordReport& report, const Rig& rig) {
@@ -125,7 +135,7 @@ void record_frames(const CaptureCommand& command, Interruption& interruption) {
   Running running = start(command);
   std::unique_ptr<ProjectorScreen> screen;
   if (command.show) {
-    screen = open_lab_screen(running.rig, running.lab, command.rig_path);
+    screen = open_screen_of(running, command);
     screen->show_all({ProjectorPicture::Kind::kLines, 0, {}});
   }
   RecordOptions options = record_options(running.lab, command.still);
@@ -152,7 +162,7 @@ void record_frames(const CaptureCommand& command, Interruption& interruption) {
 
 void capture_gray(const CaptureCommand& command, Interruption& interruption) {
   Running running = start(command);
-  const auto screen = open_lab_screen(running.rig, running.lab, command.rig_path);
+  const auto screen = open_screen_of(running, command);
   GrayCaptureOptions options = gray_options(running.rig, running.lab);
   options.solids = command.solids;
   const Progress progress = stderr_progress();
@@ -187,7 +197,7 @@ void test_lab(const CaptureCommand& command, Interruption& interruption) {
   const bool updates = std::filesystem::equivalent(command.test_to, command.lab_path, ignored);
   refuse_existing("--test", command.test_to, command.overwrite || updates);
   Running running = start(command);
-  const auto screen = open_lab_screen(running.rig, running.lab, command.rig_path);
+  const auto screen = open_screen_of(running, command);
   const Progress progress = stderr_progress();
   ProjectorTestReport report = test_projectors(*running.cameras, *screen, test_options(running.lab),
                                                [&](const std::string& what, double share) {
@@ -247,8 +257,9 @@ void add_capture_command(CLI::App& app) {
       ->check(above_zero());
   command->add_option("--frames", options->frames, "Record so many frames")
       ->check(any_number<std::size_t>());
-  command->add_flag("--still", options->still,
-                    "The object does not move: pictures of a frame may be far apart");
+  command->add_flag(
+      "--still", options->still,
+      "The object does not move: pictures of a frame may be as far apart as patience_s");
   command->add_flag("--whole-only", options->whole_only, "Leave out frames with a picture missing");
   command->add_flag("--show", options->show, "Show the rig's lines meanwhile");
   CLI::Option* gray_code =

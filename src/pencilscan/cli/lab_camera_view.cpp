@@ -24,6 +24,7 @@ nlohmann::ordered_json LabCameraView::status(std::size_t camera, const std::stri
   std::vector<std::string> advice;
   for (const Fault& fault : cameras_.group().faults())
     if (fault.device == name) advice.push_back(fault.what);
+  if (!count.trouble.empty()) advice.push_back(count.trouble);
   if (latest.frame && showing != "black")
     for (std::string& line : advice_for(figures, showing.starts_with("lines")))
       advice.push_back(std::move(line));

@@ -12,9 +12,10 @@
 namespace pencilscan::cli {
 
 /// Windows on the outputs that the laboratory, or else the rig, names. InputError and StageError as
-/// of uses_of() and ProjectorWindows; `source`: the rig's file.
+/// of uses_of() and ProjectorWindows; for messages: the files of rig and laboratory.
 [[nodiscard]] std::unique_ptr<ProjectorScreen> open_lab_screen(const Rig& rig, const Lab& lab,
-                                                               const std::string& source);
+                                                               const std::string& rig_source,
+                                                               const std::string& lab_source);
 
 /// All cameras of the rig, opened, set and running; exposures that the laboratory does not state
 /// are filled in with the cameras' own. InputError where a camera delivers another mosaic than the

@@ -86,9 +86,10 @@ TEST(Outputs, BelongToProjectorsByName) {
   const TwoOutputs two;
   Rig rig;
   rig.projectors = two.projectors;
-  const auto complaint = [&](const std::map<std::string, std::string>& named) {
+  const auto complaint = [&](const std::map<std::string, std::string>& named,
+                             const std::string& lab = "") {
     try {
-      (void)uses_of(rig, two.outputs, named, "rig.json");
+      (void)uses_of(rig, two.outputs, named, "rig.json", lab);
       return std::string("accepted");
     } catch (const InputError& error) {
       return std::string(error.what());
@@ -99,7 +100,14 @@ TEST(Outputs, BelongToProjectorsByName) {
               HasSubstr("VGA-1: this computer has no such output; connected are: HDMI-1, DP-1"));
   EXPECT_THAT(complaint({{"proj0", "DP-1"}, {"proj1", "DP-1"}}),
               HasSubstr("is the output of proj0, too"));
-  EXPECT_THAT(complaint({{"proj7", "DP-1"}}), HasSubstr("must begin with the name"));
+  EXPECT_THAT(complaint({{"proj7", "DP-1"}}),
+              HasSubstr("command line: --output = proj7=DP-1: must be of a projector of rig.json"));
+  EXPECT_THAT(complaint({{"proj0", "HDMI-9"}}),
+              HasSubstr("command line: --output = proj0=HDMI-9: this computer has no such"));
+  EXPECT_THAT(complaint({{"proj0", "HDMI-9"}}, "lab.json"),
+              HasSubstr("lab.json: projectors.proj0.output = HDMI-9: this computer has no such"));
+  EXPECT_THAT(complaint({{"proj7", "DP-1"}}, "lab.json"),
+              HasSubstr("lab.json: projectors.proj7.output = DP-1: must be of a projector of rig"));
   rig.projectors[0].output = "DP-1";
   const auto uses = uses_of(rig, two.outputs, {{"proj1", "HDMI-1"}}, "rig.json");
   EXPECT_EQ(uses[0].output->name, "DP-1");

@@ -102,34 +102,43 @@ std::vector<Fault> output_faults(std::span<const OutputUse> uses,
 
 std::vector<OutputUse> uses_of(const Rig& rig, std::span<const DisplayOutput> outputs,
                                const std::map<std::string, std::string>& named,
-                               const std::string& source) {
+                               const std::string& source, const std::string& lab) {
   std::string names;
   for (const DisplayOutput& output : outputs)
     if (output.connected) add_name(names, output.name);
   const std::string there = "; connected are: " + (names.empty() ? "none" : names);
+  /// What is wrong with an output that `named` gives a projector, where that stands.
+  const auto fault_of_named = [&](const std::string& projector, const std::string& output,
+                                  const std::string& rule) {
+    return lab.empty() ? InputError("command line", "--output", projector + "=" + output, rule)
+                       : InputError(lab, "projectors." + projector + ".output", output, rule);
+  };
   for (const auto& [projector, output] : named) {
     if (std::none_of(rig.projectors.begin(), rig.projectors.end(),
                      [&](const Projector& p) { return p.name == projector; }))
-      throw InputError("command line", "--output", projector + "=" + output,
-                       "must begin with the name of a projector of " + source);
+      throw fault_of_named(projector, output, "must be of a projector of " + source);
   }
   std::vector<OutputUse> uses;
   for (std::size_t p = 0; p < rig.projectors.size(); ++p) {
     const Projector& projector = rig.projectors[p];
     const auto own = named.find(projector.name);
     const std::string name = own == named.end() ? projector.output : own->second;
-    const std::string field = "projectors[" + std::to_string(p) + "].output";
+    const auto fault = [&](const std::string& rule) {
+      return own == named.end()
+                 ? InputError(source, "projectors[" + std::to_string(p) + "].output", name, rule)
+                 : fault_of_named(projector.name, name, rule);
+    };
     if (name.empty())
-      throw InputError(
-          source, field, "",
-          "this key is missing (or give --output " + projector.name + "=NAME)" + there);
+      throw fault("this key is missing (or " +
+                  (lab.empty() ? "give --output " + projector.name + "=NAME)"
+                               : "state projectors." + projector.name + ".output in " + lab + ")") +
+                  there);
     const auto found = std::find_if(outputs.begin(), outputs.end(),
                                     [&](const DisplayOutput& o) { return o.name == name; });
-    if (found == outputs.end())
-      throw InputError(source, field, name, "this computer has no such output" + there);
+    if (found == outputs.end()) throw fault("this computer has no such output" + there);
     for (const OutputUse& use : uses)
       if (use.output->name == name)
-        throw InputError(source, field, name, "is the output of " + use.projector->name + ", too");
+        throw fault("is the output of " + use.projector->name + ", too");
     uses.push_back({&projector, &*found});
   }
   return uses;

@@ -52,9 +52,11 @@ inline constexpr double kRefreshTolerance = 0.005;
 
 /// The output of every projector: that of `named` ("proj0" -> "HDMI-1") or else of the rig.
 /// InputError when a projector has none, one is not there, two share one, or `named` knows a
-/// projector that the rig does not. `source`: the rig's file, for the message.
+/// projector that the rig does not. For the message: `source`, the rig's file, and `lab`, the
+/// lab.json of `named`; empty: the option --output.
 [[nodiscard]] std::vector<OutputUse> uses_of(const Rig& rig, std::span<const DisplayOutput> outputs,
                                              const std::map<std::string, std::string>& named,
-                                             const std::string& source);
+                                             const std::string& source,
+                                             const std::string& lab = {});
 
 }  // namespace pencilscan
