@@ -50,7 +50,8 @@ def look_at(link):
     dim = wait_for(link, lambda s: s["cameras"][1]["figures"]["brightest"] < 0.25)
     assert "open the iris" in dim["cameras"][1]["advice"][0]
     assert abs(dim["cameras"][1]["exposure_ms"] - 4) < 0.01
-    for nonsense in ("act/shell", "act/show?what=%2Fetc%2Fpasswd", "act/set?camera=9&exposure_ms=1",
+    assert not dim["calibrated"]
+    for nonsense in ("act/shell", "act/record", "act/show?what=%2Fetc%2Fpasswd", "act/set?camera=9&exposure_ms=1",
                      "act/set?camera=0&exposure_ms=-1",
                      "act/set?camera=1&exposure_ms=100000000"):
         try:
@@ -59,6 +60,20 @@ def look_at(link):
             assert error.code == 409, (nonsense, error.code)
         else:
             raise AssertionError(nonsense)
+
+
+def come_back(lab, link):
+    """Cameras that were not asked for anything for longer than they wait belong to nobody: they are
+    taken up again."""
+    lab.send_signal(signal.SIGSTOP)
+    time.sleep(5)
+    lab.send_signal(signal.SIGCONT)
+    # Pictures that were on their way may still come.
+    time.sleep(1)
+    before = [c["whole"] for c in json.loads(get(link, "status"))["cameras"]]
+    wait_for(link, lambda s: all(
+        c["whole"] > b + 4 and not any("no longer answers" in line for line in c["advice"])
+        for c, b in zip(s["cameras"], before)))
 
 
 def own_display(screen):
@@ -99,11 +114,27 @@ def interrupt_a_test(folder):
     assert not os.path.exists(tested)
 
 
+def assign_outputs(folder):
+    """A wrong key is asked again: the answers before it are kept."""
+    lab = os.path.join(folder, "lab")
+    named = os.path.join(folder, "named.json")
+    shown = subprocess.run(
+        [os.environ["PENCILSCAN_PROGRAM"], "show", "--rig", os.path.join(lab, "devices.json"),
+         "--what", "identify", "--assign", named], env=own_display(os.path.join(lab, "screen")),
+        input="9\n2\n2\n1\n", capture_output=True, text=True, timeout=PATIENCE)
+    assert shown.returncode == 0, shown.stderr
+    assert "numbers from 1 to 2 are shown; once more" in shown.stderr, shown.stderr
+    with open(named) as file:
+        outputs = [projector["output"] for projector in json.load(file)["projectors"]]
+    assert outputs == ["DUMMY1", "DUMMY0"], outputs
+
+
 def main():
     with tempfile.TemporaryDirectory() as folder:
         lab = subprocess.Popen(
             [os.environ["PENCILSCAN_PROGRAM"], "lab", "--virtual", "--small", "--page", "--out",
-             os.path.join(folder, "lab")], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+             os.path.join(folder, "lab")], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+            start_new_session=True)
         try:
             first = lab.stdout.readline()
             if not first:
@@ -111,9 +142,11 @@ def main():
                 sys.stderr.write(said)
                 return SKIPPED if any(words in said for words in NOT_HERE) else 1
             look_at(first.split()[1])
+            come_back(lab, first.split()[1])
+            assign_outputs(folder)
             interrupt_a_test(folder)
         finally:
-            lab.send_signal(signal.SIGINT)
+            os.killpg(lab.pid, signal.SIGINT)  # as a terminal's Ctrl-C
             code = lab.wait(PATIENCE)
         assert code == 0, code
     return 0

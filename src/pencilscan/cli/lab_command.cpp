@@ -95,7 +95,7 @@ void add_lab_command(CLI::App& app) {
       ->check(one_of(virtual_faults()))
       ->needs(is_virtual)
       ->excludes(page);
-  command->add_flag("--small", made.small, "Few devices with few pixels, half a minute")
+  command->add_flag("--small", made.small, "Few devices with few pixels, a minute or less")
       ->needs(is_virtual);
   add_common_options(*command, made.common, "pencilscan lab --virtual --small --out trial");
   command->callback([options] { run_lab(*options); });

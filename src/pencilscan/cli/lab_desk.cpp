@@ -54,6 +54,15 @@ std::optional<double> number_in(const Values& values, const std::string& name) {
   return number;
 }
 
+bool is_calibrated(const fs::path& rig) {
+  try {
+    static_cast<void>(read_rig(rig));
+    return true;
+  } catch (const InputError&) {
+    return false;
+  }
+}
+
 class Desk final : public LabDesk {
  public:
   explicit Desk(LabDeskOptions options);
@@ -65,6 +74,8 @@ class Desk final : public LabDesk {
 
  private:
   [[nodiscard]] std::string next_step() const;
+  /// The calibrated rig: of this desk, or the given one; empty: there is none yet.
+  [[nodiscard]] fs::path calibrated_rig() const;
   void pulse();
   void show(const ProjectorPicture& picture, const std::string& projector);
   std::string set_camera(const Values& values);
@@ -82,6 +93,7 @@ class Desk final : public LabDesk {
   std::unique_ptr<LiveCameras> cameras_;
   std::unique_ptr<ProjectorScreen> screen_;
   std::optional<LabCameraView> view_;
+  bool given_calibrated_ = false;
 
   mutable std::mutex mutex_;  ///< of what follows
   std::string showing_;
@@ -99,8 +111,9 @@ Desk::Desk(LabDeskOptions options)
     : options_(std::move(options)), rig_(read_devices(options_.rig).rig), cover_(rig_.cameras) {
   fs::create_directories(options_.out / "logs");
   cameras_ = start_lab_cameras(rig_, options_.lab, options_.lab_source);
-  screen_ = open_lab_screen(rig_, options_.lab, options_.rig.string());
+  screen_ = open_lab_screen(rig_, options_.lab, options_.rig.string(), options_.lab_source);
   view_.emplace(rig_, *cameras_);
+  given_calibrated_ = is_calibrated(options_.rig);
   calibration_ = {{"verdict", ""}, {"rms_px", 0}, {"poses", 0}, {"reasons", Json::array()}};
   frame_ = {{"points", 0}, {"labelled_share", 0}, {"folder", ""}};
   while (fs::exists(options_.out / ("pose" + std::to_string(poses_ + 1)))) ++poses_;
@@ -132,6 +145,11 @@ void Desk::show(const ProjectorPicture& picture, const std::string& projector) {
   showing_ = to_string(picture) + (projector.empty() ? "" : " on " + projector);
 }
 
+fs::path Desk::calibrated_rig() const {
+  if (fs::exists(at("rig.json"))) return at("rig.json");
+  return given_calibrated_ ? options_.rig : fs::path();
+}
+
 std::string Desk::next_step() const {
   if (poses_ == 0)
     return "Put something with depth into the volume (a heap of matt light things), and capture "
@@ -160,6 +178,7 @@ Json Desk::status() {
   status["job"] = work_.json();
   status["poses"] = poses_;
   status["next"] = next_step();
+  status["calibrated"] = !calibrated_rig().empty();
   status["cover"] = cover_.json();
   status["calibration"] = calibration_;
   status["frame"] = frame_;
@@ -190,6 +209,8 @@ std::string Desk::act(const std::string& action, const Values& values) {
   if (action == "test") return work_.begin("flashing", [this] { flash(); });
   if (action == "capture") return work_.begin("capturing", [this] { capture(); });
   if (action == "calibrate") return work_.begin("calibrating", [this] { calibrate(); });
+  if (action == "record" && calibrated_rig().empty())
+    return "a frame needs a calibrated rig: capture poses first";
   if (action == "record") return work_.begin("recording", [this] { record(); });
   return "no such button";
 }
@@ -318,9 +339,8 @@ void Desk::calibrate() {
 }
 
 void Desk::record() {
-  const fs::path rig = fs::exists(at("rig.json")) ? fs::path(at("rig.json")) : options_.rig;
+  const fs::path rig = calibrated_rig();
   if (options_.arrange) options_.arrange(0);
-  static_cast<void>(read_rig(rig));  // says what it lacks where it is not calibrated
   show({ProjectorPicture::Kind::kLines, 0, {}}, "");
   int number = 1;
   while (fs::exists(options_.out / ("frame" + std::to_string(number)))) ++number;

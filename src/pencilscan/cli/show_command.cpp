@@ -73,6 +73,24 @@ std::map<std::string, std::string> named_outputs(const ShowOptions& options) {
   return named;
 }
 
+/// The number, from 1 to `count`, that a projector shows, or nothing; none of `taken`, to which it
+/// is added. Asks until there is one: a wrong key shall not cost the answers before.
+std::string answer_for(const std::string& projector, std::size_t count,
+                       std::set<std::string>& taken) {
+  for (;;) {
+    std::cerr << "The number that " << projector << " shows (Enter: none): " << std::flush;
+    std::string answer;
+    if (!std::getline(std::cin, answer)) throw StageError("no answer on the standard input");
+    if (answer.empty()) return answer;
+    bool shown = false;
+    for (std::size_t i = 1; i <= count; ++i) shown = shown || answer == std::to_string(i);
+    if (shown && taken.insert(answer).second) return answer;
+    std::cerr << (shown ? answer + " is another projector's"
+                        : "numbers from 1 to " + std::to_string(count) + " are shown")
+              << "; once more\n";
+  }
+}
+
 /// Every lit output shows its number; the terminal asks which projector that is.
 void assign(const ShowOptions& options) {
   refuse_existing("--assign", options.assign_to, options.overwrite);
@@ -98,15 +116,8 @@ void assign(const ShowOptions& options) {
   Json figures;
   std::set<std::string> taken;
   for (Projector& projector : devices.rig.projectors) {
-    std::cerr << "The number that " << projector.name << " shows (Enter: none): " << std::flush;
-    std::string answer;
-    if (!std::getline(std::cin, answer)) throw StageError("no answer on the standard input");
-    const auto label = std::find_if(labels.begin(), labels.end(),
-                                    [&](const Projector& l) { return l.name == answer; });
-    if (!answer.empty() && (label == labels.end() || !taken.insert(answer).second))
-      throw InputError("standard input", projector.name, answer,
-                       "must be a number that is shown, of each projector another one");
-    projector.output = answer.empty() ? "" : label->output;
+    const std::string answer = answer_for(projector.name, labels.size(), taken);
+    projector.output = answer.empty() ? "" : labels[std::stoul(answer) - 1].output;
     figures[projector.name] = projector.output;
   }
   write_devices(devices, options.assign_to);
