@@ -55,15 +55,12 @@ std::vector<char> ghostly(const cv::Mat& presence, std::span<const CurvePoint> p
   const std::size_t n = points.size();
   const std::size_t window = std::min(n, 2 * reach + 1);
   std::vector<char> is_ghost(n, 0);
-  std::vector<float> values;
+  std::vector<std::size_t> dark_before{0};  // of each point
+  for (const float value : light) dark_before.push_back(dark_before.back() + (value < kDark));
   for (std::size_t first = 0; first < n; first += kTogether) {
     const std::size_t middle = std::min(first + kTogether / 2, n - 1);
     const std::size_t low = std::min(middle - std::min(middle, reach), n - window);
-    values.assign(light.begin() + static_cast<std::ptrdiff_t>(low),
-                  light.begin() + static_cast<std::ptrdiff_t>(low + window));
-    const auto fifth = values.begin() + static_cast<std::ptrdiff_t>(window / kFifth);
-    std::nth_element(values.begin(), fifth, values.end());
-    if (*fifth >= kDark) continue;
+    if (dark_before[low + window] - dark_before[low] <= window / kFifth) continue;
     for (std::size_t i = first; i < std::min(first + kTogether, n); ++i) is_ghost[i] = 1;
   }
   return is_ghost;

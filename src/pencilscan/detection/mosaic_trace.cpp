@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "pencilscan/core/check.h"
+#include "pencilscan/core/lanes.h"
 #include "pencilscan/io/image.h"
 #include "pencilscan/io/linear_light.h"
 #include "pencilscan/rig/camera_light.h"
@@ -34,19 +35,63 @@ struct PhaseSum {
   }
 };
 
-/// |value - mean of its four neighbours|.
-std::array<PhaseSum, 4> phase_sums(const cv::Mat& rgb, int channel) {
-  std::array<PhaseSum, 4> phases;
+constexpr std::size_t kChannels = 3;
+/// Values of a row after which columns' phases and channels repeat, in whole registers.
+constexpr std::size_t kPeriod = 2 * kChannels * kLanes / 2;
+
+/// Sums over a row, of places `kPeriod` values apart.
+struct RowSums {
+  std::array<float, kPeriod> sum;
+  std::array<float, kPeriod> squares;
+};
+
+/// |value - mean of its four neighbours| of `periods` times kPeriod values from `here` on.
+PENCILSCAN_CLONES
+void sum_row(const float* above, const float* here, const float* below, std::size_t periods,
+             RowSums& sums) {
+  constexpr std::size_t kBlocks = kPeriod / kLanes;
+  std::array<Lanes, kBlocks> sum{};
+  std::array<Lanes, kBlocks> squares{};
+  for (std::size_t first = 0; first < periods * kPeriod; first += kPeriod) {
+    for (std::size_t block = 0; block < kBlocks; ++block) {
+      const std::size_t i = first + block * kLanes;
+      Lanes value;
+      Lanes left;
+      Lanes right;
+      Lanes up;
+      Lanes down;
+      load(here + i, value);
+      load(here + i - kChannels, left);
+      load(here + i + kChannels, right);
+      load(above + i, up);
+      load(below + i, down);
+      const Lanes apart = value - 0.25F * (left + right + up + down);
+      sum[block] += apart < 0 ? -apart : apart;
+      squares[block] += apart * apart;
+    }
+  }
+  for (std::size_t block = 0; block < kBlocks; ++block) {
+    store(sum[block], sums.sum.data() + block * kLanes);
+    store(squares[block], sums.squares.data() + block * kLanes);
+  }
+}
+
+/// |value - mean of its four neighbours|, per channel. A few columns at the right edge are left
+/// out.
+std::array<std::array<PhaseSum, 4>, kChannels> phase_sums(const cv::Mat& rgb) {
+  std::array<std::array<PhaseSum, 4>, kChannels> phases;
+  const std::size_t periods = kChannels * static_cast<std::size_t>(rgb.cols - 2) / kPeriod;
+  RowSums sums{};
   // In all rows: of some, lines of other spacings look like these places.
   for (int y = 1; y + 1 < rgb.rows; ++y) {
-    const auto* above = rgb.ptr<cv::Vec3f>(y - 1);
-    const auto* here = rgb.ptr<cv::Vec3f>(y);
-    const auto* below = rgb.ptr<cv::Vec3f>(y + 1);
-    for (int x = 1; x + 1 < rgb.cols; ++x) {
-      const float around =
-          here[x - 1][channel] + here[x + 1][channel] + above[x][channel] + below[x][channel];
-      phases[static_cast<std::size_t>(2 * (y % 2) + x % 2)].add(
-          std::abs(here[x][channel] - 0.25F * around));
+    sum_row(rgb.ptr<float>(y - 1) + kChannels, rgb.ptr<float>(y) + kChannels,
+            rgb.ptr<float>(y + 1) + kChannels, periods, sums);
+    for (std::size_t i = 0; i < kPeriod; ++i) {
+      const std::size_t column = 1 + i / kChannels;
+      PhaseSum& phase = phases[i % kChannels][static_cast<std::size_t>(2 * (y % 2)) + column % 2];
+      phase.sum += static_cast<double>(sums.sum[i]);
+      phase.squares += static_cast<double>(sums.squares[i]);
+      phase.count += static_cast<double>(periods);
     }
   }
   return phases;
@@ -189,8 +234,9 @@ bool looks_interpolated(const cv::Mat& rgb) {
   constexpr double kDeviations = 4;
   if (rgb.rows < 16 || rgb.cols < 16) return false;
   std::array<double, 3> contrasts{};
-  for (const int channel : {0, 2}) {  // a quarter of the samples each
-    const std::array<double, 3> of_channel = contrast_deviations(phase_sums(rgb, channel));
+  const auto sums = phase_sums(rgb);
+  for (const std::size_t channel : {0U, 2U}) {  // a quarter of the samples each
+    const std::array<double, 3> of_channel = contrast_deviations(sums[channel]);
     for (std::size_t i = 0; i < contrasts.size(); ++i)
       contrasts[i] = std::max(contrasts[i], of_channel[i]);
   }

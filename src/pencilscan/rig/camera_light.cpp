@@ -1,5 +1,6 @@
 #include "pencilscan/rig/camera_light.h"
 
+#include <algorithm>
 #include <cstdint>
 #include <opencv2/imgproc.hpp>
 #include <optional>
@@ -102,13 +103,21 @@ cv::Mat overexposed(const cv::Mat& stored) {
   cv::Mat values;
   for (int y = 0; y < stored.rows; ++y) {
     values = stored.row(y);
+    auto* const row = full.ptr<std::uint8_t>(y);
+    double most = 0;  // mostly, no value of a row is full
+    cv::minMaxIdx(values.reshape(1), nullptr, &most);
+    cv::Mat brightest(1, 1, CV_MAKETYPE(stored.depth(), 1), cv::Scalar(most));
+    if (stored.depth() != CV_32F) brightest = unit_values(brightest);
+    if (brightest.at<float>(0) < kFullRange) {
+      std::fill_n(row, stored.cols, std::uint8_t{0});
+      continue;
+    }
     if (stored.depth() != CV_32F) values = unit_values(values);
     const float* in = values.ptr<float>();
-    auto* out = full.ptr<std::uint8_t>(y);
     for (int x = 0; x < stored.cols; ++x, in += channels) {
       bool any = false;
       for (int k = 0; k < channels; ++k) any = any || in[k] >= kFullRange;
-      out[x] = any ? 255 : 0;
+      row[x] = any ? 255 : 0;
     }
   }
   if (channels == 1) cv::dilate(full, full, cv::Mat::ones(3, 3, CV_8U));
