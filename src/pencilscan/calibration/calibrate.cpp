@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "pencilscan/calibration/calibrate_once.h"
+#include "pencilscan/calibration/mirrored.h"
 #include "pencilscan/calibration/suspects.h"
 
 namespace pencilscan {
@@ -47,6 +48,8 @@ CalibrationResult calibrate(const CalibrationInput& input, const CalibrateOption
                             const Progress& progress) {
   constexpr int kMostMoves = 4;  // more is no rig
   CalibrationResult best = solve_without_wrong_pairs(input, options, progress);
+  best.mirrored = find_mirrored(input, best, options, progress);
+  if (best.mirrored) return best;
   // A device that moved between captures has several places. One capture of one device is left out
   // at a time; the rig that results counts where it shows clearly that all of these had moved.
   std::vector<CaptureMove> moved;

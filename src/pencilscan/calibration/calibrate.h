@@ -54,6 +54,13 @@ struct DeviceResiduals {
   double p95_px = 0;
 };
 
+/// Devices whose pictures are mirrored, and the shares of all correspondences that fit one rig.
+struct Mirroring {
+  std::vector<std::size_t> devices;  ///< one; or all cameras, which says the same of all projectors
+  double as_they_are = 0;
+  double other_way = 0;  ///< the devices' pictures turned round
+};
+
 struct CalibrationResult {
   Rig rig;                   ///< every placed device; see `placed`
   std::vector<char> placed;  ///< per device
@@ -77,11 +84,13 @@ struct CalibrationResult {
   std::size_t views_dropped = 0;
   std::vector<DeviceResiduals> residuals;  ///< per device
   bool solved = false;
+  std::optional<Mirroring> mirrored;  ///< then nothing else of the result counts
 };
 
 /// From correspondences, and corners of boards if any, to a rig (calibrate_once.h). Where pairs
 /// contradict it, once more without these, which counts if fewer then do (but for swapped folders);
-/// where devices moved between captures, without what they saw of these.
+/// where devices moved between captures, without what they saw of these. A device whose pictures
+/// are mirrored ends the search (mirrored.h).
 [[nodiscard]] CalibrationResult calibrate(const CalibrationInput& input,
                                           const CalibrateOptions& options = {},
                                           const Progress& progress = {});

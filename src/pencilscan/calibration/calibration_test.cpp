@@ -9,7 +9,6 @@
 #include "pencilscan/calibration/calibrate.h"
 #include "pencilscan/calibration/calibration_report.h"
 #include "pencilscan/calibration/given_values.h"
-#include "pencilscan/calibration/mirrored.h"
 #include "pencilscan/calibration/pair_matches.h"
 #include "pencilscan/calibration/rig_frame.h"
 #include "pencilscan/calibration/sample_input.h"
@@ -51,6 +50,20 @@ TEST(Calibrate, RingIsFoundFromImageSizesDespiteOutliers) {
   EXPECT_LT(projection_error(truth, result.rig), 1.0);
 }
 
+/// Several captures, the last one of another rig.
+std::vector<Track> captures_of(const Rig& truth, const Rig& last, std::size_t captures) {
+  std::vector<Track> all;
+  for (std::size_t capture = 0; capture < captures; ++capture) {
+    const std::uint64_t seed = 10 + 2 * capture;
+    for (Track& track : tracks_of(capture + 1 == captures ? last : truth,
+                                  {.count = 300, .seed = seed, .noise_seed = seed + 1})) {
+      track.capture = capture;
+      all.push_back(std::move(track));
+    }
+  }
+  return all;
+}
+
 std::vector<Track> mirrored_by(const Rig& rig, std::vector<Track> tracks, std::size_t device) {
   for (Track& track : tracks) {
     for (TrackView& view : track.views)
@@ -59,18 +72,32 @@ std::vector<Track> mirrored_by(const Rig& rig, std::vector<Track> tracks, std::s
   return tracks;
 }
 
-TEST(FindMirrored, ADeviceThatMirrorsItsPictureIsNamedAndARightOneIsNot) {
+TEST(Calibrate, ADeviceThatMirrorsItsPictureIsFoundAndARightOneIsNot) {
   const Rig truth = ring(3, 3);
   const auto tracks = tracks_of(truth, {.count = 500});
-  const auto right = input_of(truth, tracks, true);
-  EXPECT_FALSE(find_mirrored(right, calibrate(right, kQuick), kQuick));
+  EXPECT_FALSE(calibrate(input_of(truth, tracks, true), kQuick).mirrored);
   for (const std::size_t device : {1U, 4U}) {
     const auto input = input_of(truth, mirrored_by(truth, tracks, device), true);
-    const auto finding = find_mirrored(input, calibrate(input, kQuick), kQuick);
-    ASSERT_TRUE(finding) << device;
-    EXPECT_THAT(finding->what, HasSubstr(device_at(truth, device).name));
-    EXPECT_EQ(finding->grade, Grade::kUnusable);
+    const auto result = calibrate(input, kQuick);
+    ASSERT_TRUE(result.mirrored) << device;
+    EXPECT_EQ(result.mirrored->devices, std::vector{device});
+    Uncertainty sigma;
+    sigma.devices.resize(device_count(truth));
+    const Verdict verdict = judge(input, result, sigma, {});
+    ASSERT_EQ(verdict.findings.size(), 1U);  // everything else follows from it
+    EXPECT_EQ(verdict.grade, Grade::kUnusable);
+    EXPECT_THAT(verdict.findings[0].what,
+                AllOf(HasSubstr(device_at(truth, device).name), HasSubstr("mirror")));
   }
+}
+
+/// Over several captures it looks as if it had moved in each, and the rest fits well without it.
+TEST(Calibrate, AMirroredCameraHasNotMovedBetweenCaptures) {
+  const Rig truth = ring(3, 3);
+  const auto tracks = mirrored_by(truth, captures_of(truth, truth, 3), 1);
+  const auto result = calibrate(input_of(truth, tracks, true), kQuick);
+  ASSERT_TRUE(result.mirrored);
+  EXPECT_EQ(result.mirrored->devices, std::vector<std::size_t>{1});
 }
 
 TEST(Calibrate, KnownCamerasAreKeptAndGiveAPreciseRig) {
@@ -185,6 +212,22 @@ TEST(Verdict, FoldersSwappedInOneCaptureAreNamedWithIt) {
               HasSubstr("the folders proj1/cam1 and proj1/cam2 (--captures number 2) are swapped"));
 }
 
+/// A camera's folders exchanged for another's: no pair of theirs fits a scene as a whole. Of
+/// proj2's pairs one is too little off to be doubted, and the other is told as a camera that moved.
+TEST(Verdict, CamerasExchangedInOneCaptureAreNamedAndTheirCodesMakeSense) {
+  const Rig truth = ring(3, 3);
+  std::vector<Track> tracks = captures_of(truth, truth, 3);
+  for (Track& track : tracks)
+    for (TrackView& view : track.views)
+      if (track.capture == 1 && view.device < 2) view.device = 1 - view.device;
+  const std::string all = findings_of(truth, tracks);
+  for (const std::string proj : {"proj0", "proj1"})
+    EXPECT_THAT(all, HasSubstr("the folders " + proj + "/cam0 and " + proj +
+                               "/cam1 (--captures number 2) are swapped"));
+  EXPECT_THAT(all, AllOf(Not(HasSubstr("make no sense")), Not(HasSubstr("fit a rigid scene")),
+                         Not(HasSubstr("mirror"))));
+}
+
 /// In the last capture cam1 is turned by so many pixels about the axis of its frame.
 std::vector<Track> tracks_with_a_turn(const Rig& truth, const Vec3& axis, double px,
                                       std::size_t captures = 3) {
@@ -193,16 +236,7 @@ std::vector<Track> tracks_with_a_turn(const Rig& truth, const Vec3& axis, double
   RigidTransform& pose = turned.cameras[1].device_from_world;
   const Mat3 R = Eigen::AngleAxisd(angle, axis).toRotationMatrix();
   pose = {R * pose.rotation, R * pose.translation};
-  std::vector<Track> all;
-  for (std::size_t capture = 0; capture < captures; ++capture) {
-    const std::uint64_t seed = 10 + 2 * capture;
-    for (Track& track : tracks_of(capture + 1 == captures ? turned : truth,
-                                  {.count = 300, .seed = seed, .noise_seed = seed + 1})) {
-      track.capture = capture;
-      all.push_back(std::move(track));
-    }
-  }
-  return all;
+  return captures_of(truth, turned, captures);
 }
 
 /// A turn to the side goes along the epipolar lines: no pair of a camera and a projector tells.

@@ -1,6 +1,9 @@
 #include "pencilscan/calibration/decode_captures.h"
 
 #include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <map>
 #include <string>
 #include <utility>
@@ -215,6 +218,43 @@ void require_different(const std::vector<std::filesystem::path>& folders) {
   }
 }
 
+bool is_same_file(const std::filesystem::path& a, const std::filesystem::path& b) {
+  if (std::filesystem::file_size(a) != std::filesystem::file_size(b)) return false;
+  std::ifstream one(a, std::ios::binary);
+  std::ifstream other(b, std::ios::binary);
+  return std::equal(std::istreambuf_iterator<char>(one), {}, std::istreambuf_iterator<char>(other),
+                    {});
+}
+
+/// Whether two captures of one rig are copies of each other, byte by byte: sensors never repeat
+/// themselves. The first picture that differs ends it.
+bool is_same_capture(const std::vector<CapturePair>& a, const std::vector<CapturePair>& b) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(),
+                    [](const CapturePair& one, const CapturePair& other) {
+                      return one.camera == other.camera && one.projector == other.projector &&
+                             std::equal(one.files.begin(), one.files.end(), other.files.begin(),
+                                        other.files.end(), is_same_file);
+                    });
+}
+
+/// Captures that are copies of one before have no pairs any more; says so of each.
+std::vector<Finding> leave_out_copies(const std::vector<std::filesystem::path>& folders,
+                                      std::vector<std::vector<CapturePair>>& captures) {
+  std::vector<Finding> findings;
+  for (std::size_t b = 1; b < captures.size(); ++b) {
+    for (std::size_t a = 0; a < b; ++a) {
+      if (!is_same_capture(captures[a], captures[b])) continue;
+      captures[b].clear();
+      findings.push_back({Grade::kDoubtful,
+                          folders[b].string() + " holds the same pictures as " +
+                              folders[a].string() + ": it is no other pose, and was left out",
+                          "give the captures of each pose once"});
+      break;
+    }
+  }
+  return findings;
+}
+
 }  // namespace
 
 DecodedCaptures decode_captures(const Rig& rig, const std::vector<std::filesystem::path>& folders,
@@ -227,6 +267,7 @@ DecodedCaptures decode_captures(const Rig& rig, const std::vector<std::filesyste
   captures.reserve(folders.size());
   for (const std::filesystem::path& folder : folders)
     captures.push_back(list_captures(folder, rig));
+  std::vector<Finding> copies = leave_out_copies(folders, captures);
 
   std::optional<Collected> collected(std::in_place, rig, described, max_tracks);
   std::vector<DecodedPair> pairs;
@@ -249,6 +290,7 @@ DecodedCaptures decode_captures(const Rig& rig, const std::vector<std::filesyste
   decoded.tracks = collected->tracks.tracks();
   decoded.color = collected->colors.result();
   decoded.findings = order_findings(decoded.pairs, rig);
+  for (Finding& copy : copies) decoded.findings.push_back(std::move(copy));
   if (const auto& boards = collected->boards) {
     decoded.board_views = boards->views();
     decoded.projected_corners = boards->projected_views();

@@ -18,12 +18,12 @@ struct DecodedCaptures {
   ColorCalibration color;            ///< the same
   std::vector<BoardView> board_views;
   std::vector<BoardView> projected_corners;
-  std::vector<Finding> findings;  ///< wrong orders of images, boards that are not as described
+  std::vector<Finding> findings;  ///< wrong orders of images, copies, boards unlike described
 };
 
 /// Decodes captures, one folder per pose of the object. `board` as board_from_text() reads it;
-/// empty: none. InputError for folders that do not fit the devices, and for one that is named
-/// twice.
+/// empty: none. Captures that are copies of one before are left out and named. InputError for
+/// folders that do not fit the devices, and for one that is named twice.
 [[nodiscard]] DecodedCaptures decode_captures(const Rig& rig,
                                               const std::vector<std::filesystem::path>& folders,
                                               const std::string& board, std::size_t max_tracks,

@@ -4,7 +4,6 @@
 #include <utility>
 
 #include "pencilscan/calibration/decode_captures.h"
-#include "pencilscan/calibration/mirrored.h"
 #include "pencilscan/calibration/scale_deviation.h"
 #include "pencilscan/planning/units.h"
 
@@ -44,10 +43,6 @@ CapturesCalibration calibrate_captures(const UncalibratedRig& devices,
   if (auto warning = all.result.solved ? pose_unit_warning(all.result.rig) : std::nullopt)
     findings.push_back({Grade::kDoubtful, std::move(*warning), "give the known distance in mm"});
   all.verdict = judge(input, all.result, all.uncertainty, std::move(findings));
-  if (all.verdict.grade == Grade::kUnusable) {
-    if (auto finding = find_mirrored(input, all.result, calibrate_options, progress))
-      all.verdict.findings.insert(all.verdict.findings.begin(), std::move(*finding));
-  }
   tell("judging", 1);
   return all;
 }

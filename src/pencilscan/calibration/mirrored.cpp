@@ -6,8 +6,11 @@
 #include <string>
 #include <vector>
 
+#include "pencilscan/calibration/calibrate_once.h"
 #include "pencilscan/calibration/pair_fit.h"
+#include "pencilscan/calibration/suspects.h"
 #include "pencilscan/core/evenly_picked.h"
+#include "pencilscan/rig/device_list.h"
 
 namespace pencilscan {
 namespace {
@@ -27,23 +30,34 @@ bool are_pairs_sensible(const CalibrationResult& result) {
   return 2 * static_cast<std::size_t>(sensible) > result.pairs.size();
 }
 
-/// How many correspondences the result explains, of all that a device takes part in.
+double inlier_share(const CalibrationResult& result, const DevicePair& pair) {
+  for (const PairGeometry& geometry : result.pairs)
+    if (geometry.camera == pair.first && geometry.projector == pair.second)
+      return geometry.inlier_share();
+  return 1;
+}
+
+/// How many correspondences the result explains, of those that a device takes part in and that
+/// their pair explains by itself: wrong codes and moves leave these out, mirrored pictures do not.
 struct Explained {
   std::vector<double> of_device;  ///< shares
   double of_all = 0;
 };
 
-Explained explained(const CalibrationInput& input, const CalibrationResult& result) {
+Explained explained(const CalibrationInput& input, const std::vector<Track>& tracks,
+                    const CalibrationResult& result) {
   const std::size_t devices = device_count(input.rig);
   std::vector<double> good(devices, 0);
   std::vector<double> all(devices, 0);
   double good_sum = 0;
   double sum = 0;
   const PairFit fit(result.problem.devices, kExplainedPx);
-  for (const auto& [pair, matches] : matches_by_pair(input.tracks)) {
+  for (const auto& [pair, matches] : matches_by_pair(tracks)) {
     const auto count = static_cast<double>(matches.size());
     const bool is_placed = result.solved && fit.placed(pair.first) && fit.placed(pair.second);
-    const double share = is_placed ? fit.share(matches, pair.first, pair.second) : 0;
+    const double by_rig = is_placed ? fit.share(matches, pair.first, pair.second) : 0;
+    const double by_pair = inlier_share(result, pair);
+    const double share = by_rig < by_pair ? by_rig / by_pair : 1;
     for (const std::size_t d : {pair.first, pair.second}) {
       good[d] += share * count;
       all[d] += count;
@@ -100,44 +114,52 @@ std::vector<std::vector<std::size_t>> suspects(const Rig& rig, const Explained& 
 
 }  // namespace
 
-std::optional<Finding> find_mirrored(const CalibrationInput& input, const CalibrationResult& result,
-                                     const CalibrateOptions& options, const Progress& progress) {
+std::optional<Mirroring> find_mirrored(const CalibrationInput& input,
+                                       const CalibrationResult& result,
+                                       const CalibrateOptions& options, const Progress& progress) {
   constexpr double kExplains = 0.5;  // of what was not, where the suspicion is right
   constexpr std::size_t kTracks = 1500;
   // Two devices see a mirrored object as well.
   if (device_count(input.rig) < 3 || !are_pairs_sensible(result)) return std::nullopt;
-  const Explained before = explained(input, result);
+  if (suspects(input.rig, explained(input, input.tracks, result)).empty()) return std::nullopt;
+  const std::vector<Track> tracks =
+      without_pairs(input.tracks, find_contradictions(input, result).swapped);
+  const Explained before = explained(input, tracks, result);
   CalibrationInput some = input;
-  some.tracks = evenly_picked(input.tracks, kTracks);
+  some.tracks = evenly_picked(tracks, kTracks);
   const auto trials = suspects(input.rig, before);
   for (std::size_t i = 0; i < trials.size(); ++i) {
     if (progress)
       progress("looking for mirrored pictures",
                static_cast<double>(i) / static_cast<double>(trials.size()));
     const CalibrationInput changed = mirrored(some, trials[i]);
-    const CalibrationResult again = calibrate(changed, options);
+    const CalibrationResult again = calibrate_once(changed, options, {});
     if (!again.solved) continue;
-    const Explained after = explained(changed, again);
+    const Explained after = explained(changed, changed.tracks, again);
     const bool is_better = 1 - after.of_all < (1 - kExplains) * (1 - before.of_all);
     const bool fits = std::all_of(trials[i].begin(), trials[i].end(), [&](std::size_t d) {
       return 1 - after.of_device[d] < kMuchOfOne;
     });
     if (!is_better || !fits) continue;
-    const std::size_t first = trials[i].front();
-    const std::string who =
-        trials[i].size() > 1 ? "the pictures of all cameras, or of all projectors, are mirrored"
-        : first < input.rig.cameras.size()
-            ? "the pictures of camera " + device_at(input.rig, first).name + " are mirrored"
-            : "projector " + device_at(input.rig, first).name + " mirrors its picture";
-    return Finding{Grade::kUnusable,
-                   who + ": the other way round, " +
-                       std::to_string(std::lround(100 * after.of_all)) +
-                       " % of the correspondences fit one rig, as they are " +
-                       std::to_string(std::lround(100 * before.of_all)) + " %",
-                   "switch off mirroring (of a camera in its driver, of a projector in its menu: "
-                   "ceiling and rear projection), and take the captures again"};
+    return Mirroring{trials[i], before.of_all, after.of_all};
   }
   return std::nullopt;
+}
+
+Finding mirrored_finding(const Rig& rig, const Mirroring& mirrored) {
+  const std::size_t first = mirrored.devices.front();
+  const std::string who =
+      mirrored.devices.size() > 1
+          ? "the pictures of all cameras, or of all projectors, are mirrored"
+      : first < rig.cameras.size()
+          ? "the pictures of camera " + device_at(rig, first).name + " are mirrored"
+          : "projector " + device_at(rig, first).name + " mirrors its picture";
+  return {Grade::kUnusable,
+          who + ": the other way round, " + std::to_string(std::lround(100 * mirrored.other_way)) +
+              " % of the correspondences fit one rig, as they are " +
+              std::to_string(std::lround(100 * mirrored.as_they_are)) + " %",
+          "switch off mirroring (of a camera in its driver, of a projector in its menu: "
+          "ceiling and rear projection), and take the captures again"};
 }
 
 }  // namespace pencilscan

@@ -210,10 +210,10 @@ Contradictions find_contradictions(const CalibrationInput& input, const Calibrat
     }
   }
   Contradictions found;
-  Captures wrong;  // whatever stood where
-  find_swaps(input, matches, fit, std::nullopt, bad, wrong, found.findings);
+  find_swaps(input, matches, fit, std::nullopt, bad, found.swapped, found.findings);
   for (const std::size_t capture : numbers_of_bad)
-    find_swaps(input, matches, fit, capture, bad, wrong, found.findings);
+    find_swaps(input, matches, fit, capture, bad, found.swapped, found.findings);
+  Captures wrong = found.swapped;
   for (const DevicePair& pair : bad.pairs)
     if (!bad.captures.contains(pair)) wrong[pair].clear();
   found.moves = moved_between_captures(result, without_pairs(input.tracks, wrong));

@@ -18,6 +18,8 @@ struct Contradictions {
   /// Pairs that neither swapped folders nor moved devices explain, nor their own images (some fit
   /// no pair of devices at all), with the captures in which they contradict; none: in all.
   std::map<DevicePair, std::vector<std::size_t>> unexplained;
+  /// Pairs whose folders were exchanged, with the captures in which they were; none: in all.
+  std::map<DevicePair, std::vector<std::size_t>> swapped;
   CaptureMoves moves;
 };
 

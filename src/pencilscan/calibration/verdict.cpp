@@ -7,6 +7,7 @@
 #include "pencilscan/bundle/bundle_device.h"
 #include "pencilscan/calibration/flat_scene.h"
 #include "pencilscan/calibration/given_findings.h"
+#include "pencilscan/calibration/mirrored.h"
 #include "pencilscan/calibration/pair_fit.h"
 #include "pencilscan/calibration/scale_findings.h"
 #include "pencilscan/calibration/suspects.h"
@@ -32,6 +33,7 @@ class Judge {
     for (const Finding& finding : found_before)
       explained_.insert(finding.explains.begin(), finding.explains.end());
     if (explained_.size() == result_.placed.size()) return {};  // nothing is left to judge
+    if (result_.mirrored) return {mirrored_finding(input_.rig, *result_.mirrored)};
     judge_scene();
     if (!result_.solved) {
       add(Grade::kUnusable,
@@ -132,7 +134,8 @@ class Judge {
     Contradictions contradictions = find_contradictions(input_, result_);
     std::vector<LowPair> low;
     std::vector<const PairGeometry*> sound;
-    const auto matches = matches_by_pair(input_.tracks);
+    // What stood in the wrong folder says nothing against the rest.
+    const auto matches = matches_by_pair(without_pairs(input_.tracks, contradictions.swapped));
     const PairFit fit = tolerant_fit(result_);
     for (const PairGeometry& pair : result_.pairs) {
       if (pair.matches < 24) continue;
@@ -143,8 +146,8 @@ class Judge {
       // Fundamental matrices know no distortion: before a wide lens the rig explains what they do
       // not.
       const auto list = matches.find({pair.camera, pair.projector});
-      const double by_rig =
-          list == matches.end() ? 0 : fit.share(list->second, pair.camera, pair.projector);
+      if (list == matches.end()) continue;
+      const double by_rig = fit.share(list->second, pair.camera, pair.projector);
       const double share = std::max(pair.inlier_share(), by_rig);
       if (share >= options_.low_inlier_share)
         sound.push_back(&pair);
