@@ -6,6 +6,7 @@
 #include "pencilscan/core/check.h"
 #include "pencilscan/core/median.h"
 #include "pencilscan/core/parallel.h"
+#include "pencilscan/depth/pruning.h"
 #include "pencilscan/depth/wide_windows.h"
 #include "pencilscan/rig/camera_light.h"
 
@@ -135,8 +136,10 @@ void guided_depth(const Rig& rig, const RayScene& surface, const DepthStageOptio
     result.lights[i] = std::move(light);
   });
   for (std::size_t i = 0; i < found.size(); ++i) {
-    result.report.completed += found[i];
+    const std::size_t lone = drop_lone_guided_nodes(result.maps[i]);
+    result.report.completed += found[i] - std::min(found[i], lone);
     result.report.cameras[i].measured += found[i];
+    result.report.cameras[i].measured -= lone;
   }
 }
 

@@ -9,6 +9,7 @@
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/core/random.h"
 #include "pencilscan/depth/depth_image.h"
+#include "pencilscan/depth/pruning.h"
 #include "pencilscan/depth/seeds.h"
 #include "pencilscan/rig/camera_light.h"
 #include "pencilscan/rig/sample_devices.h"
@@ -466,6 +467,26 @@ TEST(Consistency, PatchesOfOneProjectorNeedACurveOrAnotherView) {
   expect_only_a_seeded_patch_stays([](DepthMap& map, DepthNode& node, bool is_around) {
     node.lit = map.lit_sets.place_of(is_around ? 1 : 3);
   });
+}
+
+TEST(Pruning, GuidedNodesOfOneProjectorContinueIntoThreeNeighbors) {
+  DepthMap map;
+  map.columns = map.rows = 5;
+  map.nodes.resize(25);
+  const auto measure = [&](int row, int column, float z) -> DepthNode& {
+    DepthNode& node = map.nodes[map.index(row, column)];
+    node.w = 1 / z;
+    node.sigma = 0.05F;
+    node.lit = map.lit_sets.place_of(1);
+    return node;
+  };
+  for (int row = 0; row < 2; ++row)
+    for (int column = 0; column < 2; ++column) measure(row, column, 1000);  // three each
+  measure(4, 0, 1000);                                                      // none
+  measure(4, 4, 1000).support = 1;
+  measure(0, 4, 1000).lit = map.lit_sets.place_of(3);  // two projectors
+  EXPECT_EQ(drop_lone_guided_nodes(map), 1U);
+  EXPECT_FALSE(map.nodes[map.index(4, 0)].measured());
 }
 
 }  // namespace

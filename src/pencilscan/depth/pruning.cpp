@@ -41,28 +41,42 @@ void for_each_patch(const DepthMap& map, IsMember is_member, Drop drop) {
   }
 }
 
-}  // namespace
+// Of eight neighbours. On the rendered bunny nearly all errors above 1 mm were nodes without them
+// (docs/depth.md, "Agreement"); no fit of this, nor of what drop_lone_nodes() asks for, is kept.
+constexpr int kLeastNeighbors = 3;
 
-std::size_t drop_lone_nodes(DepthMap& map) {
-  // Of eight neighbours; `misfit` is 1 where only noise is left. On the rendered bunny nearly all
-  // errors above 1 mm were such nodes (docs/depth.md, "Agreement"); no fit of the three is kept.
-  constexpr int kLeastNeighbors = 3;
-  constexpr int kLeastNeighborsGrown = 7;
-  constexpr float kMisfit = 2.5F;
-  std::vector<char> is_lone(map.nodes.size(), 0);
-  parallel_chunks(is_lone.size(), [&](std::size_t i) {
+/// Removes unconfirmed nodes for which is_lone(node, number of neighbours that it continues into).
+template <class IsLone>
+std::size_t drop_lone(DepthMap& map, IsLone is_lone) {
+  std::vector<char> drops(map.nodes.size(), 0);
+  parallel_chunks(drops.size(), [&](std::size_t i) {
     const DepthNode& n = map.nodes[i];
     if (!is_unconfirmed(map, n)) return;
     int neighbors = 0;
     for_each_neighbor(map, i, 1, [&](std::size_t) { ++neighbors; });
-    const int least = n.seeded ? kLeastNeighbors : kLeastNeighborsGrown;
-    is_lone[i] = neighbors < least || n.misfit > kMisfit ? 1 : 0;
+    drops[i] = is_lone(n, neighbors) ? 1 : 0;
   });
   std::vector<std::size_t> lone;
-  for (std::size_t i = 0; i < is_lone.size(); ++i) {
-    if (is_lone[i] != 0) lone.push_back(i);
+  for (std::size_t i = 0; i < drops.size(); ++i) {
+    if (drops[i] != 0) lone.push_back(i);
   }
   return drop_nodes(lone, HoleReason::kOneProjector, map);
+}
+
+}  // namespace
+
+std::size_t drop_lone_nodes(DepthMap& map) {
+  constexpr int kLeastNeighborsGrown = 7;
+  constexpr float kMisfit = 2.5F;  // 1 where only noise is left
+  return drop_lone(map, [](const DepthNode& n, int neighbors) {
+    const int least = n.seeded ? kLeastNeighbors : kLeastNeighborsGrown;
+    return neighbors < least || n.misfit > kMisfit;
+  });
+}
+
+std::size_t drop_lone_guided_nodes(DepthMap& map) {
+  return drop_lone(map,
+                   [](const DepthNode&, int neighbors) { return neighbors < kLeastNeighbors; });
 }
 
 std::size_t drop_unconfirmed_patches(DepthMap& map) {

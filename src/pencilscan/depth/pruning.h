@@ -41,6 +41,10 @@ void for_each_neighbor(const DepthMap& map, std::size_t i, int reach, Visit&& vi
 /// into its neighbours, on nearly all sides unless a labelled curve passes through it.
 std::size_t drop_lone_nodes(DepthMap& map);
 
+/// The same once the closed surface has guided fits (depth.h): a start on it is as good as one on a
+/// labelled curve, but no other camera was asked.
+std::size_t drop_lone_guided_nodes(DepthMap& map);
+
 /// Removes patches of one projector's lines that no other camera confirms: growth that slipped by a
 /// line looks just like them. A patch stays if it rests on labelled curves and nothing contradicts
 /// it.
