@@ -294,10 +294,10 @@ TEST_F(Newcomer, CountsAPoseOnce) {
 
 TEST_F(Newcomer, IsToldThatAFolderCameraTakesNewPicturesOnly) {
   static_cast<void>(small_scene());
-  fs::create_directories(folder_ / "shots");
+  fs::create_directories(folder_ / "more");
   write("shots/cam0.png", "");
   const Outcome outcome =
-      run("capture --rig r.json --camera cam0=folder:shots --camera cam1=folder:shots --seconds 1 "
+      run("capture --rig r.json --camera cam0=folder:shots --camera cam1=folder:more --seconds 1 "
           "--out frames");
   EXPECT_EQ(outcome.code, 1);
   EXPECT_THAT(outcome.error,
@@ -308,8 +308,9 @@ TEST_F(Newcomer, IsToldThatAFolderCameraTakesNewPicturesOnly) {
 TEST_F(Newcomer, MayUpdateTheLabFileThatIsTested) {
   static_cast<void>(small_scene());
   fs::create_directories(folder_ / "shots");
+  fs::create_directories(folder_ / "more");
   const std::string lab = R"({"format": "lab/1", "cameras": {"cam0": {"device": "folder:shots"},)"
-                          R"( "cam1": {"device": "folder:shots"}}})";
+                          R"( "cam1": {"device": "folder:more"}}})";
   write("lab.json", lab);
   write("other.json", lab);
   const std::string test = "capture --rig r.json --lab lab.json --test ";

@@ -148,7 +148,7 @@ TEST(FolderCamera, GivesNewPicturesOnceWholeInOrder) {
   const auto third = camera->next(Seconds(2));
   ASSERT_TRUE(third);
   EXPECT_EQ(third->status, PictureStatus::kWrongSize);
-  EXPECT_THAT(third->remark, HasSubstr("d.png has 8 x 5 px, not 8 x 6"));
+  EXPECT_THAT(third->remark, HasSubstr("its pictures are 8 x 5, the rig says 8 x 6"));
 }
 
 TEST(FolderCamera, AsksForPicturesWhenTriggered) {
@@ -189,7 +189,7 @@ TEST(CommandCamera, NamesAProgramThatFails) {
   const auto frame = camera->next(Seconds(5));
   ASSERT_TRUE(frame);
   EXPECT_EQ(frame->status, PictureStatus::kUnreadable);
-  EXPECT_EQ(frame->remark, "false ended with 1");
+  EXPECT_EQ(frame->remark, "its program ended with 1 and made no file");
   EXPECT_THROW((void)open_command_camera({"gphoto2", "--capture-image"}), InputError);
 }
 
