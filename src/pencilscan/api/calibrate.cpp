@@ -45,9 +45,11 @@ CalibratedRig calibrate_rig(const UncalibratedRig& devices,
   of_captures.board = options.board;
   if (options.max_tracks > 0) of_captures.max_tracks = options.max_tracks;
   const GivenTolerance usual;
-  of_captures.tolerance = {
-      tolerance("focal_tolerance", options.focal_tolerance, 100, 100 * usual.focal) / 100,
-      tolerance("center_tolerance", options.center_tolerance, 10000, usual.center_px)};
+  of_captures.tolerance = {tolerance("focal_tolerance", options.focal_tolerance,
+                                     100 * usual.kMostFocal, 100 * usual.focal) /
+                               100,
+                           tolerance("center_tolerance", options.center_tolerance,
+                                     usual.kMostCenterPx, usual.center_px)};
   of_captures.seed = options.seed;
   CalibratedRig result;
   constexpr std::array<std::string_view, 2> kStages = {"calibrating", "judging"};

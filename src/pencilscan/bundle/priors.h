@@ -9,6 +9,8 @@ namespace pencilscan {
 
 /// How far off given values may be, one standard deviation; 0: they are exact.
 struct GivenTolerance {
+  static constexpr double kMostFocal = 1;  ///< what may be stated
+  static constexpr double kMostCenterPx = 10000;
   double focal = 0.005;  ///< of fx and fy over themselves, >= 0
   double center_px = 5;  ///< of cx and cy, >= 0
 };

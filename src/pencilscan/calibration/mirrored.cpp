@@ -121,10 +121,13 @@ std::optional<Mirroring> find_mirrored(const CalibrationInput& input,
   constexpr std::size_t kTracks = 1500;
   // Two devices see a mirrored object as well.
   if (device_count(input.rig) < 3 || !are_pairs_sensible(result)) return std::nullopt;
-  if (suspects(input.rig, explained(input, input.tracks, result)).empty()) return std::nullopt;
-  const std::vector<Track> tracks =
-      without_pairs(input.tracks, find_contradictions(input, result).swapped);
-  const Explained before = explained(input, tracks, result);
+  std::vector<Track> tracks = input.tracks;
+  Explained before = explained(input, tracks, result);
+  if (suspects(input.rig, before).empty()) return std::nullopt;
+  if (const auto swapped = find_contradictions(input, result).swapped; !swapped.empty()) {
+    tracks = without_pairs(tracks, swapped);
+    before = explained(input, tracks, result);
+  }
   CalibrationInput some = input;
   some.tracks = evenly_picked(tracks, kTracks);
   const auto trials = suspects(input.rig, before);

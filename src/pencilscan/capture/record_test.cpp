@@ -49,6 +49,13 @@ CameraSettings fast() {
   return settings;
 }
 
+void start_with_software_triggers(LiveCameras& cameras) {
+  CameraSettings settings = fast();
+  settings.trigger = Trigger::kSoftware;
+  for (std::size_t c = 0; c < cameras.group().size(); ++c) cameras.group().configure(c, settings);
+  cameras.start();
+}
+
 /// A rig of these cameras.
 Rig rig_of(const LiveCameras& cameras) {
   Rig rig;
@@ -68,10 +75,7 @@ TEST(LiveCameras, APictureAnswersItsTriggerHoweverLongItTook) {
       return cv::Mat(6, 8, CV_8UC1, cv::Scalar(0));
     };
   }));
-  CameraSettings settings = fast();
-  settings.trigger = Trigger::kSoftware;
-  cameras.group().configure(0, settings);
-  cameras.start();
+  start_with_software_triggers(cameras);
   for (const int delay_ms : delays_ms) {
     const std::int64_t since = host_now_ns();
     ASSERT_TRUE(cameras.trigger(2).front().frame) << "after " << taken << " pictures";
@@ -237,10 +241,7 @@ TEST(Record, LostPicturesAreNamedAndNoFrame) {
 TEST(Record, SoftwareTriggersSetThePace) {
   const TemporaryFolder folder("record_software");
   LiveCameras cameras(scripted(2));
-  CameraSettings settings = fast();
-  settings.trigger = Trigger::kSoftware;
-  for (std::size_t c = 0; c < 2; ++c) cameras.group().configure(c, settings);
-  cameras.start();
+  start_with_software_triggers(cameras);
   RecordOptions options;
   options.rate_hz = 20;
   options.seconds = 1;
@@ -283,10 +284,7 @@ TEST(Record, ASlowCameraIsWaitedForWhereNothingMoves) {
       return cv::Mat(6, 8, CV_8UC1, cv::Scalar(9));
     };
   }));
-  CameraSettings settings = fast();
-  settings.trigger = Trigger::kSoftware;
-  for (std::size_t c = 0; c < 2; ++c) cameras.group().configure(c, settings);
-  cameras.start();
+  start_with_software_triggers(cameras);
   RecordOptions options;
   options.frames = 2;
   options.software_trigger = true;
@@ -302,10 +300,7 @@ TEST(Record, WhatIsWrongWithFilesIsSaidInsteadOfANetwork) {
   std::vector<NamedCamera> named;
   named.push_back({"cam0", open_command_camera({"false", "{file}"})});
   LiveCameras cameras(std::move(named));
-  CameraSettings settings = fast();
-  settings.trigger = Trigger::kSoftware;
-  cameras.group().configure(0, settings);
-  cameras.start();
+  start_with_software_triggers(cameras);
   RecordOptions options;
   options.seconds = 0.5;
   options.software_trigger = true;

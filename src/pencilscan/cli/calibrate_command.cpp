@@ -193,12 +193,12 @@ void add_calibrate_command(CLI::App& app) {
       ->add_option("--focal-tolerance", options->focal_tolerance_percent,
                    "How far off given focal lengths may be, one standard deviation in per cent; 0: "
                    "they are exact")
-      ->check(between(0.0, 100.0))
+      ->check(between(0.0, 100 * GivenTolerance::kMostFocal))
       ->capture_default_str();
   command
       ->add_option("--center-tolerance", options->center_tolerance_px,
                    "The same of given principal points, px")
-      ->check(between(0.0, 10000.0))
+      ->check(between(0.0, GivenTolerance::kMostCenterPx))
       ->capture_default_str();
   command->add_flag("--keep-unusable", options->keep_unusable,
                     "Write an unusable rig, too: rig.unusable.json for --out rig.json");

@@ -37,10 +37,11 @@ void check_own_file(const CLI::App& command, const std::string& path) {
     std::error_code ignored;
     return std::filesystem::weakly_canonical(std::filesystem::absolute(named, ignored), ignored);
   };
+  const std::filesystem::path place = place_of(path);
   for (const CLI::Option* option : command.get_options()) {
     if (option->check_lname("json") || option->get_items_expected_max() == 0) continue;
     for (const std::string& value : option->results()) {
-      if (place_of(value) != place_of(path)) continue;
+      if (place_of(value) != place) continue;
       throw CLI::ValidationError(
           "--json", refusal(path, "a file of its own, and " + option->get_name() + " names it"));
     }

@@ -2,7 +2,18 @@
 
 #include <algorithm>
 
+#include "pencilscan/geometry/light_sheet.h"
+
 namespace pencilscan {
+
+std::optional<Vec3> place_on_line(const Rig& rig, const Camera& camera, const Vec2& pixel,
+                                  const CurveLabel& label) {
+  const LinePattern& pattern = rig.pattern(label.pattern);
+  const RayInProjector ray(camera, rig.projector(label.pattern.projector), pixel);
+  const auto depth = ray.depth(pattern.position_px(label.plane), pattern.axis);
+  if (!depth) return std::nullopt;
+  return camera.point_at_depth(pixel, *depth);
+}
 
 std::size_t labelled_points(std::span<const LabeledRun> runs) {
   std::size_t count = 0;

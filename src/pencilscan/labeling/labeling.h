@@ -2,11 +2,13 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "pencilscan/grid/grid_graph.h"
+#include "pencilscan/rig/rig.h"
 
 namespace pencilscan {
 
@@ -17,6 +19,10 @@ struct CurveLabel {
   double plane = 0;      ///< line coordinate that is triangulated
   float confidence = 0;  ///< 0..1
 };
+
+/// Where the ray of a camera's pixel meets the sheet of light of a line; nothing where it does not.
+[[nodiscard]] std::optional<Vec3> place_on_line(const Rig& rig, const Camera& camera,
+                                                const Vec2& pixel, const CurveLabel& label);
 
 /// What a solution says of one connected component of one camera.
 struct ComponentReport {

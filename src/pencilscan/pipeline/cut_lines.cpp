@@ -1,11 +1,8 @@
 #include "pencilscan/pipeline/cut_lines.h"
 
 #include <algorithm>
-#include <cmath>
-#include <optional>
 #include <vector>
 
-#include "pencilscan/geometry/light_sheet.h"
 #include "pencilscan/joint/joint_options.h"
 #include "pencilscan/rig/object_space.h"
 
@@ -37,7 +34,8 @@ class Cuts {
           std::min(run.end + kAhead, k + 1 == runs.size() ? static_cast<int>(curve.points.size())
                                                           : runs[k + 1].begin);
       for (const int point : {first, run.begin, (run.begin + run.end) / 2, run.end - 1, end - 1}) {
-        const auto x = place(curve, point, run.label);
+        const Vec2 pixel = curve.points[static_cast<std::size_t>(point)].position.cast<double>();
+        const auto x = place_on_line(rig_, camera_, pixel, run.label);
         if (!x) continue;
         const bool is_held = space_.holds(*x);
         is_inside |= is_held;
@@ -49,17 +47,6 @@ class Cuts {
   }
 
  private:
-  [[nodiscard]] std::optional<Vec3> place(const Curve& curve, int point,
-                                          const CurveLabel& label) const {
-    const Projector& projector = rig_.projector(label.pattern.projector);
-    const LinePattern& pattern = rig_.pattern(label.pattern);
-    const Vec2 pixel = curve.points[static_cast<std::size_t>(point)].position.cast<double>();
-    const RayInProjector ray(camera_, projector, pixel);
-    const auto depth = ray.depth(pattern.position_px(label.plane), pattern.axis);
-    if (!depth) return std::nullopt;
-    return camera_.point_at_depth(pixel, *depth);
-  }
-
   const Rig& rig_;
   const GridGraph& graph_;
   const Camera& camera_;

@@ -8,7 +8,6 @@
 
 #include "pencilscan/core/median.h"
 #include "pencilscan/core/random.h"
-#include "pencilscan/geometry/light_sheet.h"
 #include "pencilscan/rig/object_space.h"
 
 namespace pencilscan {
@@ -203,15 +202,10 @@ std::vector<NamedPlace> named_places(const Rig& rig, std::span<const GridGraph> 
     const Camera& camera = rig.camera(graph.camera);
     for (const LabeledRun& run : labeling.runs[static_cast<std::size_t>(graph.camera)]) {
       const Curve& curve = graph.curves[static_cast<std::size_t>(run.curve)];
-      const Projector& projector = rig.projector(run.label.pattern.projector);
-      const LinePattern& pattern = rig.pattern(run.label.pattern);
       for (int i = run.begin + kStep / 2; i < run.end; i += kStep) {
         const Vec2 pixel = curve.points[static_cast<std::size_t>(i)].position.cast<double>();
-        const RayInProjector ray(camera, projector, pixel);
-        const auto depth = ray.depth(pattern.position_px(run.label.plane), pattern.axis);
-        if (depth)
-          places.push_back(
-              {camera.point_at_depth(pixel, *depth), static_cast<float>(run.label.confidence)});
+        if (const auto x = place_on_line(rig, camera, pixel, run.label))
+          places.push_back({*x, run.label.confidence});
       }
     }
   }

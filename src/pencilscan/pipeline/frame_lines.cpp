@@ -83,7 +83,7 @@ std::optional<Rig> label_lines(const Rig& rig, const Frame& frame, const PointOp
 /// off it are less likely than those on it.
 void label_with_floor(const Rig& rig, const PointOptions& options, PointResult& result) {
   const SolutionMethod& method = solution_method(options.method);
-  if (!method.capabilities.corrects_rig || result.corrected) return;
+  if (rig.floor || !method.capabilities.corrects_rig || result.corrected) return;
   result.floor = find_floor(rig, named_places(rig, result.graphs, result.labeling));
   if (!result.floor) return;
   Rig with_floor = rig;
