@@ -3,6 +3,7 @@
 #include <span>
 #include <vector>
 
+#include "pencilscan/guided/predicted_lines.h"
 #include "pencilscan/guided/run_places.h"
 
 namespace pencilscan {
