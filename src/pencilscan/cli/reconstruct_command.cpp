@@ -8,6 +8,7 @@
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/io/file.h"
+#include "pencilscan/jobs/job_folder.h"
 #include "pencilscan/pipeline/sequence.h"
 
 namespace pencilscan::cli {
@@ -54,7 +55,7 @@ void reconstruct(const ReconstructOptions& options) {
     }
   }
   figures["frames"] = outcomes.size();
-  figures["frames_failed"] = failed;
+  figures[kFramesFailed] = failed;
   figures["frames_resumed"] =
       std::count_if(outcomes.begin(), outcomes.end(), [](const auto& o) { return o.resumed; });
   std::size_t points = 0;

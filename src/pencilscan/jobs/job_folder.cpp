@@ -1,6 +1,7 @@
 #include "pencilscan/jobs/job_folder.h"
 
 #include <array>
+#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "pencilscan/core/error.h"
@@ -74,6 +75,14 @@ fs::path task_log(const fs::path& out, std::size_t task) {
 
 std::string last_log_line(const fs::path& out, std::size_t task) {
   return last_line(task_log(out, task));
+}
+
+bool went_through(const fs::path& out, std::size_t task, std::uintmax_t from) {
+  std::ifstream log(task_log(out, task));
+  log.seekg(static_cast<std::streamoff>(from));
+  for (std::string line; std::getline(log, line);)
+    if (line.starts_with(kFramesFailed)) return true;
+  return false;
 }
 
 std::string shell_word(const std::string& text) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -34,6 +35,13 @@ void write_job(const Job& job);
 [[nodiscard]] std::filesystem::path task_log(const std::filesystem::path& out, std::size_t task);
 /// Its last line, to say why a task ended; empty where there is none.
 [[nodiscard]] std::string last_log_line(const std::filesystem::path& out, std::size_t task);
+/// Whether the try of a task whose part of the log begins at byte `from` went through its frames,
+/// failed or not: `reconstruct` has printed its figures. That comes with the log; folders of other
+/// machines are seen late.
+[[nodiscard]] bool went_through(const std::filesystem::path& out, std::size_t task,
+                                std::uintmax_t from);
+/// The figure of `reconstruct` that it is known by.
+inline constexpr const char* kFramesFailed = "frames_failed";
 
 /// What a shell runs for one task. `shard` is "i/n". Where the shell makes way for the program, a
 /// signal that ends the program is seen as one; where it stays, as exit code 128 + the signal: ssh

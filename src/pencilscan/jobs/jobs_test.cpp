@@ -83,7 +83,7 @@ TEST_F(Jobs, AJobIsReadAsItWasWritten) {
 }
 
 TEST_F(Jobs, EveryTaskIsRunOnceAndFailedFramesAreNoReasonToRepeat) {
-  const Job job = job_of("echo $shard >> ran; exit 1", 5);
+  const Job job = job_of("echo $shard >> ran; echo 'frames_failed   1'; exit 1", 5);
   const TaskReport report = run_tasks(job, all(job), {});
   EXPECT_EQ(report.done, 5U);
   EXPECT_EQ(report.restarts, 0U);
@@ -91,7 +91,7 @@ TEST_F(Jobs, EveryTaskIsRunOnceAndFailedFramesAreNoReasonToRepeat) {
   std::vector<std::string> ran{std::istream_iterator<std::string>(lines), {}};
   std::sort(ran.begin(), ran.end());
   EXPECT_THAT(ran, ElementsAre("0/5", "1/5", "2/5", "3/5", "4/5"));
-  EXPECT_EQ(last_log_line(job.out, 3), "reconstruct --rig a rig --shard 3/5");
+  EXPECT_THAT(read_file(task_log(job.out, 3)), HasSubstr("reconstruct --rig a rig --shard 3/5\n"));
 }
 
 TEST_F(Jobs, WhatIsKilledIsStartedAgainAsOftenAsItMay) {
@@ -124,16 +124,20 @@ TEST_F(Jobs, StoppingEndsWhatRuns) {
   EXPECT_THROW((void)run_tasks(job, all(job), options), StageError);
 }
 
-/// An ssh that runs things here; the host `dead` cannot be reached, `apart` has other folders.
+/// An ssh that runs things here; the host `dead` cannot be reached, `apart` has other folders,
+/// `unmounted` finds no input in them, and `readonly` cannot write the output.
 class Ssh : public Jobs {
  protected:
   QueueOptions options() {
     const fs::path ssh = path() / "ssh";
-    std::ofstream(ssh) << "#!/bin/sh\n[ \"$1\" = -o ] && shift 2\necho \"$1\" >> '"
-                       << path().string() << "/hosts'\n"
-                       << "[ $1 = dead ] && echo 'ssh: no route to host' && exit 255\n"
-                       << "[ $1 = apart ] && set \"$1\" \"cd /not/there ${2#cd \'*\'}\"\n"
-                       << "exec sh -c \"$2\"\n";
+    std::ofstream(ssh)
+        << "#!/bin/sh\n[ \"$1\" = -o ] && shift 2\necho \"$1\" >> '" << path().string()
+        << "/hosts'\n"
+        << "[ $1 = dead ] && echo 'ssh: no route to host' && exit 255\n"
+        << "[ $1 = unmounted ] && echo 'pencilscan: rig.json: the file does not exist' && exit 2\n"
+        << "[ $1 = readonly ] && echo 'inputs.json: cannot be written' && exit 1\n"
+        << "[ $1 = apart ] && set \"$1\" \"cd /not/there ${2#cd \'*\'}\"\n"
+        << "exec sh -c \"$2\"\n";
     fs::permissions(ssh, fs::perms::owner_all);
     QueueOptions options;
     options.ssh = {ssh.string(), "-o", "BatchMode=yes"};
@@ -166,6 +170,37 @@ TEST_F(Ssh, AHostWithoutTheFolderDoesNoTask) {
   EXPECT_EQ(read_file(path() / "ran").size(), 6 * 4U);
 }
 
+TEST_F(Ssh, AHostThatRefusesTheInputEndsNoOthers) {
+  const Job job = job_on({"good", "unmounted"}, "sleep 0.05; echo $shard >> ran");
+  const TaskReport report = run_tasks(job, all(job), options());
+  EXPECT_EQ(report.done, 6U);
+  EXPECT_THAT(report.hosts_left_out, ElementsAre("unmounted"));
+  EXPECT_EQ(read_file(path() / "ran").size(), 6 * 4U);
+}
+
+TEST_F(Ssh, WhatAllHostsRefuseIsBadInput) {
+  const Job job = job_on({"unmounted", "unmounted"}, "");
+  EXPECT_THROW((void)run_tasks(job, all(job), options()), InputError);
+  EXPECT_THAT(error_of([&] { (void)run_tasks(job, all(job), options()); }),
+              HasSubstr("the file does not exist"));
+}
+
+TEST_F(Ssh, AHostThatCannotWriteTakesNotAllThatWaits) {
+  const Job job = job_on({"readonly", "good"},
+                         "sleep 0.2; echo $shard >> ran; echo 'frames_failed   1'; exit 1");
+  std::vector<std::string> said;
+  QueueOptions watched = options();
+  watched.say = [&](const std::string& text) { said.push_back(text); };
+  const TaskReport report = run_tasks(job, all(job), watched);
+  EXPECT_EQ(report.done, 6U);
+  EXPECT_THAT(report.lost, IsEmpty());
+  EXPECT_THAT(report.hosts_left_out, ElementsAre("readonly"));
+  EXPECT_EQ(read_file(path() / "ran").size(), 6 * 4U);
+  EXPECT_THAT(said, ::testing::Contains(
+                        HasSubstr("on readonly did not come to its frames, the host gets no more: "
+                                  "inputs.json: cannot be written")));
+}
+
 TEST_F(Ssh, ATaskThatIsKilledOverThereIsNoLostHost) {
   const Job job =
       job_on({"good"}, "[ $shard = 4/6 ] && [ ! -e once ] && touch once && kill -9 $$\nexit 0");
@@ -178,7 +213,7 @@ TEST_F(Ssh, ATaskThatIsKilledOverThereIsNoLostHost) {
 TEST_F(Ssh, NoHostIsAFailureThatSaysWhere) {
   const Job job = job_on({"dead"}, "");
   EXPECT_THAT(error_of([&] { (void)run_tasks(job, all(job), options()); }),
-              HasSubstr("no host can be reached"));
+              HasSubstr("no host can do them"));
   EXPECT_THAT(last_log_line(job.out, 0), HasSubstr("no route to host"));
 }
 

@@ -33,6 +33,7 @@ struct Slot {
   bool left_out = false;
   pid_t process = -1;
   std::size_t task = 0;
+  std::uintmax_t log_before = 0;  ///< bytes that its task's log had when this try began
 };
 
 /// Starts words[0] with its output appended to a log. It ends when this program does.
@@ -90,8 +91,9 @@ class TaskQueue {
       wait_for_one();
     }
     if (!waiting_.empty()) {
+      if (refused_) throw *refused_;
       throw StageError(std::to_string(waiting_.size()) +
-                       " tasks are left and no host can be reached (" + "see the logs in " +
+                       " tasks are left and no host can do them (see the logs in " +
                        job_folder(job_.out).string() + ")");
     }
     return std::move(report_);
@@ -110,7 +112,10 @@ class TaskQueue {
         words = options_.ssh;
         words.insert(words.end(), {slot.host, command});
       }
-      slot.process = start(words, task_log(job_.out, slot.task));
+      const fs::path log = task_log(job_.out, slot.task);
+      std::error_code not_there;
+      slot.log_before = fs::exists(log, not_there) ? fs::file_size(log) : 0;
+      slot.process = start(words, log);
     }
   }
   [[nodiscard]] bool is_running() const {
@@ -139,28 +144,61 @@ class TaskQueue {
     if (host_lost) {
       lose_host(slot, who, code);
     } else if (code == kBadInput || code == kNoProgram || code == kNoProgram + 1) {
-      throw InputError(task_log(job_.out, slot.task).string(), "",
-                       last_log_line(job_.out, slot.task),
-                       "every task needs input that it can read");
+      const InputError refused(task_log(job_.out, slot.task).string(), "",
+                               last_log_line(job_.out, slot.task),
+                               "every task needs input that it can read");
+      if (slot.host.empty()) throw refused;
+      refuse(slot, who, refused);
     } else if (code >= 128) {
       put_back(slot.task, who + " was ended by signal " + std::to_string(code - 128));
+    } else if (code != 0 && !went_through(job_.out, slot.task, slot.log_before)) {
+      ended_early(slot, who);
     } else {
       slot.lost_in_a_row = 0;
       ++report_.done;
       say(who + (code == 0 ? " is done" : " is done; frames of it failed"));
     }
   }
-  void lose_host(Slot& slot, const std::string& who, int code) {
-    ++slot.lost_in_a_row;
-    if (slot.lost_in_a_row >= kTrialsPerHost) {
-      slot.left_out = true;
-      report_.hosts_left_out.push_back(slot.host);
+  /// It did not come as far as its frames: the output cannot be written, memory is too little. Such
+  /// a host would be free at once, and take all that waits.
+  void ended_early(Slot& slot, const std::string& who) {
+    const std::string what = who + " did not come to its frames";
+    const std::string why = ": " + last_log_line(job_.out, slot.task);
+    if (slot.host.empty()) return say(what + why);
+    count_failure(slot);
+    const std::string so = what + (slot.left_out ? ", the host gets no more" : "") + why;
+    if (restarts_[slot.task]++ < job_.retries) {
+      waiting_.push_back(slot.task);
+      ++report_.restarts;
+      say(so);
+    } else {
+      report_.lost.push_back(slot.task);
+      say(so + " (as often as it may)");
     }
-    // That a host is lost is no fault of the task.
+  }
+  void lose_host(Slot& slot, const std::string& who, int code) {
+    count_failure(slot);
+    give_back(slot,
+              who + (code == kHostLost ? ": the host is lost" : ": the program is not there"));
+  }
+  void count_failure(Slot& slot) {
+    if (++slot.lost_in_a_row >= kTrialsPerHost) leave_out(slot);
+  }
+  /// Here the input was good: over there a folder is not mounted, or the program is another.
+  void refuse(Slot& slot, const std::string& who, const InputError& refused) {
+    refused_ = refused;
+    leave_out(slot);
+    give_back(slot, who + ": the host refuses the input");
+  }
+  void leave_out(Slot& slot) {
+    slot.left_out = true;
+    report_.hosts_left_out.push_back(slot.host);
+  }
+  /// That a host is lost is no fault of the task.
+  void give_back(const Slot& slot, const std::string& what) {
     waiting_.push_front(slot.task);
     ++report_.restarts;
-    say(who + (code == kHostLost ? ": the host is lost" : ": the program is not there") +
-        (slot.left_out ? ", it gets no more: " : ": ") + last_log_line(job_.out, slot.task));
+    say(what + (slot.left_out ? ", it gets no more: " : ": ") + last_log_line(job_.out, slot.task));
   }
   void put_back(std::size_t task, const std::string& why) {
     if (restarts_[task]++ < job_.retries) {
@@ -188,6 +226,7 @@ class TaskQueue {
   std::deque<std::size_t> waiting_;
   std::vector<Slot> slots_;
   std::map<std::size_t, int> restarts_;
+  std::optional<InputError> refused_;  ///< by the host that was left out last for it
   TaskReport report_;
 };
 

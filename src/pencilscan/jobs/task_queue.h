@@ -14,7 +14,7 @@ struct TaskReport {
   std::size_t done = 0;           ///< with all their frames, or with some that failed
   std::size_t restarts = 0;       ///< of tasks that were killed or whose host was lost
   std::vector<std::size_t> lost;  ///< started again as often as allowed, and killed each time
-  std::vector<std::string> hosts_left_out;  ///< could not be reached
+  std::vector<std::string> hosts_left_out;  ///< could not be reached, or do no task
 };
 
 struct QueueOptions {
@@ -35,9 +35,9 @@ struct QueueOptions {
 /// Runs the given tasks of a job, on this machine `limit` at once, or over ssh one per host (name a
 /// host twice for two): whoever is free takes the next. A task that ends by a signal, or whose host
 /// is lost, goes back to the queue at most `retries` times; it goes on where it ended. A host that
-/// cannot be reached twice in a row gets no more. InputError when a task says that its input is
-/// bad: all would. StageError when no host is left, or when told to stop; what still runs is ended
-/// first.
+/// cannot be reached, or ends a task before its frames, twice in a row gets no more, nor one that
+/// refuses the input. InputError when a task says that its input is bad, of hosts when none is
+/// left. StageError when no host is left, or when told to stop; what still runs is ended first.
 [[nodiscard]] TaskReport run_tasks(const Job& job, std::span<const std::size_t> tasks,
                                    const QueueOptions& options);
 
