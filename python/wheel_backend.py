@@ -33,7 +33,7 @@ def _metadata() -> str:
         "Summary: Entire shapes from one frame of a ring of cameras and projectors\n"
         "License: Apache-2.0\n"
         "Requires-Python: >=3.9\n"
-        "Requires-Dist: numpy\n"
+        "Requires-Dist: numpy<2\n"  # pybind11 before 2.12 reads dtypes of NumPy 2 wrong
         "Description-Content-Type: text/markdown\n"
         f"\n{readme}"
     )

@@ -47,6 +47,8 @@ class WheelTest(unittest.TestCase):
                 self.assertEqual(digest, "sha256=" + found.decode())
             self.assertIn("pencilscan/_core.pyi", names)
             self.assertIn("pencilscan/py.typed", names)
+            metadata = next(name for name in names if name.endswith("/METADATA"))
+            self.assertIn(b"Requires-Dist: numpy<2\n", wheel.read(metadata))
 
     def test_it_works_where_nothing_else_is(self) -> None:
         site = self.folder / "site"
