@@ -514,6 +514,8 @@ def simulate(
         As in `reconstruct`.
     """
     _check_threads(threads)
+    check_name("noise", noise)
+    check_name("up", up)
     _check_range("seed", seed, 2**64 - 1)
     _check_range("frame", frame, 2**31 - 1)
     shift = tuple(float(x) for x in translate_mm)

@@ -520,6 +520,9 @@ class PackageTest(unittest.TestCase):
                 lambda: ps.simulate(self.scene.rig, ball, **options))), options)
         self.assertIn("medium", str(self.complaint(
             lambda: ps.simulate(self.scene.rig, ps.make_sphere(100), noise="loud"))))
+        for options in ({"noise": 0.1}, {"up": 2}):
+            self.assertIn("a name in quotes", str(self.complaint(
+                lambda: ps.simulate(self.scene.rig, ball, **options))), options)
         self.assertIn("colours^order", str(self.complaint(lambda: ps.ring(order=30))))
         self.assertIn("green", str(self.complaint(lambda: ps.ring(colors=(("mauve", "blue"),)))))
         for colors in (((),), (("blue", "cyan"), ()), ("blue", "cyan")):
