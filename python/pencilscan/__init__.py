@@ -12,25 +12,13 @@ library gives are views of its memory. `help(ps.reconstruct)` tells all options.
 """
 
 from . import _core
+from ._calibration import CalibratedRig, calibrate
 from ._errors import Cancelled, InputError, StageError
+from ._mesh import Mesh, make_sphere, read_mesh
 from ._rig import Rig, read_rig, ring
-from ._scan import (
-    CalibratedRig,
-    CameraDepth,
-    Crossings,
-    Curves,
-    Mesh,
-    Points,
-    Result,
-    SimulatedFrame,
-    calibrate,
-    evaluate,
-    make_sphere,
-    read_mesh,
-    reconstruct,
-    simulate,
-)
+from ._scan import Result, SimulatedFrame, evaluate, reconstruct, simulate
 from ._stages import Detection, GridCurves, Labels, detect, label, measure
+from ._tables import CameraDepth, Crossings, Curves, Points
 
 __version__: str = _core.version
 __all__ = [

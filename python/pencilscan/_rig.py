@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
-from typing import Any, Mapping, Union
+from typing import Any, Callable, Mapping, Optional, Union
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from . import _core
 from ._errors import InputError
 
 PathLike = Union[str, "os.PathLike[str]"]
+Progress = Callable[[str, float], Optional[bool]]
 
 
 def path_of(path: PathLike) -> bytes:
@@ -48,6 +49,15 @@ def check_whole(file: str, name: str, value: Any, first: int, last: int) -> None
     """InputError unless `value` is a whole number from `first` to `last`."""
     if not isinstance(value, (int, np.integer)) or not first <= value <= last:
         raise InputError(file, name, str(value), f"must be a whole number from {first} to {last}")
+
+
+def check_range(name: str, value: int, last: int) -> None:
+    """InputError unless 0 <= value <= last, before the library says it in terms of its own."""
+    check_whole("options", name, value, 0, last)
+
+
+def check_threads(threads: int) -> None:
+    check_range("threads", threads, 2**31 - 1)
 
 
 def check_name(name: str, value: Any) -> None:

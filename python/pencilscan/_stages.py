@@ -8,11 +8,12 @@ import numpy as np
 
 from . import _core
 from ._errors import InputError
-from ._rig import PathLike, Rig, as_pictures, as_rig, check_name, finished
-from ._scan import Crossings, Curves, Progress, Result, _check_threads, _Table
+from ._rig import PathLike, Progress, Rig, as_pictures, as_rig, check_name, check_threads, finished
+from ._scan import Result
+from ._tables import Crossings, Curves, Table
 
 
-class GridCurves(_Table):
+class GridCurves(Table):
     """What the grid says of each curve before its line is known; views of one memory.
 
     Attributes
@@ -77,7 +78,7 @@ class Detection:
         return f"<pencilscan.Detection: {len(self.grid)} curves, {len(self.curves)} points>"
 
 
-class Labels(_Table):
+class Labels(Table):
     """Which line each curve point is, in the order of `Detection.curves`.
 
     Attributes
@@ -137,7 +138,7 @@ class Labels(_Table):
     def _of(cls, core: Any) -> "Labels":
         labels = cls.__new__(cls)
         labels._core = core
-        _Table.__init__(labels, core.arrays)
+        Table.__init__(labels, core.arrays)
         return labels
 
 
@@ -176,7 +177,7 @@ def detect_curves(
     threads: int, progress: Optional[Progress],
 ) -> Detection:
     """`detect` as a part of more: its end is not the end."""
-    _check_threads(threads)
+    check_threads(threads)
     check_name("method", method)
     check_name("frame", frame)
     rig = as_rig(rig)
@@ -203,7 +204,7 @@ def label(
     InputError
         The method needs identities, and the curves were detected without.
     """
-    _check_threads(threads)
+    check_threads(threads)
     check_name("method", method)
     check_name("multiview_cost", multiview_cost)
     labels = Labels._of(
@@ -245,7 +246,7 @@ def measure(
     """
     if not isinstance(labels, Labels):
         raise InputError("labels", "", type(labels).__name__, "must be pencilscan.Labels")
-    _check_threads(threads)
+    check_threads(threads)
     result = Result(
         _core.measure(
             detection._core, labels._core, "joint" if guided else "multiview", mesh, depth,
