@@ -1,7 +1,9 @@
 // What sigma and confidence of a frame rest on, beside the true errors:
 //   error_evidence <scene folder: rig.json, frames/000000, truth/mesh.ply> <folder for the answer>
-// surface.f32: a row of 7 floats per measured vertex; points.f32: a row of 8 per point, with the
-// confidence that the lines' margins give. Lengths in footprints (experiments/error_model.py).
+// surface.f32: a row of 7 floats per measured vertex; points.f32: a row of 9 per point, with the
+// confidence that the lines' margins give and the one that is stated; lines.f32: of points that no
+// surface was asked of, 1 if the line is right, else 0, and what margins give. Lengths in
+// footprints (experiments/error_model.py).
 //   error_evidence --lines <scene folder> <folder for the answer>
 // lines.f32: per point of the joint labels, however unsure, before any surface: 1 if its line is
 // right, else 0, and the confidence (experiments/one_projector.py --fit).
@@ -19,6 +21,7 @@
 #include "pencilscan/evaluation/truth_scene.h"
 #include "pencilscan/io/mesh_file.h"
 #include "pencilscan/pipeline/frame.h"
+#include "pencilscan/pipeline/sensor_frame.h"
 #include "read_frame.h"
 
 namespace pencilscan {
@@ -45,11 +48,6 @@ std::vector<float> surface_rows(const TruthScene& truth, const SurfaceResult& su
   return rows;
 }
 
-/// Confidences that report less than 1 for errors that no margin tells, without that.
-float confidence_of_lines(const MeasuredPoint& point) {
-  return std::min(1.F, point.confidence + (1 - reported_confidence(1)));
-}
-
 std::vector<float> point_rows(const TruthScene& truth, const PointResult& result, float per_unit) {
   std::vector<float> rows;
   const std::vector<PointVerdict> verdicts = judge_points(truth, result.points);
@@ -59,34 +57,56 @@ std::vector<float> point_rows(const TruthScene& truth, const PointResult& result
     const MeasuredPoint& p = result.points[i];
     rows.insert(rows.end(),
                 {static_cast<float>(verdicts[i].ray_error_mm) * per_unit, e.own, e.surface,
-                 e.difference, e.settled ? 1.F : 0.F, verdicts[i].right ? 1.F : 0.F,
-                 confidence_of_lines(p), p.sigma * per_unit});
+                 e.difference, e.settled ? 1.F : 0.F, verdicts[i].right ? 1.F : 0.F, e.confidence,
+                 p.sigma * per_unit, p.confidence});
   }
   return rows;
 }
 
-void write_lines(const std::filesystem::path& scene, const std::filesystem::path& out) {
+/// Points whose confidence is what margins say; no surface was asked.
+std::vector<MeasuredPoint> points_by_margins(const Rig& rig, const Frame& frame,
+                                             const PointOptions& options) {
+  std::vector<StageTime> times;
+  const StageClock clock({}, times);
+  const SensorFrame sensor = sensor_frame(in_footprints(rig), frame);
+  PointResult curves = detect_frame(sensor.rig, sensor.frame, options, clock);
+  curves = check_pictures(sensor.rig, sensor.frame, std::move(curves));
+  PointResult lines = solve_frame(sensor.rig, sensor.frame, std::move(curves), options, clock);
+  std::vector<MeasuredPoint> points =
+      place_points(sensor.rig, std::move(lines), options, clock).points;
+  const auto unit = static_cast<float>(footprint(rig));
+  for (MeasuredPoint& p : points) {
+    for (float* length : {&p.x, &p.y, &p.z}) *length *= unit;
+  }
+  return points;
+}
+
+void write_lines(const std::filesystem::path& scene, const std::filesystem::path& out,
+                 const PointOptions& options) {
   cv::setNumThreads(1);
   const Rig rig = read_rig(scene / "rig.json");
-  JointOptions joint;
-  joint.min_confidence = 0;
-  joint.min_uncrossed_confidence = 0;
-  FrameOptions options;
-  options.meshes = false;
-  options.points.method = joint;
-  options.points.guided.passes = 0;
-  const FrameResult result =
-      reconstruct_frame(rig, read_frame(rig, scene / "frames/000000"), options);
+  const std::vector<MeasuredPoint> points =
+      points_by_margins(rig, read_frame(rig, scene / "frames/000000"), options);
   const TruthScene truth(read_mesh(scene / "truth/mesh.ply"), rig);
-  const std::vector<MeasuredPoint>& points = result.points.points;
   const std::vector<PointVerdict> verdicts = judge_points(truth, points);
   std::vector<float> rows;
   for (std::size_t i = 0; i < points.size(); ++i) {
     if (!verdicts[i].counted) continue;
-    rows.insert(rows.end(), {verdicts[i].right ? 1.F : 0.F, confidence_of_lines(points[i])});
+    rows.insert(rows.end(), {verdicts[i].right ? 1.F : 0.F, points[i].confidence});
   }
   std::filesystem::create_directories(out);
   write_floats(out / "lines.f32", rows);
+}
+
+/// Of all pieces, however unsure, before guided matching.
+PointOptions of_all_pieces() {
+  JointOptions joint;
+  joint.min_confidence = 0;
+  joint.min_uncrossed_confidence = 0;
+  PointOptions options;
+  options.method = joint;
+  options.guided.passes = 0;
+  return options;
 }
 
 void run(const std::filesystem::path& scene, const std::filesystem::path& out) {
@@ -98,6 +118,7 @@ void run(const std::filesystem::path& scene, const std::filesystem::path& out) {
   std::filesystem::create_directories(out);
   write_floats(out / "surface.f32", surface_rows(truth, result.shape.surface, per_unit));
   write_floats(out / "points.f32", point_rows(truth, result.points, per_unit));
+  write_lines(scene, out, {});
 }
 
 }  // namespace
@@ -110,7 +131,13 @@ int main(int argc, char** argv) {
     return 2;
   }
   try {
-    (of_lines ? pencilscan::write_lines : pencilscan::run)(argv[argc - 2], argv[argc - 1]);
+    const char* scene = argv[argc - 2];
+    const char* out = argv[argc - 1];
+    if (of_lines) {
+      pencilscan::write_lines(scene, out, pencilscan::of_all_pieces());
+    } else {
+      pencilscan::run(scene, out);
+    }
   } catch (const std::exception& error) {
     std::fprintf(stderr, "%s\n", error.what());
     return 1;

@@ -57,8 +57,20 @@ std::string why_room_alone(const PointResult& result) {
          "states?";
 }
 
+/// From what margins in the pictures say to how often labels are right.
+void state_confidence(const PointOptions& options, PointResult& result) {
+  if (!solution_method(options.method).capabilities.may_be_guided) return;
+  for (std::size_t i = 0; i < result.points.size(); ++i) {
+    float& confidence = result.points[i].confidence;
+    confidence = result.is_on_surface ? confidence_on_surface(result.evidence[i])
+                                      : confidence_on_lines(confidence);
+  }
+}
+
 /// What is done once no line's name changes any more.
-void end_points(const Rig& rig, const Frame& frame, PointResult& result) {
+void end_points(const Rig& rig, const Frame& frame, const PointOptions& options,
+                PointResult& result) {
+  state_confidence(options, result);
   Rig above = rig;  // what a floor's lines do is said of the floor
   if (result.floor) above.floor = result.floor->floor;
   if (auto warning =
@@ -112,7 +124,7 @@ FrameResult measure_frame(const Rig& rig, const Frame& frame, PointResult lines,
   if (shows_room_alone(result.points)) throw NothingFound(why_room_alone(result.points));
   if (result.points.points.empty()) throw NothingFound(why_nothing(rig, result.points));
   if (!options.meshes) {
-    end_points(rig, frame, result.points);
+    end_points(rig, frame, options.points, result.points);
     return result;
   }
   const Frame right = without(frame, result.points.left_out);
@@ -121,7 +133,7 @@ FrameResult measure_frame(const Rig& rig, const Frame& frame, PointResult lines,
   result = match_on_surface(rig, std::move(result), options.points, clock);
   clock("confirmation",
         [&] { result = finish_shape(rig, std::move(result), options.shape.fusion); });
-  end_points(rig, frame, result.points);
+  end_points(rig, frame, options.points, result.points);
   if (auto warning = little_light_warning(rig, result.points))
     result.points.warnings.push_back(std::move(*warning));
   if (auto warning = depth_warning(result.shape.depth.report.consistency, result.points.warnings))

@@ -10,8 +10,9 @@ namespace pencilscan {
 
 struct SettleOptions {
   double model_px = 0.05;  ///< what a quadratic patch misses: depth in pixel footprints, at tilt 0
-  double max_deviations = 6;            ///< from the surface around, in standard deviations; > 0
-  double min_alone_confidence = 0.995;  ///< of a point where nothing around shows one surface
+  double max_deviations = 6;  ///< from the surface around, in standard deviations; > 0
+  /// Of a point where nothing around shows one surface, by margins in the picture.
+  double min_alone_confidence = 0.99514;
   /// The rig is off. Neighbours then have the same error and cannot correct each other: sigma is
   /// never less than the point's own.
   bool errors_are_shared = false;

@@ -217,6 +217,7 @@ SettledPoints settle_on_surface(const Rig& rig, const RayScene& surface,
     if (check.contradicts(camera, pixel, {p.projector, p.pattern}, p.line, hit)) keep[i] = 0;
     PointEvidence& evidence = settled.evidence[i];
     evidence.own = points[i].sigma;
+    evidence.confidence = points[i].confidence;
     p.sigma = static_cast<float>(point_sigma(evidence));
     const auto stay = [&] {
       if (p.confidence < min_alone_confidence || check.is_better_known(p)) keep[i] = 0;

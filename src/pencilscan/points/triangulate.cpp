@@ -75,7 +75,7 @@ void add_run(const Rig& rig, const GridGraph& graph, const LabeledRun& run,
     point.line = static_cast<std::uint16_t>(label.line);
     point.sigma = static_cast<float>(root_of_squares(sigma_px / std::max(1e-6, slope), footprint) *
                                      ray_length);
-    point.confidence = reported_confidence(label.confidence);
+    point.confidence = label.confidence;
     point.plane = static_cast<float>(label.plane);
     points.push_back(point);
   }

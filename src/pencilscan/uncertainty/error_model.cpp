@@ -14,7 +14,19 @@ constexpr double kOnLines = 0.876;
 constexpr double kDifference = 0.167;
 constexpr double kOwnOff = 1.86;
 constexpr double kDifferenceOff = 0.97;
-constexpr double kSharedErrors = 0.00014;
+
+/// How often labels are wrong, by what margins say of it.
+struct WrongShare {
+  double shared, factor, power;
+
+  [[nodiscard]] float confidence(float of_margin) const {
+    const double said = std::clamp(1 - static_cast<double>(of_margin), 0.0, 1.0);
+    return static_cast<float>(1 - std::min(1.0, shared + factor * std::pow(said, power)));
+  }
+};
+constexpr WrongShare kLabelsByLines{0.000724, 0.467, 0.634};
+constexpr WrongShare kLabelsOnSurface{0.000065, 0.053, 0.626};
+constexpr WrongShare kLabelsOffSurface{0.121, 0, 1};
 
 /// Footprints. No mean of depths was ever seen to be better; keeps exact data from saying 0.
 constexpr double kLeast = 0.01;
@@ -39,8 +51,10 @@ double point_sigma(const PointEvidence& evidence) {
   return std::hypot(kOwnOff * own, kDifferenceOff * difference);
 }
 
-float reported_confidence(float confidence) {
-  return std::max(0.F, confidence - static_cast<float>(kSharedErrors));
+float confidence_on_lines(float of_margin) { return kLabelsByLines.confidence(of_margin); }
+
+float confidence_on_surface(const PointEvidence& evidence) {
+  return (evidence.settled ? kLabelsOnSurface : kLabelsOffSurface).confidence(evidence.confidence);
 }
 
 }  // namespace pencilscan

@@ -20,6 +20,7 @@ struct PointEvidence {
   float own = 0;         ///< deviation that it had by itself
   float surface = 0;     ///< deviation of the surface that its ray meets; 0: it meets none
   float difference = 0;  ///< from that surface
+  float confidence = 0;  ///< of its label, as margins in the picture say
   bool settled = false;  ///< it lies on the surface now
 };
 
@@ -33,8 +34,15 @@ struct PointEvidence {
 /// them; where point and surface contradict each other, either may be wrong.
 [[nodiscard]] double point_sigma(const PointEvidence& evidence);
 
-/// The probability that a label is right, where lines' margins in the picture say `confidence`:
-/// they know nothing of the rare errors that all pictures share.
-[[nodiscard]] float reported_confidence(float confidence);
+/// The probability that a label is right, where margins in the picture say `of_margin` and no dense
+/// surface was asked. Margins take evidence for independent that is not, and know nothing of rare
+/// errors that all pictures share: the share of wrong labels is a power of what they say, and never
+/// below a small one.
+[[nodiscard]] float confidence_on_lines(float of_margin);
+
+/// The same where the dense surface was asked, which light of all pixels and cameras made: nearly
+/// all wrong labels contradict it and are gone. Where a point does not lie on it, margins say
+/// nothing.
+[[nodiscard]] float confidence_on_surface(const PointEvidence& evidence);
 
 }  // namespace pencilscan

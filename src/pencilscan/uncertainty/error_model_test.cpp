@@ -51,11 +51,32 @@ TEST(ErrorModel, APointIsLessSureTheFartherItWasOff) {
   EXPECT_GT(point_sigma({0.3F, 0, 0, false}), 0.3) << "a point alone";
 }
 
+PointEvidence evidence_of(float of_margin, bool settled) {
+  PointEvidence evidence;
+  evidence.confidence = of_margin;
+  evidence.settled = settled;
+  return evidence;
+}
+
 TEST(ErrorModel, NoLabelIsCertain) {
-  EXPECT_LT(reported_confidence(1), 1);
-  EXPECT_GT(reported_confidence(1), 0.999F);
-  EXPECT_EQ(reported_confidence(0), 0);
-  EXPECT_GT(reported_confidence(0.99F), 0.989F);
+  EXPECT_LT(confidence_on_lines(1), 1);
+  EXPECT_GT(confidence_on_lines(1), 0.999F);
+  EXPECT_LT(confidence_on_surface(evidence_of(1, true)), 1);
+  EXPECT_GE(confidence_on_lines(0), 0);
+  EXPECT_GE(confidence_on_surface(evidence_of(0, true)), 0);
+}
+
+TEST(ErrorModel, ASurfaceMakesLabelsSurer) {
+  float before = 0;
+  for (const float of_margin : {0.9F, 0.99F, 0.999F, 0.9999F}) {
+    const float alone = confidence_on_lines(of_margin);
+    const float settled = confidence_on_surface(evidence_of(of_margin, true));
+    EXPECT_GT(settled, alone);
+    EXPECT_GT(alone, before) << "surer by margins: surer";
+    EXPECT_LT(confidence_on_surface(evidence_of(of_margin, false)), settled);
+    before = alone;
+  }
+  EXPECT_LT(confidence_on_surface(evidence_of(1, false)), 0.99F) << "it contradicts the surface";
 }
 
 }  // namespace
