@@ -226,6 +226,41 @@ TEST(DetectCurves, EveryLineOfADenseFieldIsFoundHoweverSharpItIs) {
   }
 }
 
+/// Presence of ten lines 8 px apart on a bright surface with a dark strip of `dark` times its
+/// albedo, from x = 100 to 200, and of the black around.
+cv::Mat lines_over_a_dark_strip(float dark, double noise) {
+  cv::Mat presence(300, 300, CV_32F);
+  for (int y = 0; y < presence.rows; ++y) {
+    Random random(12, static_cast<std::uint64_t>(y));
+    for (int x = 0; x < presence.cols; ++x) {
+      const double d = std::remainder(y - 4.3 - 0.05 * x, 8);
+      const auto light = static_cast<float>(y < 80 ? 0.5 * std::exp(-0.5 * d * d) : 0);
+      presence.at<float>(y, x) =
+          (x < 100 || x >= 200 ? 1 : dark) * light + static_cast<float>(random.normal(0, noise));
+    }
+  }
+  return presence;
+}
+
+/// Ridgels in the middle of the strip.
+std::size_t ridgels_on_the_strip(const cv::Mat& presence) {
+  const std::vector<Ridgel> ridgels = find_ridgels(presence);
+  return static_cast<std::size_t>(std::count_if(
+      ridgels.begin(), ridgels.end(), [](auto& r) { return r.x > 130 && r.x < 170 && r.y < 80; }));
+}
+
+TEST(Ridgels, OfLinesOnADarkSurfaceAreFoundBesideABrightOne) {
+  constexpr double kNoise = 0.001;
+  constexpr std::size_t kAll = 10 * 40;  // of ten lines
+  EXPECT_GT(ridgels_on_the_strip(lines_over_a_dark_strip(0.03F, kNoise)), kAll * 8 / 10);
+  // Of noise, and of what 8 bits round, no line is made.
+  EXPECT_LT(ridgels_on_the_strip(lines_over_a_dark_strip(0, kNoise)), 3U);
+  cv::Mat rounded;
+  lines_over_a_dark_strip(0.003F, 0).convertTo(rounded, CV_8U, 255);
+  rounded.convertTo(rounded, CV_32F, 1.0 / 255);
+  EXPECT_EQ(ridgels_on_the_strip(rounded), 0U);
+}
+
 TEST(LooksInterpolated, TellsFilledInColoursFromThreeChannels) {
   Random random(3);
   cv::Mat rgb(240, 320, CV_32FC3);

@@ -97,6 +97,46 @@ void add_ridgels(const std::vector<FilterMaximum>& maxima,
   }
 }
 
+/// Standard deviation of the response to the rounding of 8 bits: 1 / 255 / sqrt(12) a pixel, times
+/// the root of the sum of the filter's squared weights, .182 at sigma 1.3.
+constexpr float kRoundingResponse = 0.182F * 0.00113F;
+
+/// The strongest response near each place. What looks like a weak line beside strong ones is light
+/// of these, whose colours, blur and reflections reach so far; where all is dim, it is a line on a
+/// dark surface.
+class StrongNearby {
+ public:
+  /// `area`: of the image within the padding.
+  StrongNearby(const Hessian& h, const cv::Rect& area) {
+    cv::Mat peaks((area.height + kCell - 1) / kCell, (area.width + kCell - 1) / kCell, CV_32F);
+    for (int row = 0; row < peaks.rows; ++row) {
+      for (int column = 0; column < peaks.cols; ++column) {
+        const cv::Rect cell =
+            cv::Rect(area.x + column * kCell, area.y + row * kCell, kCell, kCell) & area;
+        double peak = 0;
+        const cv::Mat response = -(h.xx(cell) + h.yy(cell));
+        cv::minMaxLoc(response, nullptr, &peak);
+        peaks.at<float>(row, column) = static_cast<float>(peak);
+      }
+    }
+    cv::dilate(peaks, strongest_, cv::Mat::ones(2 * kAround + 1, 2 * kAround + 1, CV_8U));
+  }
+
+  [[nodiscard]] float at(int x, int y) const { return strongest_.at<float>(y / kCell, x / kCell); }
+  /// Of all places in a rectangle of the image.
+  [[nodiscard]] float least_in(const cv::Rect& area) const {
+    const cv::Point first(area.x / kCell, area.y / kCell);
+    const cv::Point last((area.br().x - 1) / kCell, (area.br().y - 1) / kCell);
+    return lowest_value(strongest_, {first, last + cv::Point(1, 1)});
+  }
+
+ private:
+  static constexpr int kCell = 8;  ///< px
+  static constexpr int kAround =
+      2;  ///< cells; with the own one, 16 px and more: the filter's reach
+  cv::Mat strongest_;
+};
+
 /// The image at one size, ready to be looked at.
 struct Look {
   cv::Mat image;
@@ -124,10 +164,15 @@ class RidgeFilter {
     return look;
   }
 
-  [[nodiscard]] float threshold_of(const Levels& levels) const {
+  /// `nearby`: the strongest response there.
+  [[nodiscard]] float threshold_of(const Levels& levels, float nearby) const {
     // Smoothing along a line keeps its response and divides that of white noise by about 2.
-    return std::max(static_cast<float>(options_.noise_factor) * 0.5F * levels.noise,
-                    static_cast<float>(options_.relative_threshold) * levels.strong);
+    const auto over_noise = static_cast<float>(options_.noise_factor) * 0.5F;
+    const auto share = static_cast<float>(options_.relative_threshold);
+    const float usual = share * levels.strong;
+    // What is dim all around may be the steps of 8 bits, which no noise may hide.
+    const float least = std::min(usual, over_noise * kRoundingResponse);
+    return std::max({over_noise * levels.noise, std::min(usual, share * nearby), least});
   }
 
   /// In pixels of the look's image.
@@ -135,7 +180,7 @@ class RidgeFilter {
     constexpr int kTile = FilterTile::kTile;
     std::vector<Ridgel> ridgels;
     if (look.levels.strong <= 0) return ridgels;
-    const float threshold = threshold_of(look.levels);
+    const StrongNearby nearby(look.hessian, {border_, border_, look.image.cols, look.image.rows});
     FilterTile tile(directions_);
     std::vector<FilterMaximum> maxima;
     const Hessian& h = look.hessian;
@@ -144,10 +189,14 @@ class RidgeFilter {
         const int width = std::min(kTile, look.image.cols - x0);
         const int height = std::min(kTile, look.image.rows - y0);
         const cv::Rect area(x0 + border_, y0 + border_, width, height);
+        const float threshold = threshold_of(look.levels, nearby.least_in({x0, y0, width, height}));
         if (-(lowest_value(h.xx, area) + lowest_value(h.yy, area)) < 0.7F * threshold)
           continue;  // nothing bright and thin in here
         tile.compute(h, area.x, area.y);
         tile.find_maxima(threshold, width, height, maxima);
+        std::erase_if(maxima, [&](const FilterMaximum& m) {
+          return m.at < threshold_of(look.levels, nearby.at(x0 + m.x, y0 + m.y));
+        });
         add_ridgels(maxima, directions_, x0, y0, ridgels);
       }
     }
