@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <optional>
 #include <utility>
@@ -27,7 +28,8 @@ struct Node {
 struct Link {
   std::uint32_t other;
   std::uint16_t group;     ///< map; maps + projector; or these + a map that contradicts
-  float disagreement = 0;  ///< of a support: distance across the surface over its deviation
+  float disagreement = 0;  ///< of a support: distance across the surface over its deviation; NaN:
+                           ///< the two are the two sides of a sheet
 };
 
 struct Links {
@@ -106,16 +108,22 @@ class Comparison {
   }
 
   /// Distance of node i from the surface at `other`, seen `beyond` it by the other's camera, over
-  /// the standard deviation that the two of them state; below zero where that is nearer.
+  /// the standard deviation that the two of them state; below zero where that is nearer. NaN where
+  /// they face away from each other: a sheet lies between them, and no error.
   [[nodiscard]] float disagreement(std::size_t i, std::size_t other, double beyond) const {
-    const auto cosine = [&](std::size_t k) {
-      const DepthMap& map = maps_[nodes_[k].map];
-      const Vec3& eye = rig_.cameras[static_cast<std::size_t>(map.camera)].center();
-      return (eye - nodes_[k].x).normalized().dot(node_normal(rig_, map, nodes_[k].index));
+    const auto normal = [&](std::size_t k) {
+      return node_normal(rig_, maps_[nodes_[k].map], nodes_[k].index);
     };
-    const double c = cosine(other);
+    const auto cosine = [&](std::size_t k, const Vec3& n) {
+      const auto camera = static_cast<std::size_t>(maps_[nodes_[k].map].camera);
+      return (rig_.cameras[camera].center() - nodes_[k].x).normalized().dot(n);
+    };
+    const Vec3 there = normal(other);
+    const Vec3 here = normal(i);
+    if (here.dot(there) < 0) return std::numeric_limits<float>::quiet_NaN();
+    const double c = cosine(other, there);
     const double sigma = std::hypot(c * static_cast<double>(node(other).sigma),
-                                    cosine(i) * static_cast<double>(node(i).sigma));
+                                    cosine(i, here) * static_cast<double>(node(i).sigma));
     return static_cast<float>(c * beyond / std::max(sigma, 1e-9));
   }
 
@@ -230,7 +238,8 @@ double sigma_scale(const Links& links) {
   constexpr double kUsual = 1.7;  // of the rendered scenes, where one camera is all there is
   std::vector<float> ratios;
   for (const auto& of_node : links.support) {
-    for (const Link& link : of_node) ratios.push_back(std::abs(link.disagreement));
+    for (const Link& link : of_node)
+      if (!std::isnan(link.disagreement)) ratios.push_back(std::abs(link.disagreement));
   }
   constexpr std::size_t kEnough = 200;
   if (ratios.size() < kEnough) return kUsual;
@@ -257,6 +266,7 @@ std::optional<double> shared_scale(const std::vector<Node>& nodes, std::span<con
     const int block =
         index / map.columns / kBlock * across(nodes[i].map) + index % map.columns / kBlock;
     for (const Link& link : links.support[i]) {
+      if (std::isnan(link.disagreement)) continue;
       auto& blocks = seen[{nodes[i].map, link.group}];
       if (blocks.empty())
         blocks.resize(static_cast<std::size_t>((map.rows / kBlock + 1) * across(nodes[i].map)));

@@ -397,6 +397,38 @@ TEST(Consistency, FloatingPatchIsRemovedAndUnconfirmedDepthStays) {
   EXPECT_LT(check_consistency(scene.rig, projectors, alone).contradicted, 5u);
 }
 
+/// A flat map, parallel to the image, of a camera that looks at the origin: all of it at one depth.
+DepthMap flat_map(const Rig& rig, int camera, double depth) {
+  const Camera& device = rig.cameras[static_cast<std::size_t>(camera)];
+  DepthMap map;
+  map.camera = camera;
+  map.columns = device.width / map.stride;
+  map.rows = device.height / map.stride;
+  DepthNode node;
+  node.w = static_cast<float>(1 / depth);
+  node.sigma = 0.05F;
+  node.seeded = true;
+  node.reason = HoleReason::kMeasured;
+  map.nodes.assign(static_cast<std::size_t>(map.columns * map.rows), node);
+  return map;
+}
+
+TEST(Consistency, TheTwoSidesOfASheetDoNotDisagree) {
+  constexpr double kThickness = 1;  // less than what lies at one place
+  Rig rig = small_rig();
+  const auto factor = [&](const Vec3& second_eye, double second_depth) {
+    rig.cameras[0] = sample::device_at<Camera>({600, 0, 0}, "cam0", 240, 200, 900);
+    rig.cameras[1] = sample::device_at<Camera>(second_eye, "cam1", 240, 200, 900);
+    std::vector<DepthMap> maps{flat_map(rig, 0, 600 - kThickness / 2),
+                               flat_map(rig, 1, second_depth)};
+    const std::vector<int> projectors = {0, 1};
+    return check_consistency(rig, projectors, maps).sigma_factor;
+  };
+  EXPECT_LT(factor({-600, 0, 0}, 600 - kThickness / 2), 2);
+  // From the same side, one of them is wrong by as much.
+  EXPECT_GT(factor({600, 0, 0}, 600 + kThickness / 2), 4);
+}
+
 TEST(Consistency, ShadowsAreTheSameHoweverFineTheProjectorsPixelsAre) {
   const BallScene& scene = ball_scene();
   const std::vector<int> projectors = {0, 1};

@@ -130,6 +130,10 @@ ViewsApart views_apart(const Rig& rig, std::span<const MeasuredPoint> points,
     float deviations;
   };
   const double reach = kSameSurface * line_spacing(rig);
+  // A thin plate has another surface right behind: what one side shows of the other says nothing.
+  const auto faces = [&](const MeasuredPoint& p, const Camera& camera) {
+    return about_facing(rig, p).dot(camera.center() - position_of(p)) > 0;
+  };
   std::vector<Ratio> ratios;
   const std::size_t step = std::max(kNext, points.size() / kMost);
   for (std::size_t i = 0; i < points.size(); i += step) {
@@ -137,7 +141,7 @@ ViewsApart views_apart(const Rig& rig, std::span<const MeasuredPoint> points,
     for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
       const Camera& camera = rig.cameras[c];
       const auto pixel = camera.project(position_of(p));
-      if (c == p.camera || !pixel || !camera.contains(*pixel)) continue;
+      if (c == p.camera || !pixel || !camera.contains(*pixel) || !faces(p, camera)) continue;
       const Eigen::Vector2f at = pixel->cast<float>();
       const SurfacePatch* patch = surfaces[c].nearest(at);
       if (patch == nullptr || patch->one_sidedness > kOneSided) continue;

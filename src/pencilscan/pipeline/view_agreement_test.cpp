@@ -85,6 +85,36 @@ TEST(ViewAgreement, TwoBallsAFractionOfALineApartLieManyDeviationsApart) {
   EXPECT_FALSE(views_apart(rig, of_one, local_surfaces(rig, of_one, {})).all.has_value());
 }
 
+TEST(ViewAgreement, TheTwoSidesOfASheetSayNothingOfEachOther) {
+  constexpr double kThickness = 0.3;  // line spacings
+  Rig rig = sample::small_rig(480, 360, 110);
+  rig.cameras[0] = sample::device_at<Camera>({560, 0, 80}, "cam0", 480, 360, 900);
+  rig.cameras[1] = sample::device_at<Camera>({-560, 0, 80}, "cam1", 480, 360, 900);
+  rig.projectors[1].device_from_world = look_at({-450, 100, 45}, Vec3::Zero());
+  const auto apart = [&](int second_camera, int second_projector) {
+    std::vector<MeasuredPoint> points;
+    for (int side = 0; side < 2; ++side) {
+      for (int i = 0; i < 6400; ++i) {
+        MeasuredPoint p;
+        p.camera = static_cast<std::uint8_t>(side == 0 ? 0 : second_camera);
+        p.projector = static_cast<std::uint8_t>(side == 0 ? 0 : second_projector);
+        set_position({(0.5 - side) * kThickness * line_spacing(rig), i % 80 - 39.5, i / 80 - 39.5},
+                     p);
+        const Vec2 pixel = rig.cameras[p.camera].project(position_of(p)).value();
+        p.u = static_cast<float>(pixel.x());
+        p.v = static_cast<float>(pixel.y());
+        p.sigma = 0.05F;
+        points.push_back(p);
+      }
+    }
+    return views_apart(rig, points, local_surfaces(rig, points, {})).all;
+  };
+  EXPECT_FALSE(apart(1, 1).has_value());
+  // From the same side, what they see lies apart.
+  rig.cameras[1] = sample::device_at<Camera>({560, 90, 80}, "cam1", 480, 360, 900);
+  EXPECT_GT(apart(1, 0).value(), kMostApart);
+}
+
 TEST(ViewAgreement, TheOneOfThreeCamerasThatLiesApartIsNamed) {
   Rig rig = sample::small_rig(480, 360, 110);
   rig.cameras.push_back(sample::device_at<Camera>({560, 0, 120}, "cam2", 480, 360, 900));
