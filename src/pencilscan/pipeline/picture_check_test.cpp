@@ -247,6 +247,19 @@ TEST_F(PictureCheck, AProjectorWithAnotherPatternIsNamed) {
   EXPECT_THAT(named(other, *frame_), testing::ElementsAre(rig_->projectors[2].name));
 }
 
+TEST_F(PictureCheck, OfFewLinesThatAreExpectedNextToAllHaveToBeMissing) {
+  const auto are_missing = [](std::size_t points, std::size_t named) {
+    const std::vector<ExpectedLines> expected{{4000, 3200}, {points, named}, {3000, 2400}};
+    return !missing_lines_warnings(*rig_, expected).empty();
+  };
+  EXPECT_TRUE(are_missing(4000, 200));
+  EXPECT_TRUE(are_missing(1600, 0));
+  EXPECT_TRUE(are_missing(300, 0));
+  EXPECT_FALSE(are_missing(200, 0));
+  EXPECT_FALSE(are_missing(300, 30));
+  EXPECT_FALSE(are_missing(4000, 1100));  // as few as a right projector has
+}
+
 /// What is left in its colours is of others that share them, and no sign that it was moved.
 TEST_F(PictureCheck, AProjectorThatIsOffStandsNowhereElse) {
   const Rig rig = make_ring(sample::small_ring());
