@@ -204,8 +204,7 @@ std::optional<TurnedCamera> turn_of(const Rig& rig, const SeenCurves& seen,
                         [](const PictureWay& a, const PictureWay& b) { return a.share < b.share; });
   const auto given = search.pixels_of({});
   const auto turned = search.pixels_of(search.settle({best.rotation_px, Vec3::Zero()}));
-  const auto distance = [&](const Vec2& pixel, const PlaceOfLine& place) {
-    const auto line = seen.nearest(pixel, place, kFar * margin_px);
+  const auto distance = [&](const Vec2& pixel, const auto& line) {
     return line ? std::abs(line->normal.dot(line->position - pixel)) : kFar * margin_px;
   };
   TurnedCamera result;
@@ -216,10 +215,16 @@ std::optional<TurnedCamera> turn_of(const Rig& rig, const SeenCurves& seen,
   for (std::size_t i = 0; i < places.size(); ++i) {
     if (!given[i] || !turned[i] || !rig.cameras[c].contains(*given[i])) continue;
     shifts.push_back((*turned[i] - *given[i]).norm());
-    before.push_back(distance(*given[i], places[i]));
-    after.push_back(distance(*turned[i], places[i]));
+    const auto line_before = seen.nearest(*given[i], places[i], kFar * margin_px);
+    const auto line_after = seen.nearest(*turned[i], places[i], kFar * margin_px);
+    before.push_back(distance(*given[i], line_before));
+    after.push_back(distance(*turned[i], line_after));
     const bool is_on = before.back() < margin_px / 2;
     const bool comes_on = after.back() < margin_px / 2;
+    // What slides along its line meets the end of a curve, or leaves it: no turn is told by that.
+    const auto& line = line_after ? line_after : line_before;
+    const double across = line ? std::abs(line->normal.dot(*turned[i] - *given[i])) : 0;
+    if (across < 0.5 * std::abs(after.back() - before.back())) continue;
     result.won += comes_on && !is_on ? 1U : 0U;
     result.lost += is_on && !comes_on ? 1U : 0U;
   }
