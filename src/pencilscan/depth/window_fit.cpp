@@ -94,22 +94,21 @@ void WindowFitter::set_weight(Seen& seen) {
   sum_parts(grid_, seen.weight.data(), grid_.monomial(0), 1, &seen.weight_sum);
 }
 
-void WindowFitter::choose_patterns(const Vec2& m, const Eigen::Matrix2d& jacobian,
-                                   const Quadric& q) {
+void WindowFitter::choose_patterns(const Quadric& q) {
   lit_.clear();
   const auto w = static_cast<float>(q[0]);
   const auto wx = static_cast<float>(q[1] / grid_.half);
   const auto wy = static_cast<float>(q[2] / grid_.half);
   // w = omega . (x, y, 1) over normalised pixels: the normal towards the camera is -omega.
-  const Vec2 slope = jacobian.transpose().inverse() * Vec2(q[1], q[2]) / grid_.half;
-  const Vec3 normal = -Vec3(slope[0], slope[1], q[0] - slope.dot(m)).normalized();
-  const Vec3 x = m.homogeneous() / q[0];
+  const Vec2 slope = jacobian_.transpose().inverse() * Vec2(q[1], q[2]) / grid_.half;
+  const Vec3 normal = -Vec3(slope[0], slope[1], q[0] - slope.dot(m_)).normalized();
+  const Vec3 x = m_.homogeneous() / q[0];
   for (std::size_t k = 0; k < light_->patterns.size(); ++k) {
     const PatternView& view = light_->patterns[k];
     if ((view.center() - x).dot(normal) <= 0) continue;
     bool ok = false;
     Lit lit;
-    lit.lines = view.lines(m, jacobian, q[0], ok);
+    lit.lines = view.lines(m_, jacobian_, q[0], ok);
     if (!ok) continue;
     const float gradient = lit.lines.gradient(w, wx, wy).norm();
     if (gradient * kLeastSpacingPx > 1) continue;
@@ -121,12 +120,21 @@ void WindowFitter::choose_patterns(const Vec2& m, const Eigen::Matrix2d& jacobia
   }
 }
 
+// A point of the plane omega . X = 1 that rises by h along the normal n = -omega / |omega| gains
+// h w |omega| of inverse depth over the plane, and moves by h w (n_xy - m n_z) in the image.
+WindowSurface WindowFitter::surface_of(const Quadric& q) const {
+  const Vec2 slope = jacobian_.transpose().inverse() * Vec2(q[1], q[2]) / grid_.half;
+  const double along = q[0] - slope.dot(m_);
+  const Vec2 way = (m_ * along - slope) / (slope.squaredNorm() + along * along);
+  const Vec2 lean = jacobian_.inverse() * way / grid_.half;
+  WindowSurface surface{};
+  for (int k = 0; k < 6; ++k) surface.p[k] = static_cast<float>(q[k]);
+  for (int k = 0; k < 2; ++k) surface.lean[k] = static_cast<float>(lean[k]);
+  return surface;
+}
+
 void WindowFitter::render(const Quadric& q) {
-  const Eigen::Matrix<float, 6, 1> p = q.cast<float>();
-  for (std::size_t i = 0; i < grid_.padded; ++i) {
-    w_[i] = p[0];
-    for (int k = 1; k < 6; ++k) w_[i] += p[k] * grid_.monomial(k)[i];
-  }
+  surface_depths(grid_, surface_of(q), w_.data());
   const auto scale = static_cast<float>(grid_.half);
   for (std::size_t k = 0; k < lit_.size(); ++k) {
     if (!lit_[k].on) continue;
@@ -290,6 +298,24 @@ bool WindowFitter::iterate(Quadric& q, int rounds) {
   return evaluate(q);
 }
 
+bool WindowFitter::cut_at_edge() {
+  constexpr float kOfBlur = 2;  // deviations: from there inwards 98 % of the light is left
+  constexpr float kRounding = 1e-4F;
+  const auto edge = parts_.edge(static_cast<float>(chi2_ / degrees_));
+  if (!edge) return false;
+  const float within_px = std::max(0.F, edge->offset - kOfBlur * light_->blur_px);
+  const float within = within_px / static_cast<float>(grid_.half) + kRounding;
+  const float* x = grid_.monomial(1);
+  const float* y = grid_.monomial(2);
+  for (Seen& seen : seen_) {
+    for (std::size_t i = 0; i < grid_.padded; ++i) {
+      if (x[i] * edge->cosine + y[i] * edge->sine > within) seen.weight[i] = 0;
+    }
+    set_weight(seen);
+  }
+  return true;
+}
+
 void WindowFitter::compare_light() {
   parts_.reset();
   for (std::size_t f = 0; f < seen_.size(); ++f) {
@@ -332,11 +358,11 @@ std::optional<WindowFit> WindowFitter::fit(const Vec2& pixel, const Quadric& sta
   const int u = static_cast<int>(std::lround(pixel[0]));
   const int v = static_cast<int>(std::lround(pixel[1]));
   if (!gather(u, v)) return std::nullopt;
-  const Vec2 m = light_->camera->normalized_from_pixel(pixel);
-  const Eigen::Matrix2d jacobian = light_->camera->pixel_slope(m).inverse();
+  m_ = light_->camera->normalized_from_pixel(pixel);
+  jacobian_ = light_->camera->pixel_slope(m_).inverse();
   Quadric q = start;
   const auto fit_window = [&] {
-    choose_patterns(m, jacobian, q);
+    choose_patterns(q);
     if (lit_.empty()) return false;
     render(q);
     solve_amplitudes();
@@ -345,7 +371,13 @@ std::optional<WindowFit> WindowFitter::fit(const Vec2& pixel, const Quadric& sta
     return true;
   };
   if (!fit_window()) return std::nullopt;
-  // Where the surface ends within the window, fit what is left of it.
+  // Where the surface ends within the window, fit what is left of it: within two edges at most, as
+  // at a corner, or within the one that the better fit shows.
+  constexpr int kEdges = 2;
+  int edges = 0;
+  for (; edges < kEdges && cut_at_edge(); ++edges) {
+    if (!fit_window()) return std::nullopt;
+  }
   const std::optional<std::size_t> side = parts_.dark_side();
   if (side) {
     const float* beyond = parts_.side(*side);
@@ -357,7 +389,7 @@ std::optional<WindowFit> WindowFitter::fit(const Vec2& pixel, const Quadric& sta
   }
   // The centre itself must show the light that is predicted there.
   if (parts_.is_middle_dark()) return std::nullopt;
-  return finish(q, side.has_value());
+  return finish(q, edges > 0 || side.has_value());
 }
 
 }  // namespace pencilscan

@@ -41,7 +41,9 @@ struct CameraLight {
   float usual_residual = 0;       ///< WindowFit::relative_residual, median of the pilot windows
 };
 
-/// Inverse depth over a window: w = q . (1, x, y, x^2, x y, y^2), x = dx / half, y = dy / half.
+/// Inverse depth over a window: w = q . (1, x, y, x^2, x y, y^2), x = dx / half, y = dy / half, to
+/// second order. Farther out it is that of the surface that has this tangent plane and rises over
+/// it by this bow (WindowSurface): like a ball, it may end in an outline.
 using Quadric = Eigen::Matrix<double, 6, 1>;
 
 struct WindowFit {
@@ -61,7 +63,12 @@ struct WindowFit {
 /// blur contributes blur_px * |grad l_k|. The bell is the triweight kernel (1 - u^2)^3, whose
 /// integral is a polynomial. e_f takes the slope of albedo and shading. Least are the squares over
 /// the noise's variance, weighted by 1 - (x^2 + y^2) / 2, with weak priors on e_f (0.3) and on the
-/// quadric's bow (6 footprints). The blur follows the slope of w between steps.
+/// quadric's bow (6 footprints). The blur follows the slope of w between steps. Steps take the
+/// slopes of the quadric for those of the surface, which differ beyond the second order.
+///
+/// Where the surface ends within the window, pixels beyond its edge (WindowParts::edge()), and
+/// those that blur mixes with the dark, are left out: to fit darkness, it would come nearer to the
+/// camera.
 class WindowFitter {
  public:
   /// half: radius, px, in [2, 10].
@@ -101,7 +108,8 @@ class WindowFitter {
 
   [[nodiscard]] bool gather(int u, int v);
   void set_weight(Seen& seen);
-  void choose_patterns(const Vec2& m, const Eigen::Matrix2d& jacobian, const Quadric& q);
+  void choose_patterns(const Quadric& q);
+  [[nodiscard]] WindowSurface surface_of(const Quadric& q) const;
   void render(const Quadric& q);
   /// Lists the patterns of a family that are on.
   void collect(std::size_t family);
@@ -113,6 +121,8 @@ class WindowFitter {
   /// Goes where the equations lead; returns how far the lines move at most.
   [[nodiscard]] double step(Quadric& q);
   [[nodiscard]] bool iterate(Quadric& q, int rounds);
+  /// Leaves out what lies beyond an edge, and its blur; false where there is none.
+  [[nodiscard]] bool cut_at_edge();
   /// Light that the fit predicts at each pixel, and what is seen of it, over the parts.
   void compare_light();
   [[nodiscard]] std::optional<WindowFit> finish(const Quadric& q, bool cut);
@@ -120,6 +130,8 @@ class WindowFitter {
   const CameraLight* light_;
   WindowGrid grid_;
   WindowParts parts_;
+  Vec2 m_ = Vec2::Zero();                                   ///< the middle, normalised
+  Eigen::Matrix2d jacobian_ = Eigen::Matrix2d::Identity();  ///< of it, per px
   std::vector<float> valid_, w_;
   std::vector<Seen> seen_;  ///< per family
   std::vector<Lit> lit_;

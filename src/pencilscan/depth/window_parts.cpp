@@ -10,6 +10,15 @@ namespace {
 constexpr float kSideStart = 0.2F;  // of the radius: where a side of the window begins
 constexpr float kMiddle2 = 0.2F;    // squared radius of the middle, in radii
 
+constexpr std::size_t kDirections = 16;  // of edges
+constexpr int kStripsPerPx = 2;
+constexpr std::size_t kMostStrips = 32;  // of windows of 10 px
+
+WindowParts::Edge edge_of(std::size_t direction, float offset) {
+  const double angle = 2 * std::numbers::pi * static_cast<double>(direction) / kDirections;
+  return {static_cast<float>(std::cos(angle)), static_cast<float>(std::sin(angle)), offset};
+}
+
 /// Whether a part shows too little of the light that is predicted in it. `energy`: the predicted
 /// light's squares over the variance of the noise; `seen`: the same of predicted and seen light, of
 /// which noise makes the square root of the energy.
@@ -22,10 +31,7 @@ bool is_dark(float seen, float energy) {
 }  // namespace
 
 WindowParts::WindowParts(const WindowGrid& grid)
-    : grid_(&grid),
-      masks_(kParts * grid.padded, 0.F),
-      seen_(grid.padded, 0.F),
-      predicted_(grid.padded, 0.F) {
+    : grid_(&grid), masks_(kParts * grid.padded, 0.F), strip_(kDirections * grid.padded, 0) {
   const float* x = grid.monomial(1);
   const float* y = grid.monomial(2);
   for (std::size_t part = 0; part < kParts; ++part) {
@@ -38,21 +44,69 @@ WindowParts::WindowParts(const WindowGrid& grid)
       masks_[part * grid.padded + i] = is_in ? 1.F : 0.F;
     }
   }
+  for (std::size_t direction = 0; direction < kDirections; ++direction) {
+    const Edge edge = edge_of(direction, 0);
+    for (std::size_t i = 0; i < static_cast<std::size_t>(grid.count); ++i) {
+      const float out = static_cast<float>(grid.half) * (x[i] * edge.cosine + y[i] * edge.sine);
+      strip_[direction * grid.padded + i] =
+          static_cast<std::uint8_t>(std::max(0.F, std::floor(kStripsPerPx * out + 1)));
+    }
+  }
+  reset();
 }
 
 void WindowParts::reset() {
-  std::fill(seen_.begin(), seen_.end(), 0.F);
-  std::fill(predicted_.begin(), predicted_.end(), 0.F);
+  for (std::vector<float>* sums :
+       {&light_.shown, &light_.expected, &light_.seen, &light_.predicted})
+    sums->assign(grid_->padded, 0.F);
 }
 
 void WindowParts::add(const FamilyLight& light, const float* image, const float* weight,
                       float certainty) {
-  add_light(*grid_, light, image, weight, certainty, seen_.data(), predicted_.data());
+  if (light.patterns > 0) add_light(*grid_, light, image, weight, certainty, light_);
 }
 
 void WindowParts::sum_up() {
-  sum_parts(*grid_, seen_.data(), masks_.data(), kParts, seen_in_.data());
-  sum_parts(*grid_, predicted_.data(), masks_.data(), kParts, predicted_in_.data());
+  sum_parts(*grid_, light_.seen.data(), masks_.data(), kParts, seen_in_.data());
+  sum_parts(*grid_, light_.predicted.data(), masks_.data(), kParts, predicted_in_.data());
+}
+
+// Of pixels with the light L predicted and S seen, both over the noise, twice the logarithm of the
+// likelihood that they are lit, over that of the dark, is S^2 - (S - L)^2 = 2 S L - L^2.
+std::optional<WindowParts::Edge> WindowParts::edge(float misfit) const {
+  // Light that is not where it was predicted is no darkness: relief moves lines.
+  constexpr float kMostShown = 0.5F;
+  const float certainty = 1 / std::max(1.F, misfit);
+  struct Light {
+    float seen = 0, predicted = 0, shown = 0, expected = 0;
+  };
+  std::array<Light, kMostStrips> strips;
+  std::optional<Edge> best;
+  float least = 0;
+  for (std::size_t direction = 0; direction < kDirections; ++direction) {
+    strips.fill({});
+    for (std::size_t i = 0; i < static_cast<std::size_t>(grid_->count); ++i) {
+      Light& strip = strips[strip_[direction * grid_->padded + i]];
+      strip.seen += light_.seen[i];
+      strip.predicted += light_.predicted[i];
+      strip.shown += light_.shown[i];
+      strip.expected += light_.expected[i];
+    }
+    Light beyond;
+    for (auto k = static_cast<std::size_t>(kStripsPerPx * (grid_->half + 1)); k >= 1; --k) {
+      beyond.seen += strips[k].seen;
+      beyond.predicted += strips[k].predicted;
+      beyond.shown += strips[k].shown;
+      beyond.expected += strips[k].expected;
+      const float lit = 2 * beyond.seen - beyond.predicted;
+      if (lit >= least || beyond.shown > kMostShown * beyond.expected ||
+          !is_dark(certainty * beyond.seen, certainty * beyond.predicted))
+        continue;
+      least = lit;
+      best = edge_of(direction, static_cast<float>(k - 1) / kStripsPerPx);
+    }
+  }
+  return best;
 }
 
 std::optional<std::size_t> WindowParts::dark_side() const {

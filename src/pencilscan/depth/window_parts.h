@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <optional>
 #include <vector>
 
@@ -11,7 +12,8 @@ namespace pencilscan {
 /// Whether parts of a window show the light that a fit predicts there: eight overlapping sides,
 /// beyond a fifth of the radius in as many directions, and the middle. A part shows too little
 /// where it has less than .6 of that light, and 2.5 deviations of the noise less than all of it:
-/// few samples tell what is quite dark.
+/// few samples tell what is quite dark. And where the surface ends in a straight edge: the one
+/// beyond which darkness explains the image best, of 16 directions and half pixels.
 class WindowParts {
  public:
   /// The grid must outlive it.
@@ -21,6 +23,15 @@ class WindowParts {
   void reset();
   void add(const FamilyLight& light, const float* image, const float* weight, float certainty);
   void sum_up();
+
+  /// Where the surface ends: `offset` px from the middle, outwards along (cosine, sine).
+  struct Edge {
+    float cosine = 0, sine = 0;
+    float offset = 0;
+  };
+  /// The edge beyond which the image most likely is dark, where the middle lies within it.
+  /// `misfit`: of the fit, chi^2 per degree of freedom; it counts as noise.
+  [[nodiscard]] std::optional<Edge> edge(float misfit) const;
 
   /// The side that shows too little of the predicted light, the darkest.
   [[nodiscard]] std::optional<std::size_t> dark_side() const;
@@ -35,8 +46,9 @@ class WindowParts {
   static constexpr std::size_t kParts = kSides + 1;
 
   const WindowGrid* grid_;
-  std::vector<float> masks_;             ///< of the sides, then of the middle
-  std::vector<float> seen_, predicted_;  ///< per pixel
+  std::vector<float> masks_;         ///< of the sides, then of the middle
+  std::vector<std::uint8_t> strip_;  ///< per direction and pixel: half pixels outwards, 0: inwards
+  LightSums light_;
   std::array<float, kParts> seen_in_{}, predicted_in_{};
 };
 

@@ -156,6 +156,33 @@ WindowGrid::WindowGrid(int half_px) : half(half_px) {
   }
 }
 
+// With q = b(lean), c = the slope of b along lean and s = 1 + c, the rise is the root
+// 2 b / (s + sqrt(s^2 - 4 q b)) of q r^2 - s r + b = 0 that is b where lean is zero.
+PENCILSCAN_CLONES void surface_depths(const WindowGrid& grid, const WindowSurface& surface,
+                                      float* w) {
+  // The root is 1 in the middle and 0 at an outline, towards which slopes grow without bound.
+  constexpr float kLeastRoot = 0.2F;
+  const float* x = grid.monomial(1);
+  const float* y = grid.monomial(2);
+  const float* p = surface.p;
+  const float* lean = surface.lean;
+  const float turn_x = 2 * p[3] * lean[0] + p[4] * lean[1];
+  const float turn_y = p[4] * lean[0] + 2 * p[5] * lean[1];
+  const float along_lean = 0.5F * (turn_x * lean[0] + turn_y * lean[1]);
+  for (std::size_t i = 0; i < grid.padded; i += kLanes) {
+    Lanes px, py, root;
+    load(x + i, px);
+    load(y + i, py);
+    const Lanes bow = p[3] * px * px + p[4] * px * py + p[5] * py * py;
+    Lanes turn = 1.F + turn_x * px + turn_y * py;
+    clamp(kLeastRoot, 1 / kLeastRoot, turn);
+    Lanes square = turn * turn - 4 * along_lean * bow;
+    clamp(kLeastRoot * kLeastRoot, 1 / (kLeastRoot * kLeastRoot), square);
+    for (int k = 0; k < kLanes; ++k) root[k] = std::sqrt(square[k]);
+    store(p[0] + p[1] * px + p[2] * py + 2 * bow / (turn + root), w + i);
+  }
+}
+
 PENCILSCAN_CLONES void render_lines(const WindowGrid& grid, const WindowLineShape& lines,
                                     const float* w, float* profile, float* slope) {
   const float* x = grid.monomial(1);
@@ -327,7 +354,7 @@ PENCILSCAN_CLONES void sum_surface(const WindowGrid& grid, int patterns,
 
 PENCILSCAN_CLONES void add_light(const WindowGrid& grid, const FamilyLight& light,
                                  const float* image, const float* weight, float certainty,
-                                 float* seen, float* predicted) {
+                                 LightSums& sums) {
   const float* x = grid.monomial(1);
   const float* y = grid.monomial(2);
   for (std::size_t i = 0; i < grid.padded; i += kLanes) {
@@ -340,13 +367,19 @@ PENCILSCAN_CLONES void add_light(const WindowGrid& grid, const FamilyLight& ligh
     }
     sum *= 1.F + light.ex * px + light.ey * py;
     load(weight + i, value);
-    const Lanes weighted = certainty * value * sum;
+    const Lanes certain = certainty * value;
+    const Lanes weighted = certain * sum;
     load(image + i, value);
+    value -= light.offset;
     Lanes total;
-    load(seen + i, total);
-    store(total + weighted * (value - light.offset), seen + i);
-    load(predicted + i, total);
-    store(total + weighted * sum, predicted + i);
+    load(sums.shown.data() + i, total);
+    store(total + certain * value, sums.shown.data() + i);
+    load(sums.expected.data() + i, total);
+    store(total + certain * sum, sums.expected.data() + i);
+    load(sums.seen.data() + i, total);
+    store(total + weighted * value, sums.seen.data() + i);
+    load(sums.predicted.data() + i, total);
+    store(total + weighted * sum, sums.predicted.data() + i);
   }
 }
 

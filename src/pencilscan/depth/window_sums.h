@@ -29,6 +29,19 @@ struct WindowGrid {
   }
 };
 
+/// A surface over a window: its tangent plane p0 + p1 x + p2 y in inverse depth, and the bow
+/// b(x, y) = p3 xx + p4 xy + p5 yy that it rises over it, at its own foot on the plane. A rise
+/// moves what is seen of the surface by `lean` per inverse depth, away from where its normal
+/// points, so that its rise r at a pixel solves r = b((x, y) - r lean). It ends in an outline,
+/// where that has no solution; b alone (lean 0) never does.
+struct WindowSurface {
+  float p[6];
+  float lean[2];
+};
+/// Inverse depth of a surface at each pixel; beyond its outline, something near that of the
+/// outline.
+void surface_depths(const WindowGrid& grid, const WindowSurface& surface, float* w);
+
 /// Lines of one pattern over a window: their coordinate (pattern_view.h), with dx and dy in halves
 /// of the window, and their profile.
 struct WindowLineShape {
@@ -85,10 +98,16 @@ struct SurfaceSums {
 void sum_surface(const WindowGrid& grid, int patterns, const FamilyColumns& columns,
                  SurfaceSums& sums);
 
-/// What a fit predicts of a family's light, and what the image shows of it, both times the
-/// prediction, the weights and `certainty`; added to the arrays.
+/// Per pixel, over all families: light that a fit predicts and what the image shows of it, times
+/// the weights over the variance of the noise; the same times the prediction once more, which makes
+/// them squares over the variance.
+struct LightSums {
+  std::vector<float> shown, expected;
+  std::vector<float> seen, predicted;  ///< times the prediction
+};
+/// Adds a family's light. `certainty`: 1 / variance of its noise.
 void add_light(const WindowGrid& grid, const FamilyLight& light, const float* image,
-               const float* weight, float certainty, float* seen, float* predicted);
+               const float* weight, float certainty, LightSums& sums);
 
 /// Sums of values over the pixels of each part; parts: `count` masks.
 void sum_parts(const WindowGrid& grid, const float* values, const float* parts, int count,
