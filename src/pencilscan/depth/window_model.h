@@ -72,6 +72,29 @@ class WindowModel {
     return q;
   }
 
+  /// Inverse depth of the surface at a place of the window: over the foot of its perpendicular on
+  /// the tangent plane, the surface rises by the quadric's bow.
+  [[nodiscard]] double inverse_depth(const Quadric& q, const Vec2& at) const {
+    const Camera& camera = rig_.cameras[0];
+    const auto plane = [&](const Vec2& x) { return q[0] + q[1] * x.x() + q[2] * x.y(); };
+    const auto point = [&](const Vec2& x, double w) -> Vec3 {
+      return camera.normalized_from_pixel(pixel_ + half_ * x).homogeneous() / w;
+    };
+    const Vec3 origin = point(Vec2::Zero(), q[0]);
+    const Vec3 along = point(Vec2::UnitX(), plane(Vec2::UnitX())) - origin;
+    const Vec3 down = point(Vec2::UnitY(), plane(Vec2::UnitY())) - origin;
+    const Vec3 normal = along.cross(down).normalized();
+    double rise = 0;
+    for (int round = 0; round < 200; ++round) {
+      const Vec3 x = point(at, plane(at) + rise);
+      const Vec3 foot = x - normal.dot(x - origin) * normal;
+      const Vec2 m = camera.normalized_from_pixel(pixel_);
+      const Vec2 px = camera.pixel_slope(m) * (foot.head<2>() / foot.z() - m) / half_;
+      rise = q[3] * px.x() * px.x() + q[4] * px.x() * px.y() + q[5] * px.y() * px.y();
+    }
+    return plane(at) + rise;
+  }
+
   /// Slope of the line coordinate of a pattern with inverse depth, in the middle.
   [[nodiscard]] double lines_per_w(std::size_t pattern, double w) const {
     const RayInProjector ray(rig_.cameras[0], rig_.projectors[pattern], pixel_);
@@ -103,10 +126,8 @@ class WindowModel {
     Eigen::VectorXd result(static_cast<Eigen::Index>(size()));
     for (std::size_t i = 0; i < size(); ++i) {
       const Vec2 x = place(i);
-      const double w = q[0] + q[1] * x.x() + q[2] * x.y() + q[3] * x.x() * x.x() +
-                       q[4] * x.x() * x.y() + q[5] * x.y() * x.y();
       result[static_cast<Eigen::Index>(i)] =
-          blurred_lines(line(rays_[pattern][i], pattern, w), half_width, reach);
+          blurred_lines(line(rays_[pattern][i], pattern, inverse_depth(q, x)), half_width, reach);
     }
     return result;
   }
