@@ -19,13 +19,17 @@ WindowParts::Edge edge_of(std::size_t direction, float offset) {
   return {static_cast<float>(std::cos(angle)), static_cast<float>(std::sin(angle)), offset};
 }
 
+// Deviations of the noise that a part lacks of its light: one in 160 is as dark by noise alone.
+constexpr float kPartBelow = 2.5F;
+// Of the 200 edges of a window of 5 px (most of them share pixels) noise makes one in 150 windows.
+constexpr float kEdgeBelow = 4;
+
 /// Whether a part shows too little of the light that is predicted in it. `energy`: the predicted
 /// light's squares over the variance of the noise; `seen`: the same of predicted and seen light, of
 /// which noise makes the square root of the energy.
-bool is_dark(float seen, float energy) {
-  constexpr float kLeastLight = 0.6F;   // share of the predicted light ...
-  constexpr float kBeyondNoise = 2.5F;  // ... and deviations of the noise below it
-  return seen < std::min(kLeastLight * energy, energy - kBeyondNoise * std::sqrt(energy));
+bool is_dark(float seen, float energy, float deviations) {
+  constexpr float kLeastLight = 0.6F;  // share of the predicted light
+  return seen < std::min(kLeastLight * energy, energy - deviations * std::sqrt(energy));
 }
 
 }  // namespace
@@ -117,7 +121,7 @@ std::optional<WindowParts::Edge> WindowParts::edge(float misfit) const {
       beyond.expected += strips[k].expected;
       const float lit = 2 * beyond.seen - beyond.predicted;
       if (lit >= least || beyond.shown > kMostShown * beyond.expected ||
-          !is_dark(certainty * beyond.seen, certainty * beyond.predicted))
+          !is_dark(certainty * beyond.seen, certainty * beyond.predicted, kEdgeBelow))
         continue;
       least = lit;
       best = edge_of(direction, static_cast<float>(k - 1) / kStripsPerPx);
@@ -132,7 +136,7 @@ std::optional<std::size_t> WindowParts::dark_side() const {
   for (std::size_t side = 0; side < kSides; ++side) {
     const float energy = predicted_in_[side];
     const float seen = seen_in_[side];
-    if (!is_dark(seen, energy) || seen > least * energy) continue;
+    if (!is_dark(seen, energy, kPartBelow) || seen > least * energy) continue;
     least = seen / energy;
     darkest = side;
   }
@@ -140,7 +144,7 @@ std::optional<std::size_t> WindowParts::dark_side() const {
 }
 
 bool WindowParts::is_middle_dark() const {
-  return is_dark(seen_in_[kSides], predicted_in_[kSides]);
+  return is_dark(seen_in_[kSides], predicted_in_[kSides], kPartBelow);
 }
 
 }  // namespace pencilscan
