@@ -20,8 +20,8 @@ struct PointEvidence {
   float own = 0;         ///< deviation that it had by itself
   float surface = 0;     ///< deviation of the surface that its ray meets; 0: it meets none
   float difference = 0;  ///< from that surface
-  float confidence = 0;  ///< of its label, as margins in the picture say
   bool settled = false;  ///< it lies on the surface now
+  float confidence = 0;  ///< of its label, as margins in the picture say
 };
 
 /// Standard deviation of a place across its surface. What the pictures let expect (of the mean over
