@@ -259,10 +259,13 @@ class ProjectorSearch {
     SettledPose best = of_least_cost(poses, 1);
     best = of_least_cost(poses, best.scale);
     if (best.share < kLeastShown) return std::nullopt;
+    // The rig is right where no other pose explains the places clearly better.
+    const SettledPose& given = poses.front();
+    if (given.share >= kLeastShown && gain(given, best) <= FoundProjector::kClearGain) best = given;
     FoundProjector found;
     found.correction = best.correction;
     found.share = best.share;
-    found.gain = gain(poses.front(), best);
+    found.gain = gain(given, best);
     found.lines_away = apart(PoseCorrection{}, best.correction);
     for (const SettledPose& pose : poses)
       found.is_ambiguous |= gain(pose, best) < FoundProjector::kClearGain &&
