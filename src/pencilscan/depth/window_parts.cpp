@@ -80,7 +80,6 @@ void WindowParts::sum_up() {
 std::optional<WindowParts::Edge> WindowParts::edge(float misfit) const {
   // Light that is not where it was predicted is no darkness: relief moves lines.
   constexpr float kMostShown = 0.5F;
-  constexpr float kRounding = 1e-3F;
   const float certainty = 1 / std::max(1.F, misfit);
   struct Light {
     float seen = 0, predicted = 0, shown = 0, expected = 0;
@@ -90,21 +89,8 @@ std::optional<WindowParts::Edge> WindowParts::edge(float misfit) const {
   std::array<Light, kMostStrips> strips;
   std::optional<Edge> best;
   float least = 0;
-  // Most windows are lit in all directions, which one sum tells.
-  const auto may_be_dark = [&](const std::uint8_t* strip_of) {
-    std::array<float, kMostStrips> lit{};
-    for (std::size_t i = 0; i < count; ++i)
-      lit[strip_of[i]] += 2 * light_.seen[i] - light_.predicted[i];
-    float beyond = 0;
-    for (std::size_t k = last; k >= 1; --k) {
-      beyond += lit[k];
-      if (beyond < least + kRounding * (1 - least)) return true;
-    }
-    return false;
-  };
   for (std::size_t direction = 0; direction < kDirections; ++direction) {
     const std::uint8_t* strip_of = strip_.data() + direction * grid_->padded;
-    if (!may_be_dark(strip_of)) continue;
     strips.fill({});
     for (std::size_t i = 0; i < count; ++i) {
       Light& strip = strips[strip_of[i]];

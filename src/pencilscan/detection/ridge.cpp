@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <opencv2/imgproc.hpp>
 #include <utility>
@@ -108,16 +109,14 @@ class StrongNearby {
  public:
   /// `area`: of the image within the padding.
   StrongNearby(const Hessian& h, const cv::Rect& area) {
-    cv::Mat peaks((area.height + kCell - 1) / kCell, (area.width + kCell - 1) / kCell, CV_32F);
-    for (int row = 0; row < peaks.rows; ++row) {
-      for (int column = 0; column < peaks.cols; ++column) {
-        const cv::Rect cell =
-            cv::Rect(area.x + column * kCell, area.y + row * kCell, kCell, kCell) & area;
-        double peak = 0;
-        const cv::Mat response = -(h.xx(cell) + h.yy(cell));
-        cv::minMaxLoc(response, nullptr, &peak);
-        peaks.at<float>(row, column) = static_cast<float>(peak);
-      }
+    cv::Mat peaks((area.height + kCell - 1) / kCell, (area.width + kCell - 1) / kCell, CV_32F,
+                  cv::Scalar(std::numeric_limits<float>::lowest()));
+    for (int y = 0; y < area.height; ++y) {
+      const float* xx = h.xx.ptr<float>(area.y + y) + area.x;
+      const float* yy = h.yy.ptr<float>(area.y + y) + area.x;
+      float* of_row = peaks.ptr<float>(y / kCell);
+      for (int x = 0; x < area.width; ++x)
+        of_row[x / kCell] = std::max(of_row[x / kCell], -(xx[x] + yy[x]));
     }
     cv::dilate(peaks, strongest_, cv::Mat::ones(2 * kAround + 1, 2 * kAround + 1, CV_8U));
   }
@@ -131,9 +130,8 @@ class StrongNearby {
   }
 
  private:
-  static constexpr int kCell = 8;  ///< px
-  static constexpr int kAround =
-      2;  ///< cells; with the own one, 16 px and more: the filter's reach
+  static constexpr int kCell = 8;    ///< px
+  static constexpr int kAround = 2;  ///< cells beside the own one: 16 px, the filter's reach
   cv::Mat strongest_;
 };
 
