@@ -6,6 +6,7 @@
 #include <opencv2/core.hpp>
 
 #include "pencilscan/depth/seeds.h"
+#include "pencilscan/depth/shared_bends.h"
 
 namespace pencilscan {
 namespace {
@@ -42,31 +43,13 @@ bool acceptable(const CameraLight& light, const Vec2& pixel, const WindowFit& fi
 
 DepthNode node_of(const WindowFit& fit, int half, LitSets& lit_sets) {
   DepthNode node;
-  const double h = half;
-  node.w = static_cast<float>(fit.q[0]);
-  node.wx = static_cast<float>(fit.q[1] / h);
-  node.wy = static_cast<float>(fit.q[2] / h);
-  node.wxx = static_cast<float>(2 * fit.q[3] / (h * h));
-  node.wxy = static_cast<float>(fit.q[4] / (h * h));
-  node.wyy = static_cast<float>(2 * fit.q[5] / (h * h));
+  set_quadric(fit.q, half, node);
+  node.cut = fit.cut;
   node.sigma = static_cast<float>(std::sqrt(fit.variance) / (fit.q[0] * fit.q[0]));
   node.misfit = fit.misfit;
   node.lit = lit_sets.place_of(fit.lit);
   node.reason = HoleReason::kMeasured;
   return node;
-}
-
-/// The quadric of a node as seen from a neighbour (dx, dy) px away.
-Quadric shifted(const DepthNode& n, double dx, double dy, int half) {
-  Quadric q;
-  const double wx = n.wx, wy = n.wy, wxx = n.wxx, wxy = n.wxy, wyy = n.wyy, h = half;
-  q[0] = n.w + wx * dx + wy * dy + 0.5 * (wxx * dx * dx + 2 * wxy * dx * dy + wyy * dy * dy);
-  q[1] = h * (wx + wxx * dx + wxy * dy);
-  q[2] = h * (wy + wxy * dx + wyy * dy);
-  q[3] = 0.5 * h * h * wxx;
-  q[4] = h * h * wxy;
-  q[5] = 0.5 * h * h * wyy;
-  return q;
 }
 
 /// Nodes without depth whose windows are overexposed for the most part.
@@ -253,8 +236,10 @@ std::vector<PilotWindow> pilot_windows(const CameraLight& light, const RayScene&
   return pilots;
 }
 
+namespace {
+
 void grow(const CameraLight& light, const Background& background, const DepthOptions& options,
-          DepthMap& map) {
+          DepthMap& map, FittedWindows& fitted) {
   WindowFitter fitter(light, options.half);
   const BackgroundView behind(light, background, options);
   const ObjectSpace& space = background.space;
@@ -278,27 +263,36 @@ void grow(const CameraLight& light, const Background& background, const DepthOpt
     }
     std::sort(next.begin(), next.end());
     front.clear();
-    std::vector<std::pair<std::size_t, DepthNode>> found;
+    std::vector<std::pair<std::size_t, WindowFit>> found;
     for (std::size_t k = 0; k < next.size();) {
       const std::size_t j = next[k].first;
       std::optional<WindowFit> best;
       for (; k < next.size() && next[k].first == j; ++k) {
-        const Vec2 d = map.pixel(j) - map.pixel(next[k].second);
-        const Quadric start = shifted(map.nodes[next[k].second], d[0], d[1], options.half);
+        const Vec2 way = map.pixel(j) - map.pixel(next[k].second);
+        const Quadric start = quadric_at(map.nodes[next[k].second], way, options.half);
         const auto fit = fitter.fit(map.pixel(j), start, 5);
         if (fit && acceptable(light, map.pixel(j), *fit, space, options.half, options) &&
             (!best || cost(*fit) < cost(*best))) {
           best = fit;
         }
       }
-      if (best && !behind.shows(map.pixel(j), *best, fitter))
-        found.emplace_back(j, node_of(*best, options.half, map.lit_sets));
+      if (best && !behind.shows(map.pixel(j), *best, fitter)) found.emplace_back(j, *best);
     }
-    for (const auto& [j, node] : found) {
-      map.nodes[j] = node;
+    for (const auto& [j, fit] : found) {
+      map.nodes[j] = node_of(fit, options.half, map.lit_sets);
+      fitted.add(j, fit.information);
       front.push_back(j);
     }
   }
+}
+
+}  // namespace
+
+void grow(const CameraLight& light, const Background& background, const DepthOptions& options,
+          DepthMap& map) {
+  FittedWindows fitted{options.half, {}, {}};
+  grow(light, background, options, map, fitted);
+  share_bends(fitted, map);
 }
 
 DepthMap dense_depth(const CameraLight& light, int camera, std::span<const MeasuredPoint> points,
@@ -313,6 +307,7 @@ DepthMap dense_depth(const CameraLight& light, int camera, std::span<const Measu
   WindowFitter fitter(light, options.half);
   const BackgroundView behind(light, background, options);
   const ObjectSpace& space = background.space;
+  FittedWindows fitted{options.half, {}, {}};
   // Nodes near labelled curves.
   for (std::size_t i = 0; i < map.nodes.size(); ++i) {
     const Vec2 pixel = map.pixel(i);
@@ -327,8 +322,10 @@ DepthMap dense_depth(const CameraLight& light, int camera, std::span<const Measu
     if (!best || behind.shows(pixel, *best, fitter)) continue;
     map.nodes[i] = node_of(*best, options.half, map.lit_sets);
     map.nodes[i].seeded = true;
+    fitted.add(i, best->information);
   }
-  grow(light, background, options, map);
+  grow(light, background, options, map, fitted);
+  share_bends(fitted, map);
   mark_saturated(light, options.half, map);
   return map;
 }
@@ -342,7 +339,7 @@ std::size_t complete_map(const CameraLight& light, const RayScene& surface,
   WindowFitter fitter(light, options.half);
   const BackgroundView behind(light, background, options);
   const ObjectSpace& space = background.space;
-  std::size_t found = 0;
+  FittedWindows fitted{options.half, {}, {}};
   for (std::size_t i = 0; i < map.nodes.size(); ++i) {
     if (map.nodes[i].measured()) continue;
     const Vec2 pixel = map.pixel(i);
@@ -355,11 +352,13 @@ std::size_t complete_map(const CameraLight& light, const RayScene& surface,
     const double move = (camera.point_at_depth(pixel, 1 / fit->q[0]) - hit->point).norm();
     if (move > options.max_move || behind.shows(pixel, *fit, fitter)) continue;
     map.nodes[i] = node_of(*fit, options.half, map.lit_sets);
-    map.nodes[i].sigma *= static_cast<float>(kHardPlaces * sigma_factor);
     map.nodes[i].confidence = kConfidence;
-    ++found;
+    fitted.add(i, fit->information);
   }
-  return found;
+  share_bends(fitted, map);
+  for (const std::size_t i : fitted.nodes)
+    map.nodes[i].sigma *= static_cast<float>(kHardPlaces * sigma_factor);
+  return fitted.nodes.size();
 }
 
 }  // namespace pencilscan

@@ -56,6 +56,7 @@ struct DepthNode {
   std::uint32_t lit = 0;  ///< whose light was found: place in the map's sets
   /// Started from a labelled curve of a pattern found here, not from neighbours.
   bool seeded = false;
+  bool cut = false;  ///< a side of its window was left out
   HoleReason reason = HoleReason::kBackground;
 
   [[nodiscard]] bool measured() const { return w > 0; }

@@ -27,6 +27,29 @@ constexpr float kLeastAmplitude = 0.003F;
 
 }  // namespace
 
+Quadric quadric_at(const DepthNode& node, const Vec2& way, int half) {
+  const double wx = node.wx, wy = node.wy, wxx = node.wxx, wxy = node.wxy, wyy = node.wyy;
+  const double dx = way[0], dy = way[1], h = half;
+  Quadric q;
+  q[0] = node.w + wx * dx + wy * dy + 0.5 * (wxx * dx * dx + 2 * wxy * dx * dy + wyy * dy * dy);
+  q[1] = h * (wx + wxx * dx + wxy * dy);
+  q[2] = h * (wy + wxy * dx + wyy * dy);
+  q[3] = 0.5 * h * h * wxx;
+  q[4] = h * h * wxy;
+  q[5] = 0.5 * h * h * wyy;
+  return q;
+}
+
+void set_quadric(const Quadric& q, int half, DepthNode& node) {
+  const double h = half;
+  node.w = static_cast<float>(q[0]);
+  node.wx = static_cast<float>(q[1] / h);
+  node.wy = static_cast<float>(q[2] / h);
+  node.wxx = static_cast<float>(2 * q[3] / (h * h));
+  node.wxy = static_cast<float>(q[4] / (h * h));
+  node.wyy = static_cast<float>(2 * q[5] / (h * h));
+}
+
 WindowFitter::WindowFitter(const CameraLight& light, int half)
     : light_(&light), grid_(half), parts_(grid_), of_family_(grid_, light.patterns.size()) {
   valid_.assign(grid_.padded, 0.F);
@@ -332,7 +355,11 @@ std::optional<WindowFit> WindowFitter::finish(const Quadric& q, bool cut) {
   fit.cut = cut;
   fit.misfit = static_cast<float>(chi2_ / degrees_);
   const double inflate = std::max(1.0, chi2_ / degrees_);
-  fit.variance = equations_.surface_variance() * inflate * q[0] * q[0];
+  const double unit2 = inflate * q[0] * q[0];
+  fit.variance = equations_.surface_variance() * unit2;
+  for (int r = 0; r < 6; ++r) {
+    for (int c = 0; c < 6; ++c) fit.information(r, c) = equations_.surface[r][c] / unit2;
+  }
   for (const Lit& lit : lit_) {
     if (lit.on) fit.amplitude = std::max(fit.amplitude, lit.amplitude);
   }

@@ -1,0 +1,116 @@
+#include "pencilscan/depth/shared_bends.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+
+#include "pencilscan/depth/window_fit.h"
+
+namespace pencilscan {
+namespace {
+
+using Bends = Eigen::Matrix<double, 5, 1>;  ///< of a Quadric: all but its depth
+using BendsMatrix = Eigen::Matrix<double, 5, 5>;
+
+constexpr int kReach = 2;  // nodes; windows farther off share no pixel with the node's own
+
+/// With six or fewer, the covariance of five unknowns is singular or nearly so.
+constexpr std::size_t kLeastSaid = 7;
+
+double variance_of(const DepthNode& node) {
+  const auto w = static_cast<double>(node.w);
+  const double deviation = static_cast<double>(node.sigma) * w * w;
+  return deviation * deviation;
+}
+
+/// What windows around say of one node's slopes and bends.
+class BendPrior {
+ public:
+  void clear() {
+    count_ = 0;
+    weight_ = 0;
+    sum_.setZero();
+    squares_.setZero();
+  }
+  /// Of like size for all: differences to the node's own.
+  void add(const Bends& difference, double weight) {
+    ++count_;
+    weight_ += weight;
+    sum_ += weight * difference;
+    squares_ += (weight * difference) * difference.transpose();
+  }
+  /// The prior of a node whose own window knows its bends as `own` says (covariance). False where
+  /// too few said anything.
+  [[nodiscard]] bool solve(const BendsMatrix& own, Bends& mean, BendsMatrix& information) const {
+    if (count_ < kLeastSaid) return false;
+    constexpr double kRounding = 1e-6;
+    mean = sum_ / weight_;
+    const auto n = static_cast<double>(count_);
+    BendsMatrix covariance = n / (n - 1) * (squares_ / weight_ - mean * mean.transpose());
+    covariance.diagonal() *= 1 + kRounding;
+    // Where a bend is greatest or least, it is farther from its neighbours' than these are from one
+    // another: as wide as that, then.
+    const double apart2 = mean.dot((covariance + own).llt().solve(mean));
+    covariance *= std::max(1.0, apart2 / static_cast<double>(mean.size()));
+    const Eigen::LLT<BendsMatrix> cholesky(covariance);
+    if (cholesky.info() != Eigen::Success) return false;
+    information = cholesky.solve(BendsMatrix::Identity());
+    return information.allFinite();
+  }
+
+ private:
+  std::size_t count_ = 0;
+  double weight_ = 0;
+  Bends sum_;
+  BendsMatrix squares_;
+};
+
+/// Adds what the nodes around say of this one.
+void ask_neighbors(const DepthMap& map, std::size_t node, int half, BendPrior& prior) {
+  const Quadric own = quadric_at(map.nodes[node], Vec2::Zero(), half);
+  const int row = static_cast<int>(node) / map.columns;
+  const int column = static_cast<int>(node) % map.columns;
+  for (int r = std::max(0, row - kReach); r <= std::min(map.rows - 1, row + kReach); ++r) {
+    for (int c = std::max(0, column - kReach); c <= std::min(map.columns - 1, column + kReach);
+         ++c) {
+      const DepthNode& other = map.nodes[map.index(r, c)];
+      if (!other.measured() || other.cut || (r == row && c == column)) continue;
+      const Vec2 way = map.stride * Vec2(column - c, row - r);
+      prior.add((quadric_at(other, way, half) - own).tail<5>(), 1 / variance_of(other));
+    }
+  }
+}
+
+}  // namespace
+
+void share_bends(const FittedWindows& fitted, DepthMap& map) {
+  std::vector<DepthNode> shared;
+  shared.reserve(fitted.nodes.size());
+  BendPrior prior;
+  for (std::size_t k = 0; k < fitted.nodes.size(); ++k) {
+    const DepthNode& node = shared.emplace_back(map.nodes[fitted.nodes[k]]);
+    prior.clear();
+    ask_neighbors(map, fitted.nodes[k], fitted.half, prior);
+    const FittedWindows::Information covariance = fitted.information[k].inverse();
+    Bends mean;
+    BendsMatrix information;
+    if (!prior.solve(covariance.bottomRightCorner<5, 5>(), mean, information)) continue;
+    FittedWindows::Information all = fitted.information[k];
+    all.bottomRightCorner<5, 5>() += information;
+    const Eigen::LLT<FittedWindows::Information> cholesky(all);
+    Quadric right = Quadric::Zero();
+    right.tail<5>() = information * mean;
+    const Quadric q = quadric_at(node, Vec2::Zero(), fitted.half) + cholesky.solve(right);
+    const double variance = cholesky.solve(Quadric::Unit(0))[0];
+    if (cholesky.info() != Eigen::Success || !q.allFinite() || !(q[0] > 0) || !(variance > 0))
+      continue;
+    set_quadric(q, fitted.half, shared.back());
+    // A neighbour's word makes a depth surer, never less sure.
+    const double deviation = std::sqrt(std::min(variance, variance_of(node)));
+    shared.back().sigma = static_cast<float>(deviation / (q[0] * q[0]));
+  }
+  for (std::size_t k = 0; k < fitted.nodes.size(); ++k) map.nodes[fitted.nodes[k]] = shared[k];
+}
+
+}  // namespace pencilscan
