@@ -299,7 +299,6 @@ BallBarFigures measure_ball_bar(const ArtefactPoints& given, const Rig* rig,
   second = refined(others, *second);
 
   BallBarFigures bar;
-  bar.between = count_between(points.points, first->center, second->center, radius);
   std::vector<std::size_t> of_ball[2];
   for (std::size_t i = 0; i < points.points.size(); ++i) {
     const double to_first = (points.points[i] - first->center).squaredNorm();
@@ -324,6 +323,8 @@ BallBarFigures measure_ball_bar(const ArtefactPoints& given, const Rig* rig,
     trimmed_center[b] = held->trimmed.model.center;
     bar.balls.push_back(measure_ball(std::move(part), own, rig, options));
     bar.balls.back().left_out = whole - bar.balls.back().points.points.size();
+    bar.between +=
+        count_between(bar.balls.back().points.points, first->center, second->center, radius);
   }
   bar.distance_mm = {(center[1] - center[0]).norm(),
                      (trimmed_center[1] - trimmed_center[0]).norm()};

@@ -25,6 +25,7 @@ void add_points(Json& json, const ArtefactPoints& points, std::size_t left_out, 
   if (left_out > 0) json["left_out"] = left_out;
   if (points.outside_region > 0) json["outside_region"] = points.outside_region;
   if (points.not_finite > 0) json["not_finite"] = points.not_finite;
+  if (points.without_face > 0) json["without_face"] = points.without_face;
 }
 
 void add_worst(Json& json, const ArtefactPoints& points, const std::vector<WorstPoint>& worst) {

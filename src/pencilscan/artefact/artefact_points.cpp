@@ -48,6 +48,19 @@ struct OriginColumns {
   const std::vector<double>*u, *v, *camera, *projector, *line, *confidence;
 };
 
+/// 1 for each of `count` vertices that a face has; all where there are no faces.
+std::vector<std::uint8_t> vertices_of_faces(const PlyElement* faces, std::size_t count) {
+  const PlyColumn* corners = faces != nullptr ? faces->find("vertex_indices") : nullptr;
+  if (faces != nullptr && corners == nullptr) corners = faces->find("vertex_index");
+  if (corners == nullptr || !corners->is_list || corners->values.empty())
+    return std::vector<std::uint8_t>(count, 1);
+  std::vector<std::uint8_t> has_face(count, 0);
+  for (const double corner : corners->values)
+    if (corner >= 0 && corner < static_cast<double>(count))
+      has_face[static_cast<std::size_t>(corner)] = 1;
+  return has_face;
+}
+
 }  // namespace
 
 ArtefactPoints ArtefactPoints::subset(const std::vector<std::size_t>& indices) const {
@@ -56,6 +69,7 @@ ArtefactPoints ArtefactPoints::subset(const std::vector<std::size_t>& indices) c
   part.is_mesh = is_mesh;
   part.unit_known = unit_known;
   part.not_finite = not_finite;
+  part.without_face = without_face;
   part.outside_region = outside_region;
   for (const std::size_t i : indices) {
     part.points.push_back(points[i]);
@@ -110,8 +124,13 @@ ArtefactPoints read_artefact_points(const fs::path& path) {
   ArtefactPoints result;
   result.source = path.string();
   result.is_mesh = faces != nullptr && faces->count > 0;
+  const std::vector<std::uint8_t> has_face = vertices_of_faces(faces, vertices->count);
   for (std::size_t i = 0; i < vertices->count; ++i) {
     const Vec3 point(x[i], y[i], z[i]);
+    if (has_face[i] == 0) {
+      ++result.without_face;
+      continue;
+    }
     if (!point.allFinite()) {
       ++result.not_finite;
       continue;

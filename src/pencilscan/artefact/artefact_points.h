@@ -29,7 +29,8 @@ struct ArtefactPoints {
   bool is_mesh = false;              ///< the file has faces
   bool unit_known = true;            ///< false: of a rig whose unit is unknown
   std::size_t not_finite = 0;        ///< vertices without a position, as organised clouds have
-  std::size_t outside_region = 0;    ///< left out: outside of what was asked for
+  std::size_t without_face = 0;    ///< vertices of a mesh that no face has: no part of its surface
+  std::size_t outside_region = 0;  ///< left out: outside of what was asked for
 
   [[nodiscard]] ArtefactPoints subset(const std::vector<std::size_t>& indices) const;
 };

@@ -254,6 +254,7 @@ TEST(ArtefactBallBar, TheBarIsLeftOutWhereItIsStatedAndElsewhereNoticed) {
   const BallBarFigures without = measure_ball_bar(as_points(points), nullptr, options);
   EXPECT_NEAR(without.spacing_mm->all, 0, 1e-6);
   EXPECT_GT(without.balls[0].left_out, 900U);
+  EXPECT_EQ(without.between, 0U);
 }
 
 TEST(ArtefactBallBar, ALengthThatIsNotThisBarsIsTold) {
@@ -483,6 +484,20 @@ TEST(ArtefactFiles, AnyPlyIsReadAndPointsWithoutPositionAreCounted) {
   write_mesh(folder.path() / "mesh.ply", make_sphere(10));
   EXPECT_TRUE(read_artefact_points(folder.path() / "mesh.ply").is_mesh);
   EXPECT_THROW((void)read_artefact_points(folder.path() / "none.ply"), InputError);
+}
+
+TEST(ArtefactFiles, VerticesThatNoFaceHasAreNoPartOfAMesh) {
+  const TemporaryFolder folder("artefact_loose");
+  TriangleMesh ball = make_sphere(10);
+  const std::size_t count = ball.vertices.size();
+  ball.vertices.push_back(Vec3::Zero());  // as a scanner's program leaves its origin behind
+  write_mesh(folder.path() / "mesh.ply", ball);
+  const ArtefactPoints mesh = read_artefact_points(folder.path() / "mesh.ply");
+  EXPECT_EQ(mesh.points.size(), count);
+  EXPECT_EQ(mesh.without_face, 1U);
+  ball.faces.clear();
+  write_mesh(folder.path() / "points.ply", ball);
+  EXPECT_EQ(read_artefact_points(folder.path() / "points.ply").points.size(), count + 1);
 }
 
 TEST(ArtefactFiles, AnOutputFolderIsOnePositionPerFrame) {
