@@ -119,13 +119,14 @@ Json names_of(const std::vector<std::size_t>& frames) {
   return names;
 }
 
-Json camera_figures(const RecordedCamera& camera, const CameraClock& clock) {
+Json camera_figures(const RecordedCamera& camera, const CameraClock& clock, std::size_t lost) {
   Json figures;
   figures["size"] = std::to_string(camera.width) + "x" + std::to_string(camera.height);
   figures["pixels"] = (camera.channels == 3 ? "RGB " : "grey or mosaic ") +
                       std::to_string(camera.bit_depth) + " bit";
   if (camera.exposure_us > 0) figures["exposure_us"] = camera.exposure_us;
   figures["missing"] = clock.dropped.size();
+  if (lost > 0) figures["lost"] = lost;
   if (!clock.left_out.empty()) figures["left_out"] = clock.left_out.size();
   if (!clock.timed) return figures;
   figures["late"] = clock.late.size();
@@ -152,6 +153,7 @@ void say_what_is_wrong(const Recording& recording, const FrameSets& sets) {
       warn_of(who + ": its clock counts from another moment; it was shifted onto the others'");
   }
   for (const std::string& warning : left_out_warnings(recording, sets)) warn_of(warning);
+  for (const std::string& warning : lost_warnings(recording, sets)) warn_of(warning);
   for (const auto& [before, count] : sets.gaps)
     warn_of("before frame " + six_digits(before) + " " + std::to_string(count) +
             " moments are missing in all cameras");
@@ -172,15 +174,17 @@ void run_info(const InfoCommand& command) {
                             {"p90", lower_quantile(spreads, 0.9)},
                             {"max", *std::max_element(spreads.begin(), spreads.end())}};
   }
+  const auto lost = lost_pictures(recording, sets);
   for (std::size_t c = 0; c < sets.clocks.size(); ++c)
     figures["cameras"][recording.cameras()[c].name] =
-        camera_figures(recording.cameras()[c], sets.clocks[c]);
+        camera_figures(recording.cameras()[c], sets.clocks[c], lost[c].size());
   print_figures({}, figures);
   say_what_is_wrong(recording, sets);
   if (command.common.json_path.empty()) return;
   for (std::size_t c = 0; c < sets.clocks.size(); ++c) {
     Json& camera = figures["cameras"][recording.cameras()[c].name];
     camera["missing_frames"] = names_of(sets.clocks[c].dropped);
+    camera["lost_frames"] = names_of(lost[c]);
     camera["late_frames"] = names_of(sets.clocks[c].late);
   }
   write_figures(command.common, figures);
@@ -189,7 +193,7 @@ void run_info(const InfoCommand& command) {
 void add_info(CLI::App& group) {
   auto options = std::make_shared<InfoCommand>();
   CLI::App* command = group.add_subcommand(
-      "info", "What a recording holds: cameras, clocks, missing and late pictures");
+      "info", "What a recording holds: cameras, clocks, missing, lost and late pictures");
   command->add_option("--frames", options->frames, "The recording")->required();
   add_common_options(*command, options->common, "pencilscan sequence info --frames recording.zarr");
   command->callback([options] { run_info(*options); });

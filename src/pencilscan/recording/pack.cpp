@@ -182,6 +182,33 @@ PackReport pack_recording(const fs::path& frames, const fs::path& out, const Pac
   return report;
 }
 
+std::vector<std::vector<std::size_t>> lost_pictures(const Recording& recording,
+                                                    const FrameSets& sets) {
+  std::vector<std::vector<std::size_t>> lost(recording.cameras().size());
+  for (const FrameSet& set : sets.sets) {
+    for (std::size_t c = 0; c < lost.size(); ++c) {
+      const auto row = set.rows[c];
+      if (row && recording.valid(*row, c) && !is_there(recording, row, c))
+        lost[c].push_back(set.number);
+    }
+  }
+  return lost;
+}
+
+std::vector<std::string> lost_warnings(const Recording& recording, const FrameSets& sets) {
+  std::vector<std::string> warnings;
+  const auto lost = lost_pictures(recording, sets);
+  for (std::size_t c = 0; c < lost.size(); ++c) {
+    std::vector<std::string> names;
+    for (const std::size_t number : lost[c]) names.push_back(six_digits(number));
+    if (names.empty()) continue;
+    warnings.push_back(
+        "pictures of camera " + recording.cameras()[c].name +
+        " that were recorded and whose files are no longer there: " + counted_names(names));
+  }
+  return warnings;
+}
+
 PackReport unpack_recording(const Recording& recording, const FrameSets& sets, const fs::path& out,
                             const Progress& progress) {
   refuse_what_would_stay(recording, sets, out);
@@ -210,6 +237,8 @@ PackReport unpack_recording(const Recording& recording, const FrameSets& sets, c
   report.pictures = pictures;
   report.missing = report.frames * cameras - report.pictures;
   report.warnings = left_out_warnings(recording, sets);
+  for (std::string& warning : lost_warnings(recording, sets))
+    report.warnings.push_back(std::move(warning));
   if (!has_times(recording, sets)) return report;
   std::string table = "frame";
   for (const RecordedCamera& camera : recording.cameras()) table += "," + camera.name;

@@ -46,4 +46,12 @@ PackReport unpack_recording(const Recording& recording, const FrameSets& sets,
 [[nodiscard]] std::vector<std::string> left_out_warnings(const Recording& recording,
                                                          const FrameSets& sets);
 
+/// Per camera the numbers of the sets whose picture of it was lost: it was recorded, and its file
+/// is no longer there.
+[[nodiscard]] std::vector<std::vector<std::size_t>> lost_pictures(const Recording& recording,
+                                                                  const FrameSets& sets);
+/// A sentence for each camera of them.
+[[nodiscard]] std::vector<std::string> lost_warnings(const Recording& recording,
+                                                     const FrameSets& sets);
+
 }  // namespace pencilscan

@@ -72,6 +72,23 @@ TEST_F(Pack, FoldersComeBackAsTheyWere) {
   EXPECT_TRUE(fs::exists(again / "timestamps.csv"));
 }
 
+TEST_F(Pack, PicturesWhoseFilesAreGoneAreNamed) {
+  for (const char* frame : {"000000", "000001", "000002"}) {
+    put(std::string(frame) + "/left.png", CV_8UC1, 3);
+    if (std::string(frame) != "000002") put(std::string(frame) + "/right.png", CV_8UC1, 4);
+  }
+  (void)pack_recording(frames(), packed());
+  const Recording recording = Recording::open(packed());
+  const FrameSets sets = group_frames(recording);
+  // What was never taken is missing, and not lost.
+  EXPECT_THAT(lost_pictures(recording, sets), ElementsAre(IsEmpty(), IsEmpty()));
+  fs::remove(recording.picture_file(1, 1));
+  EXPECT_THAT(lost_pictures(recording, sets), ElementsAre(IsEmpty(), ElementsAre(1U)));
+  const PackReport unpacked = unpack_recording(recording, sets, temporary_.path() / "again");
+  EXPECT_THAT(unpacked.warnings, ElementsAre("pictures of camera right that were recorded and "
+                                             "whose files are no longer there: 1 (000001)"));
+}
+
 TEST_F(Pack, AFolderWithoutAPictureIsTold) {
   put("000000/cam0.png", CV_8UC1, 3);
   put("000002/cam0.png", CV_8UC1, 5);
