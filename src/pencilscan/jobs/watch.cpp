@@ -202,14 +202,18 @@ bool agrees_again(const Found& found) {
 double size_of(const Found& found) { return std::abs(found.change.after - found.change.before); }
 
 /// Whether a camera's crossings meet with its picture where it was, so that it did not turn away.
+/// Where noise hides how much they miss, the change is noticed some frames late: medians of many
+/// frames on both sides, so that these are outvoted.
 bool is_steady(std::span<const FrameRow> rows, const Found& found) {
+  constexpr std::size_t kFramesBeside = 15;  // as the running median of find_changes()
   const std::size_t camera = found.series->device;
   if (camera >= rows[0].cameras.size()) return false;
   const auto change = [&](double CameraRow::*shift) {
-    const auto [before, after] =
-        before_and_after(rows, found.change.at, kFramesOfChange,
-                         [&](const FrameRow& row) { return row.cameras[camera].*shift; });
-    return after - before;
+    const Reading reading = [&](const FrameRow& row) { return row.cameras[camera].*shift; };
+    double before =
+        median_of_done(std::make_reverse_iterator(at), rows.rend(), kFramesBeside, reading);
+    if (!std::isfinite(before)) before = median_of_done(end, rows.end(), kFramesBeside, reading);
+    return median_of_done(at, end, kFramesBeside, reading) - before;
   };
   return std::hypot(change(&CameraRow::shift_x_px), change(&CameraRow::shift_y_px)) < kShiftPx;
 }

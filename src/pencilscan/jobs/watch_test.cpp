@@ -359,6 +359,21 @@ TEST_F(Watch, MissesThatNoiseExplainsAreNoMotion) {
   EXPECT_THAT(found[0].text, HasSubstr("stands where it stood"));
 }
 
+// Its shifts are noisy, and what crossings miss is noticed three frames after it moved.
+TEST_F(Watch, ACameraThatIsNoticedLateHasMovedAllTheSame) {
+  Random random(11);
+  for (FrameRow& row : rows_) {
+    row.device_crossing_expected_px.assign(6, 0.09);
+    for (CameraRow& camera : row.cameras) {
+      camera.shift_x_px = random.normal(0, 0.3);
+      camera.shift_y_px = random.normal(0, 0.1);
+    }
+  }
+  from(150, [](FrameRow& row) { row.cameras[1].shift_x_px += 1.2; });
+  from(153, [](FrameRow& row) { row.device_crossing_px[1] += 0.1; });
+  expect_one_moved("153", "cam1");
+}
+
 TEST_F(Watch, FindingsAreEventsWithTheirFrames) {
   const auto say = [&](std::size_t first, std::size_t last, const char* code, const char* device) {
     for (std::size_t k = first; k <= last; ++k)
