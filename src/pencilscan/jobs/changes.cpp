@@ -34,8 +34,8 @@ double spread_of(std::span<const double> values, double median) {
 /// The running median and its spread.
 class Reference {
  public:
-  Reference(double least_spread, double threshold)
-      : least_spread_(least_spread), threshold_(threshold) {}
+  Reference(double least_spread, double threshold, bool follows)
+      : least_spread_(least_spread), threshold_(threshold), follows_(follows) {}
 
   [[nodiscard]] bool is_known() const { return values_.size() >= kFewest; }
   [[nodiscard]] double median() const { return median_; }
@@ -48,6 +48,7 @@ class Reference {
     return value > median_ ? 1 : -1;
   }
   void add(double value) {
+    if (!follows_ && values_.size() >= kReference) return;
     values_.push_back(value);
     if (values_.size() > kReference) values_.pop_front();
     know(std::vector<double>(values_.begin(), values_.end()));
@@ -61,7 +62,7 @@ class Reference {
   }
   /// Of these values alone.
   [[nodiscard]] Reference around(std::span<const double> values) const {
-    Reference result(least_spread_, threshold_);
+    Reference result(least_spread_, threshold_, follows_);
     result.know(values);
     return result;
   }
@@ -74,6 +75,7 @@ class Reference {
 
   double least_spread_;
   double threshold_;
+  bool follows_;
   std::deque<double> values_;
   double median_ = 0;
   double spread_ = 0;
@@ -269,7 +271,8 @@ ChangeReport find_changes(std::span<const double> values, const ChangeOptions& o
     known.push_back(i);
     series.push_back(values[i]);
   }
-  const Reference empty(std::max(options.smallest / threshold, frame_noise(series)), threshold);
+  const Reference empty(std::max(options.smallest / threshold, frame_noise(series)), threshold,
+                        options.follows);
   ChangeReport report;
   if (known.empty()) return report;
   report.changes = with_ends(search(series, empty, first_changes(series, empty)), threshold);

@@ -33,6 +33,10 @@ struct ChangeOptions {
   std::size_t values =
       1;  ///< of all figures that are watched together, so that one chance is for all
   double chance = 0.01;  ///< of a false alarm in all of them
+  /// The running median follows what changes slowly. False: it is that of the first kReference
+  /// values, of a figure that the object's motion does not change; a drift is a change then, once
+  /// it comes to `smallest`.
+  bool follows = true;
 };
 
 struct Change {

@@ -208,6 +208,9 @@ bool is_steady(std::span<const FrameRow> rows, const Found& found) {
   constexpr std::size_t kFramesBeside = 15;  // as the running median of find_changes()
   const std::size_t camera = found.series->device;
   if (camera >= rows[0].cameras.size()) return false;
+  const auto at = rows.begin() + static_cast<std::ptrdiff_t>(found.change.at);
+  const auto end =
+      rows.begin() + static_cast<std::ptrdiff_t>(found.change.end.value_or(rows.size()));
   const auto change = [&](double CameraRow::*shift) {
     const Reading reading = [&](const FrameRow& row) { return row.cameras[camera].*shift; };
     double before =
@@ -326,7 +329,10 @@ std::vector<Found> find_all(std::span<const FrameRow> rows, const SequenceDevice
           row.status.state == FrameState::kDone ? series.value(row) : kUnknownFigure;
       values.push_back(series.is_ratio ? finite_log(value) : value);
     }
-    const ChangeReport changes = find_changes(values, {series.smallest, all.size() * rows.size()});
+    ChangeOptions options{series.smallest, all.size() * rows.size()};
+    // The object's motion hardly changes it, and a lens creeps out of focus.
+    options.follows = series.kind != "width";
+    const ChangeReport changes = find_changes(values, options);
     for (const Change& change : changes.changes) {
       if (!is_confirmed(rows, series, change.at, kFramesOfChange)) continue;
       found.push_back({&series, of_figure(series, change)});
@@ -346,7 +352,8 @@ constexpr std::size_t kFramesApart = 5;  ///< of changes that have one cause
 
 /// Takes out what another change explains:
 ///   1. the light of a picture, or its named share, that goes with a projector, off or on again,
-///   2. a shift with which a camera's crossings meet while they miss by far more than they did:
+///   2. the light on lines of a camera that falls where they get wider: it is spread,
+///   3. a shift with which a camera's crossings meet while they miss by far more than they did:
 ///      then its names are those of other lines.
 void drop_explained(std::vector<Found>& found) {
   const std::vector<Found> all = found;
@@ -360,6 +367,11 @@ void drop_explained(std::vector<Found>& found) {
   const auto explains = [&](const Found& f, const Found& cause) {
     if (f.series->kind == "level" || f.series->kind == "labelled")
       return cause.series->kind == "projector" && goes_with_projector(f, cause);
+    if (f.series->kind == "height" && !rises(f))
+      return cause.series->kind == "width" && rises(cause) &&
+             cause.series->device == f.series->device &&
+             cause.change.at <= f.change.at + kFramesApart &&
+             (!cause.change.end || f.change.at < *cause.change.end);
     const bool is_within = cause.change.at + kFramesApart < f.change.at &&
                            (!cause.change.end || f.change.at < *cause.change.end);
     return is_shift(f) && cause.series->kind == "crossings" && rises(cause) && is_within &&

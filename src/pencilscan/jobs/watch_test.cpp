@@ -359,6 +359,36 @@ TEST_F(Watch, MissesThatNoiseExplainsAreNoMotion) {
   EXPECT_THAT(found[0].text, HasSubstr("stands where it stood"));
 }
 
+// Slower than a median of some frames could tell.
+TEST_F(Watch, ALensThatCreepsOutOfFocusIsNamed) {
+  for (std::size_t k = 100; k < kFrames; ++k) {
+    const double wider = 1 + 0.25 * static_cast<double>(k - 100) / (kFrames - 100);
+    rows_[k].cameras[1].line_width_px *= wider;
+  }
+  const auto found = events();
+  ASSERT_THAT(found, SizeIs(1));
+  EXPECT_EQ(found[0].kind, "width");
+  EXPECT_EQ(found[0].device, "cam1");
+  EXPECT_TRUE(found[0].lasts);
+  EXPECT_NEAR(static_cast<double>(found[0].first), 220, 30);  // where it is wider by 15 %
+  EXPECT_THAT(found[0].text, HasSubstr("out of focus"));
+}
+
+// Wider lines are lower: that is no aperture.
+TEST_F(Watch, LightOfALensThatGoesOutOfFocusIsSpread) {
+  for (std::size_t k = 200; k < kFrames; ++k) {
+    const double wider = 1 + 0.5 * std::min(1.0, static_cast<double>(k - 200) / 44);
+    rows_[k].cameras[1].line_width_px *= wider;
+    for (double& height : rows_[k].cameras[1].height_of_projector) height /= std::pow(wider, 3);
+  }
+  const auto found = events();
+  ASSERT_FALSE(found.empty());
+  for (const SequenceEvent& event : found) {
+    EXPECT_EQ(event.kind, "width") << event.text;
+    EXPECT_EQ(event.device, "cam1") << event.text;
+  }
+}
+
 // Its shifts are noisy, and what crossings miss is noticed three frames after it moved.
 TEST_F(Watch, ACameraThatIsNoticedLateHasMovedAllTheSame) {
   Random random(11);
