@@ -244,6 +244,12 @@ TEST_F(Newcomer, FiguresReplaceFiguresOnly) {
   EXPECT_THAT(slurp(folder_ / "figures.json"), HasSubstr("\"coverage\""));
   expect_bad("rig check --rig rig.json --json rig.json", "--json = rig.json: must be a new file");
   EXPECT_EQ(slurp(folder_ / "rig.json"), rig);
+  // Files of results that say no format, and those of others.
+  for (const std::string text : {R"({"cameras": [], "points": 3})", R"({"mine": 1})", "[1]", ""}) {
+    write("report.json", text);
+    expect_bad("rig check --rig rig.json --json report.json", "figures of an earlier run");
+    EXPECT_EQ(slurp(folder_ / "report.json"), text);
+  }
 }
 
 TEST_F(Newcomer, AScanLeavesNoMeshOfAnEarlierOne) {

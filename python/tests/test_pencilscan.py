@@ -130,6 +130,7 @@ class PackageTest(unittest.TestCase):
         run("evaluate", "--truth", folder / "ball.ply", "--rig", folder / "rig.json", "--result",
             folder / "out" / "000000", "--json", folder / "figures.json")
         theirs = json.loads((folder / "figures.json").read_text())
+        self.assertEqual(theirs.pop("format"), "figures/1")
         self.assertEqual(ps.evaluate(folder / "ball.ply", self.scene.rig, folder / "out/000000"), theirs)
         ours = ps.evaluate(folder / "ball.ply", self.scene.rig, self.scene.result)
         self.assertEqual(list(ours), list(theirs))

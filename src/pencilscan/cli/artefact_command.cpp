@@ -188,7 +188,7 @@ void run_artefact(ArtefactCommand command) {
   print_lacking(test.lacking);
   std::printf("%s", kLegend);
   std::fflush(stdout);
-  if (!command.common.json_path.empty()) write_json(command.common.json_path, json);
+  write_figures(command.common, json);
   if (!command.report_path.empty())
     write_text(command.report_path, artefact_html(test, "pencilscan " PENCILSCAN_VERSION));
   if (!test.lacking.empty()) {

@@ -19,15 +19,16 @@ namespace pencilscan::cli {
 namespace {
 
 using Json = nlohmann::ordered_json;
-/// True for what --json may replace: nothing, or the figures of an earlier run. Every other JSON
-/// file of ours says its format.
+constexpr const char* kFiguresFormat = "figures/1";
+
+/// True for what --json may replace: nothing, or the figures of an earlier run, which say so.
 bool may_hold_figures(const std::filesystem::path& path) {
   std::error_code ignored;
   if (!std::filesystem::exists(path, ignored)) return true;
   if (!std::filesystem::is_regular_file(path, ignored)) return false;
   std::ifstream stream(path);
   const Json json = Json::parse(stream, nullptr, false);
-  return json.is_object() && !json.contains("format");
+  return json.is_object() && json.contains("format") && json["format"] == kFiguresFormat;
 }
 
 /// The figures would replace, or be replaced by, what another option of the command names.
@@ -78,9 +79,10 @@ void add_common_options(CLI::App& command, CommonOptions& options, const std::st
       ->check([](const std::string& path) {
         return may_hold_figures(path)
                    ? std::string()
-                   : refusal(
-                         path,
-                         "a new file or figures of an earlier run, and it holds something else");
+                   : refusal(path,
+                             std::string("a new file or figures of an earlier run (their format "
+                                         "is ") +
+                                 kFiguresFormat + "), and it holds something else");
       });
   command.parse_complete_callback(
       [&command, &options] { check_own_file(command, options.json_path); });
@@ -119,7 +121,10 @@ void write_figures(const CommonOptions& options, const nlohmann::ordered_json& f
   if (!may_hold_figures(options.json_path))
     throw InputError("command line", "--json", options.json_path,
                      "must not be another output of the command");
-  write_json(options.json_path, figures);
+  nlohmann::ordered_json file;
+  file["format"] = kFiguresFormat;
+  file.update(figures);
+  write_json(options.json_path, file);
 }
 
 }  // namespace pencilscan::cli

@@ -36,7 +36,8 @@ void warn_of_rig(const Rig& rig);
 
 /// Prints figures to stdout as aligned "key value" lines and writes --json when asked for.
 void print_figures(const CommonOptions& options, const nlohmann::ordered_json& figures);
-/// The second half of it.
+/// The second half of it: the figures, and before them their format, which tells --json what it may
+/// replace.
 void write_figures(const CommonOptions& options, const nlohmann::ordered_json& figures);
 
 // One per command, each in its own <name>_command.cpp. They register a sub-command whose callback

@@ -285,7 +285,7 @@ void run_check(const CheckCommand& command) {
     std::cout << (warning.severe ? "SEVERE: " : "warning: ") << warning.text << "\n";
   }
   if (check.warnings.empty()) std::cout << "no warnings\n";
-  if (!command.common.json_path.empty()) write_json(command.common.json_path, json);
+  write_figures(command.common, json);
 }
 
 void add_check(CLI::App& group) {
