@@ -36,6 +36,10 @@ std::string judge(const TriangleMesh& truth, const Rig& rig,
     nlohmann::ordered_json figures = figures_json(evaluate(truth, rig, input, evaluation), rig);
     if (const auto warning = unit_warning(rig, evaluation.align))
       figures["warnings"].push_back("rig: " + *warning);
+    if (input.points) {
+      if (const auto warning = rig_warning(rig, *input.points))
+        figures["warnings"].push_back("rig: " + *warning);
+    }
     text = json_text(figures);
   });
   return text;

@@ -103,10 +103,13 @@ void run_evaluate(const EvaluateOptions& options) {
   try {
     const Evaluation evaluation = evaluate(truth, rig, result.input, evaluation_options);
     nlohmann::ordered_json figures = figures_json(evaluation, rig);
-    if (const auto warning = unit_warning(rig, evaluation_options.align)) {
+    const auto warn_of_the_rig = [&](const std::optional<std::string>& warning) {
+      if (!warning) return;
       warn_of(options.rig_path + ": " + *warning);
       figures["warnings"].push_back(options.rig_path + ": " + *warning);
-    }
+    };
+    warn_of_the_rig(unit_warning(rig, evaluation_options.align));
+    if (result.input.points) warn_of_the_rig(rig_warning(rig, *result.input.points));
     for (const std::string& warning : evaluation.warnings)
       warn_of(options.truth_path + ": " + warning);
     if (evaluation.point_distance && !evaluation.labels) {

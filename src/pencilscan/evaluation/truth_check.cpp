@@ -1,6 +1,7 @@
 #include "pencilscan/evaluation/truth_check.h"
 
 #include <algorithm>
+#include <limits>
 #include <numbers>
 #include <vector>
 
@@ -79,6 +80,25 @@ std::optional<std::string> unit_warning(const Rig& rig, AlignmentKind align) {
   if (rig.unit_known || align == AlignmentKind::kSimilarity) return std::nullopt;
   return "the rig's unit is unknown: figures and thresholds that are named mm are in that unit; "
          "--align similarity measures in the truth's";
+}
+
+std::optional<std::string> rig_warning(const Rig& rig, std::span<const MeasuredPoint> points) {
+  constexpr double kBesidePx = 1;
+  std::vector<double> beside;
+  for (const MeasuredPoint& point : evenly_picked(points, kLooked)) {
+    const Vec2 pixel(static_cast<double>(point.u), static_cast<double>(point.v));
+    const auto seen = rig.cameras[point.camera].project(position_of(point));
+    beside.push_back(seen ? (*seen - pixel).norm() : std::numeric_limits<double>::max());
+  }
+  if (beside.empty()) return std::nullopt;
+  const double median = quantile(std::move(beside), 0.5);
+  if (median <= kBesidePx) return std::nullopt;
+  return "this is hardly the rig that the result was made with: its cameras see half of the "
+         "points " +
+         (median < std::numeric_limits<double>::max()
+              ? formatted(median, "%.3g") + " px and more beside the pixels of points.ply"
+              : std::string("behind them")) +
+         "; devices.json beside the frames of a result is its rig";
 }
 
 }  // namespace pencilscan

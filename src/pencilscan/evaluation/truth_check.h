@@ -6,6 +6,7 @@
 
 #include "pencilscan/evaluation/alignment.h"
 #include "pencilscan/geometry/ray_scene.h"
+#include "pencilscan/labeling/measured_point.h"
 #include "pencilscan/rig/rig.h"
 
 namespace pencilscan {
@@ -24,5 +25,11 @@ namespace pencilscan {
 /// That the figures are not in mm: the rig's unit is unknown, and no similarity has brought the
 /// result to the truth's size.
 [[nodiscard]] std::optional<std::string> unit_warning(const Rig& rig, AlignmentKind align);
+
+/// Why a rig can hardly be the one that a result was made with: a point lies on its camera's ray
+/// through its pixel, and half of them lie more than a pixel beside it, in which a label counts as
+/// right. Nothing where it may be, or where there are no points; their cameras are the rig's.
+[[nodiscard]] std::optional<std::string> rig_warning(const Rig& rig,
+                                                     std::span<const MeasuredPoint> points);
 
 }  // namespace pencilscan
