@@ -408,6 +408,9 @@ TEST_F(Sequence, FramesBeforeAChunkAreNotCountedAmongItsOwn) {
 TEST_F(Sequence, NeverReplacesItsFrames) {
   EXPECT_THAT(error_of([&] { (void)run(frames(), frames(), {}, true); }),
               HasSubstr("must not be that of --frames"));
+  EXPECT_THAT(error_of([&] { (void)run(frames(), frames() / "result", {}, true); }),
+              HasSubstr("must not lie in that of --frames"));
+  EXPECT_FALSE(fs::exists(frames() / "result"));
   // Reached on another way, too: as a part of the output.
   const fs::path out = temporary_.path() / "out";
   fs::create_directories(out);
