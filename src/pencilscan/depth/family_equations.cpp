@@ -15,6 +15,12 @@ void FamilyEquations::sum(const FamilyLight& light, const float* image, const fl
   gram(columns_.values.data(), static_cast<int>(grid_->padded), all_, gram_.data());
 }
 
+void FamilyEquations::sum_light(const FamilyLight& light, const float* image, const float* root) {
+  make_light_columns(*grid_, light, image, root, columns_);
+  all_ = light.patterns + 2;
+  gram(columns_.values.data(), static_cast<int>(grid_->padded), all_, gram_.data());
+}
+
 void FamilyEquations::add(const FamilyLight& light, double certainty, std::size_t family,
                           WindowEquations& equations) {
   const int patterns = light.patterns;

@@ -25,6 +25,8 @@ class FamilyEquations {
   /// Sums them for the light as it is; `image`, `root` (of the weights): of the grid's pixels.
   /// `unit`: as make_columns().
   void sum(const FamilyLight& light, const float* image, const float* root, float unit);
+  /// Sums those of patterns, offset and image alone (make_light_columns()).
+  void sum_light(const FamilyLight& light, const float* image, const float* root);
   /// Adds what they say, times `certainty`, to the equations of a family, whose unknowns are then
   /// the patterns' amplitudes, the offset, e_x and e_y, and to those of the surface. After sum().
   void add(const FamilyLight& light, double certainty, std::size_t family,

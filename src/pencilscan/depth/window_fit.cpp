@@ -201,10 +201,9 @@ void WindowFitter::solve_amplitudes(std::size_t family) {
     lit_[k].amplitude = lit_[k].family == static_cast<int>(family) ? 0.F : lit_[k].amplitude;
     if (lit_[k].on && lit_[k].family == static_cast<int>(family)) mine.push_back(k);
   }
-  // Without light, the residual is the image.
   collect(family);
-  of_family_.sum(seen.light, seen.image.data(), seen.root.data(), 1);
-  const int image = FamilyColumns::residual(static_cast<int>(mine.size()));
+  of_family_.sum_light(seen.light, seen.image.data(), seen.root.data());
+  const int image = static_cast<int>(mine.size()) + 1;
   for (int k = 0; k <= static_cast<int>(mine.size()); ++k) columns.push_back(k);
   using Dense = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic>;
   thread_local Dense A;

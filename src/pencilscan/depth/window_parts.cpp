@@ -10,12 +10,15 @@ namespace {
 constexpr float kSideStart = 0.2F;  // of the radius: where a side of the window begins
 constexpr float kMiddle2 = 0.2F;    // squared radius of the middle, in radii
 
-constexpr std::size_t kDirections = 16;  // of edges
 constexpr int kStripsPerPx = 2;
-constexpr std::size_t kMostStrips = 32;  // of windows of 10 px
 
-WindowParts::Edge edge_of(std::size_t direction, float offset) {
-  const double angle = 2 * std::numbers::pi * static_cast<double>(direction) / kDirections;
+/// LightSums of a pixel, or over several.
+using PixelLight __attribute__((vector_size(16))) = float;
+enum : int { kShown, kExpected, kSeen, kPredicted };
+
+WindowParts::Edge edge_of(std::size_t direction, std::size_t directions, float offset) {
+  const double angle =
+      2 * std::numbers::pi * static_cast<double>(direction) / static_cast<double>(directions);
   return {static_cast<float>(std::cos(angle)), static_cast<float>(std::sin(angle)), offset};
 }
 
@@ -34,8 +37,7 @@ bool is_dark(float seen, float energy, float deviations) {
 
 }  // namespace
 
-WindowParts::WindowParts(const WindowGrid& grid)
-    : grid_(&grid), masks_(kParts * grid.padded, 0.F), strip_(kDirections * grid.padded, 0) {
+WindowParts::WindowParts(const WindowGrid& grid) : grid_(&grid), masks_(kParts * grid.padded, 0.F) {
   const float* x = grid.monomial(1);
   const float* y = grid.monomial(2);
   for (std::size_t part = 0; part < kParts; ++part) {
@@ -48,15 +50,31 @@ WindowParts::WindowParts(const WindowGrid& grid)
       masks_[part * grid.padded + i] = is_in ? 1.F : 0.F;
     }
   }
+  list_strips();
+  reset();
+}
+
+void WindowParts::list_strips() {
+  const float* x = grid_->monomial(1);
+  const float* y = grid_->monomial(2);
+  // How many strips out each pixel lies, from 1; 0: inwards of the middle.
+  std::vector<int> strip_of(static_cast<std::size_t>(grid_->count));
   for (std::size_t direction = 0; direction < kDirections; ++direction) {
-    const Edge edge = edge_of(direction, 0);
-    for (std::size_t i = 0; i < static_cast<std::size_t>(grid.count); ++i) {
-      const float out = static_cast<float>(grid.half) * (x[i] * edge.cosine + y[i] * edge.sine);
-      strip_[direction * grid.padded + i] =
-          static_cast<std::uint8_t>(std::max(0.F, std::floor(kStripsPerPx * out + 1)));
+    const Edge edge = edge_of(direction, kDirections, 0);
+    for (std::size_t i = 0; i < strip_of.size(); ++i) {
+      const float out = static_cast<float>(grid_->half) * (x[i] * edge.cosine + y[i] * edge.sine);
+      strip_of[i] = std::max(0, static_cast<int>(std::floor(kStripsPerPx * out + 1)));
+    }
+    for (int strip = *std::max_element(strip_of.begin(), strip_of.end()); strip >= 1; --strip) {
+      const std::size_t before = pixels_.size();
+      for (std::size_t i = 0; i < strip_of.size(); ++i) {
+        if (strip_of[i] == strip) pixels_.push_back(static_cast<std::uint16_t>(i));
+      }
+      if (pixels_.size() == before) continue;
+      strips_[direction].push_back({static_cast<float>(strip - 1) / kStripsPerPx,
+                                    static_cast<std::uint16_t>(pixels_.size())});
     }
   }
-  reset();
 }
 
 void WindowParts::reset() {
@@ -81,36 +99,26 @@ std::optional<WindowParts::Edge> WindowParts::edge(float misfit) const {
   // Light that is not where it was predicted is no darkness: relief moves lines.
   constexpr float kMostShown = 0.5F;
   const float certainty = 1 / std::max(1.F, misfit);
-  struct Light {
-    float seen = 0, predicted = 0, shown = 0, expected = 0;
-  };
-  const auto last = static_cast<std::size_t>(kStripsPerPx * (grid_->half + 1));
-  const auto count = static_cast<std::size_t>(grid_->count);
-  std::array<Light, kMostStrips> strips;
+  thread_local std::vector<PixelLight> light;
+  light.resize(static_cast<std::size_t>(grid_->count));
+  for (std::size_t i = 0; i < light.size(); ++i)
+    light[i] = PixelLight{light_.shown[i], light_.expected[i], light_.seen[i], light_.predicted[i]};
+  const std::uint16_t* pixel = pixels_.data();
   std::optional<Edge> best;
   float least = 0;
   for (std::size_t direction = 0; direction < kDirections; ++direction) {
-    const std::uint8_t* strip_of = strip_.data() + direction * grid_->padded;
-    strips.fill({});
-    for (std::size_t i = 0; i < count; ++i) {
-      Light& strip = strips[strip_of[i]];
-      strip.seen += light_.seen[i];
-      strip.predicted += light_.predicted[i];
-      strip.shown += light_.shown[i];
-      strip.expected += light_.expected[i];
-    }
-    Light beyond;
-    for (std::size_t k = last; k >= 1; --k) {
-      beyond.seen += strips[k].seen;
-      beyond.predicted += strips[k].predicted;
-      beyond.shown += strips[k].shown;
-      beyond.expected += strips[k].expected;
-      const float lit = 2 * beyond.seen - beyond.predicted;
-      if (lit >= least || beyond.shown > kMostShown * beyond.expected ||
-          !is_dark(certainty * beyond.seen, certainty * beyond.predicted, kEdgeBelow))
+    PixelLight beyond = {};
+    for (const Strip& strip : strips_[direction]) {
+      PixelLight sum = {};
+      for (const std::uint16_t* end = pixels_.data() + strip.end; pixel != end; ++pixel)
+        sum += light[*pixel];
+      beyond += sum;
+      const float lit = 2 * beyond[kSeen] - beyond[kPredicted];
+      if (lit >= least || beyond[kShown] > kMostShown * beyond[kExpected] ||
+          !is_dark(certainty * beyond[kSeen], certainty * beyond[kPredicted], kEdgeBelow))
         continue;
       least = lit;
-      best = edge_of(direction, static_cast<float>(k - 1) / kStripsPerPx);
+      best = edge_of(direction, kDirections, strip.offset);
     }
   }
   return best;

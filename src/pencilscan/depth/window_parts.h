@@ -44,10 +44,20 @@ class WindowParts {
  private:
   static constexpr std::size_t kSides = 8;
   static constexpr std::size_t kParts = kSides + 1;
+  static constexpr std::size_t kDirections = 16;  ///< of edges
+
+  void list_strips();
 
   const WindowGrid* grid_;
-  std::vector<float> masks_;         ///< of the sides, then of the middle
-  std::vector<std::uint8_t> strip_;  ///< per direction and pixel: half pixels outwards, 0: inwards
+  std::vector<float> masks_;  ///< of the sides, then of the middle
+  /// Pixels of a strip half a pixel wide across a direction, outwards of the middle.
+  struct Strip {
+    float offset = 0;       ///< where it begins
+    std::uint16_t end = 0;  ///< of its pixels among those of all strips
+  };
+  std::vector<std::uint16_t> pixels_;  ///< of all strips, one after another
+  /// Per direction those that have pixels, the outermost first.
+  std::array<std::vector<Strip>, kDirections> strips_;
   LightSums light_;
   std::array<float, kParts> seen_in_{}, predicted_in_{};
 };

@@ -323,6 +323,26 @@ PENCILSCAN_CLONES void make_columns(const WindowGrid& grid, const FamilyLight& l
   }
 }
 
+PENCILSCAN_CLONES void make_light_columns(const WindowGrid& grid, const FamilyLight& light,
+                                          const float* image, const float* root,
+                                          FamilyColumns& columns) {
+  const std::size_t rows = grid.padded;
+  const auto patterns = static_cast<std::size_t>(light.patterns);
+  float* of_pattern = columns.values.data();
+  float* rest = of_pattern + patterns * rows;
+  for (std::size_t i = 0; i < rows; i += kLanes) {
+    Lanes pr, value;
+    load(root + i, pr);
+    for (std::size_t k = 0; k < patterns; ++k) {
+      load(light.profile[k] + i, value);
+      store(pr * value, of_pattern + k * rows + i);
+    }
+    load(image + i, value);
+    store(pr, rest + i);
+    store(pr * value, rest + rows + i);
+  }
+}
+
 PENCILSCAN_CLONES void gram(const float* J, int rows, int columns, float* result) {
   int first = 0;
   for (; first + 4 <= columns; first += 4) gram_rows<4>(J, rows, columns, first, result);

@@ -82,6 +82,11 @@ struct FamilyColumns {
 void make_columns(const WindowGrid& grid, const FamilyLight& light, const float* image,
                   const float* root, float unit, FamilyColumns& columns);
 
+/// The first of them alone, of light that is not known yet: patterns, offset, and the image in
+/// place of the residual.
+void make_light_columns(const WindowGrid& grid, const FamilyLight& light, const float* image,
+                        const float* root, FamilyColumns& columns);
+
 /// Products of columns with each other, J' J: both triangles. rows: a multiple of kLanes; result:
 /// columns x columns.
 void gram(const float* J, int rows, int columns, float* result);
