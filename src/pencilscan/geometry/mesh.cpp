@@ -6,6 +6,7 @@
 #include <numbers>
 #include <span>
 
+#include "pencilscan/core/chunks.h"
 #include "pencilscan/geometry/mesh_sides.h"
 
 namespace pencilscan {
@@ -52,7 +53,7 @@ std::vector<Vec3> vertex_normals(const TriangleMesh& mesh) {
     const Vec3 n = doubled_area_vector(mesh, face);
     for (const int v : face) normals[static_cast<std::size_t>(v)] += n;
   }
-  for (Vec3& n : normals) n.stableNormalize();
+  parallel_chunks(normals.size(), [&](std::size_t v) { normals[v].stableNormalize(); });
   return normals;
 }
 

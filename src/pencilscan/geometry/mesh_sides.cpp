@@ -5,6 +5,8 @@
 #include <cstddef>
 #include <utility>
 
+#include "pencilscan/core/chunks.h"
+
 namespace pencilscan {
 
 std::vector<FaceSide> sides_by_edge(const TriangleMesh& mesh) {
@@ -27,15 +29,14 @@ std::vector<FaceSide> sides_by_edge(const TriangleMesh& mesh) {
     }
   }
   // next[v] is now the end of v's sides.
-  std::size_t begin = 0;
-  for (std::size_t v = 0; v + 1 < next.size(); ++v) {
+  parallel_chunks(mesh.vertices.size(), [&](std::size_t v) {
+    const std::size_t begin = v == 0 ? 0 : next[v - 1];
     std::sort(sides.begin() + static_cast<std::ptrdiff_t>(begin),
               sides.begin() + static_cast<std::ptrdiff_t>(next[v]),
               [](const FaceSide& a, const FaceSide& b) {
                 return std::pair(a.high, a.face) < std::pair(b.high, b.face);
               });
-    begin = next[v];
-  }
+  });
   return sides;
 }
 

@@ -2,10 +2,7 @@
 
 #include <algorithm>
 #include <cstdlib>
-#include <utility>
 #include <vector>
-
-#include "pencilscan/core/median.h"
 
 namespace pencilscan {
 
@@ -43,7 +40,8 @@ std::optional<float> NamedPoints::amplitude_around(const Eigen::Vector2f& place,
                       std::max(static_cast<float>(options_.support_px),
                                static_cast<float>(options_.support_lines) * spacing_px);
   const auto lights = lights_.find({name.pattern.projector, name.pattern.pattern});
-  std::vector<float> amplitudes;
+  thread_local std::vector<float> amplitudes;
+  amplitudes.clear();
   if (lights != lights_.end()) {
     lights->second.around(place, reach, [&](const LineLight& light) {
       const int lines = std::abs(light.line - name.line);
@@ -53,7 +51,9 @@ std::optional<float> NamedPoints::amplitude_around(const Eigen::Vector2f& place,
     });
   }
   if (static_cast<int>(amplitudes.size()) < options_.min_support) return std::nullopt;
-  return upper_median(std::move(amplitudes));
+  const auto middle = amplitudes.begin() + static_cast<std::ptrdiff_t>(amplitudes.size() / 2);
+  std::nth_element(amplitudes.begin(), middle, amplitudes.end());
+  return *middle;
 }
 
 }  // namespace pencilscan

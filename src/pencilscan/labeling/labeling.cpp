@@ -42,12 +42,15 @@ void add_undecided(const UndecidedRun& run, std::vector<UndecidedRun>& undecided
 std::array<std::size_t, 4> undecided_points(std::span<const UndecidedRun> undecided,
                                             std::span<const LabeledRun> labelled) {
   std::array<std::size_t, 4> points{};
+  std::vector<LabeledRun> by_curve(labelled.begin(), labelled.end());
+  std::sort(by_curve.begin(), by_curve.end(),
+            [](const LabeledRun& a, const LabeledRun& b) { return a.curve < b.curve; });
+  const auto is_before = [](const LabeledRun& run, int curve) { return run.curve < curve; };
   for (const UndecidedRun& run : undecided) {
     int left = run.end - run.begin;
-    for (const LabeledRun& other : labelled) {
-      if (other.curve == run.curve)
-        left -= std::max(0, std::min(run.end, other.end) - std::max(run.begin, other.begin));
-    }
+    for (auto other = std::lower_bound(by_curve.begin(), by_curve.end(), run.curve, is_before);
+         other != by_curve.end() && other->curve == run.curve; ++other)
+      left -= std::max(0, std::min(run.end, other->end) - std::max(run.begin, other->begin));
     points[static_cast<std::size_t>(run.reason)] += static_cast<std::size_t>(left);
   }
   return points;

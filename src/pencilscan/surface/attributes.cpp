@@ -15,12 +15,15 @@ namespace {
 /// Declares invented those fringe vertices that connect to an invented one through the fringe. Gaps
 /// between lines have a fringe too, but nothing invented inside: they stay measured.
 void cut_fringe(std::span<const char> fringe, TriangleMesh& mesh) {
-  std::vector<std::vector<int>> neighbors(mesh.vertices.size());
+  // Ways into the fringe, by where they begin: few vertices have any.
+  std::vector<std::array<int, 2>> ways;
   for (const auto& face : mesh.faces) {
     for (std::size_t k = 0; k < 3; ++k) {
-      neighbors[static_cast<std::size_t>(face[k])].push_back(face[(k + 1) % 3]);
+      const auto to = static_cast<std::size_t>(face[(k + 1) % 3]);
+      if (fringe[to] && mesh.confidence[to] > 0) ways.push_back({face[k], face[(k + 1) % 3]});
     }
   }
+  std::sort(ways.begin(), ways.end());
   std::vector<std::size_t> open;
   for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
     if (!(mesh.confidence[v] > 0)) open.push_back(v);
@@ -28,9 +31,11 @@ void cut_fringe(std::span<const char> fringe, TriangleMesh& mesh) {
   while (!open.empty()) {
     const std::size_t v = open.back();
     open.pop_back();
-    for (const int next : neighbors[v]) {
-      const auto n = static_cast<std::size_t>(next);
-      if (!fringe[n] || !(mesh.confidence[n] > 0)) continue;
+    const auto from = static_cast<int>(v);
+    for (auto way = std::lower_bound(ways.begin(), ways.end(), std::array{from, -1});
+         way != ways.end() && (*way)[0] == from; ++way) {
+      const auto n = static_cast<std::size_t>((*way)[1]);
+      if (!(mesh.confidence[n] > 0)) continue;
       mesh.confidence[n] = 0;
       open.push_back(n);
     }

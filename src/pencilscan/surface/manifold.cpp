@@ -2,10 +2,11 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <map>
-#include <numeric>
 #include <span>
 #include <utility>
 #include <vector>
@@ -182,6 +183,37 @@ std::size_t split_edges(TriangleMesh& mesh) {
   return count;
 }
 
+/// Those vertices that do not lie alone at their place, found by a table of places.
+std::vector<std::size_t> at_one_place(std::span<const Vec3> places) {
+  constexpr std::uint32_t kNone = 0xFFFFFFFFU;
+  const auto hash = [](const Vec3& x) {
+    std::uint64_t h = 0;
+    for (Eigen::Index k = 0; k < 3; ++k) {
+      // Plus zero, as minus zero is the same place.
+      h = (h ^ std::bit_cast<std::uint64_t>(x[k] + 0.0)) * 0x9E3779B97F4A7C15ULL;
+      h ^= h >> 29;
+    }
+    return h;
+  };
+  // The first vertex of each place, in a table that is at most half full.
+  std::vector<std::uint32_t> first(std::bit_ceil(2 * places.size() + 1), kNone);
+  const std::size_t mask = first.size() - 1;
+  std::vector<std::size_t> shared;
+  for (std::size_t v = 0; v < places.size(); ++v) {
+    std::size_t at = hash(places[v]) & mask;
+    while (first[at] != kNone && places[first[at]] != places[v]) at = (at + 1) & mask;
+    if (first[at] == kNone) {
+      first[at] = static_cast<std::uint32_t>(v);
+    } else {
+      shared.push_back(first[at]);
+      shared.push_back(v);
+    }
+  }
+  std::sort(shared.begin(), shared.end());
+  shared.erase(std::unique(shared.begin(), shared.end()), shared.end());
+  return shared;
+}
+
 }  // namespace
 
 std::size_t make_manifold(TriangleMesh& mesh) { return split_fans(mesh) + split_edges(mesh); }
@@ -194,8 +226,6 @@ std::size_t separate_vertices(TriangleMesh& mesh) {
       x[k] = static_cast<double>(rounded);
     }
   }
-  std::vector<std::size_t> order(mesh.vertices.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
   const auto key = [&](std::size_t v) {
     const Vec3& x = mesh.vertices[v];
     return std::array<double, 3>{x[0], x[1], x[2]};
@@ -203,6 +233,8 @@ std::size_t separate_vertices(TriangleMesh& mesh) {
   std::size_t moved = 0;
   constexpr int kRounds = 8;
   for (int round = 0; round < kRounds; ++round) {
+    std::vector<std::size_t> order = at_one_place(mesh.vertices);
+    if (order.empty()) break;
     std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
       return std::pair(key(a), a) < std::pair(key(b), b);
     });

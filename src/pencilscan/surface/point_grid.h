@@ -38,6 +38,15 @@ class PointGrid {
   /// Calls visit(index, squared distance) for every point within `radius` of `center`.
   template <typename Visit>
   void for_each_within(const Vec3& center, double radius, Visit&& visit) const {
+    (void)any_within(center, radius, [&](std::size_t i, double d2) {
+      visit(i, d2);
+      return false;
+    });
+  }
+
+  /// Whether matches(index, squared distance) for any point within `radius` of `center`.
+  template <typename Matches>
+  [[nodiscard]] bool any_within(const Vec3& center, double radius, Matches&& matches) const {
     const Cell low = cell_of(center - Vec3::Constant(radius));
     const Cell high = cell_of(center + Vec3::Constant(radius));
     for (std::int64_t x = low[0]; x <= high[0]; ++x) {
@@ -51,10 +60,12 @@ class PointGrid {
         for (at = std::lower_bound(at, end, least); at != end && *at <= most; ++at) {
           const auto i = static_cast<std::size_t>(at - keys_.begin());
           const double d2 = (points_[i] - center).squaredNorm();
-          if (d2 <= radius * radius) visit(static_cast<std::size_t>(index_[i]), d2);
+          if (d2 <= radius * radius && matches(static_cast<std::size_t>(index_[i]), d2))
+            return true;
         }
       }
     }
+    return false;
   }
 
  private:

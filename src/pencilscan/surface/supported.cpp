@@ -34,6 +34,13 @@ class Places {
     return nearest;
   }
 
+  /// Whether there is any such place.
+  [[nodiscard]] bool any(const Vec3& x, const std::vector<char>& is_faced, double radius) const {
+    return grid_.any_within(x, radius, [&](std::size_t k, double) {
+      return is_faced[points_[kEvery * k].camera] != 0;
+    });
+  }
+
  private:
   std::span<const MeasuredPoint> points_;
   PointGrid grid_;
@@ -80,6 +87,8 @@ std::vector<char> unsupported_vertices(const Rig& rig, const TriangleMesh& mesh,
     is_faced.clear();
     for (const Camera& camera : rig.cameras)
       is_faced.push_back(normals[v].dot(camera.center() - x) > 0 ? 1 : 0);
+    // How near does not matter where nothing denied is.
+    if (!denied_places.any(x, is_faced, near) && places.any(x, is_faced, near)) return;
     double nearest = places.nearest2(x, is_faced, near, far);
     if (nearest == far) nearest = places.nearest2(x, is_faced, reach, far);
     bool is_supported = nearest < far;

@@ -117,10 +117,15 @@ double measured_share(const TriangleMesh& mesh) {
 
 /// The measured part without islands below an area, and what the surface is worth.
 void finish(double least_island, SurfaceResult& result) {
-  result.measured = measured_part(result.mesh, least_island);
-  result.measured.hole.clear();  // it has none
-  result.report.measured_share = measured_share(result.mesh);
-  note_quality(result);
+  const auto find_measured = [&] {
+    result.measured = measured_part(result.mesh, least_island);
+    result.measured.hole.clear();  // it has none
+  };
+  const auto judge = [&] {
+    result.report.measured_share = measured_share(result.mesh);
+    note_quality(result);
+  };
+  parallel_for(2, [&](std::size_t part) { part == 0 ? find_measured() : judge(); });
 }
 
 /// Vertices with depth go out by the bows around, so that the faces between lie as much outside of

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdint>
 #include <numbers>
+#include <optional>
 
 #include "pencilscan/core/chunks.h"
 #include "pencilscan/depth/pattern_view.h"
@@ -111,8 +112,10 @@ class Light {
   std::vector<std::vector<PatternView>> patterns_;  ///< per view
 };
 
+/// `meanwhile`: what another thread may do.
+template <class Meanwhile>
 Samples collect(const Rig& rig, const RayScene& surface, std::span<const ColorView> views,
-                const ColorOptions& options, bool has_plain) {
+                const ColorOptions& options, bool has_plain, const Meanwhile& meanwhile) {
   const TriangleMesh& mesh = surface.mesh();
   const Light light(rig, surface, views, options);
   const std::vector<Vec3> normals = vertex_normals(mesh);
@@ -145,7 +148,9 @@ Samples collect(const Rig& rig, const RayScene& surface, std::span<const ColorVi
   };
   const std::size_t count = mesh.vertices.size();
   Samples samples((count + kVerticesPerRun - 1) / kVerticesPerRun);
-  parallel_for(samples.size(), [&](std::size_t r) {
+  parallel_for(samples.size() + 1, [&](std::size_t k) {
+    if (k == 0) return meanwhile();
+    const std::size_t r = k - 1;
     for (std::size_t v = r * kVerticesPerRun; v < std::min(count, (r + 1) * kVerticesPerRun); ++v)
       look(v, samples[r]);
   });
@@ -335,20 +340,33 @@ std::size_t find_clusters(const Neighbors& neighbors, std::vector<int>& cluster_
   return static_cast<std::size_t>(count);
 }
 
+/// What vertices and clusters of them lie beside each other.
+struct Graph {
+  Neighbors neighbors;
+  std::vector<int> cluster_of;
+  std::size_t clusters;
+  Neighbors of_clusters;
+
+  explicit Graph(const TriangleMesh& mesh)
+      : neighbors(mesh),
+        cluster_of(mesh.vertices.size(), -1),
+        clusters(find_clusters(neighbors, cluster_of)),
+        of_clusters(neighbors, cluster_of, clusters) {}
+};
+
 /// The solution with one albedo per cluster: where little is seen, colours have far to come, which
 /// takes as many rounds as there are vertices on the way.
-std::vector<Channels> coarse_albedo(const Neighbors& neighbors, std::span<const Evidence> sums,
+std::vector<Channels> coarse_albedo(const Graph& graph, std::span<const Evidence> sums,
                                     float smoothing, int rounds) {
-  std::vector<int> cluster_of(sums.size(), -1);
-  const std::size_t count = find_clusters(neighbors, cluster_of);
-  std::vector<Evidence> of_cluster(count);
+  const std::vector<int>& cluster_of = graph.cluster_of;
+  std::vector<Evidence> of_cluster(graph.clusters);
   for (std::size_t v = 0; v < sums.size(); ++v) {
     Evidence& sum = of_cluster[static_cast<std::size_t>(cluster_of[v])];
     sum.weight += sums[v].weight;
     sum.right += sums[v].right;
   }
   std::vector<Channels> albedo = even_albedo(of_cluster);
-  solve(Neighbors(neighbors, cluster_of, count), of_cluster, smoothing, rounds, albedo);
+  solve(graph.of_clusters, of_cluster, smoothing, rounds, albedo);
   std::vector<Channels> rho(sums.size());
   for (std::size_t v = 0; v < rho.size(); ++v)
     rho[v] = albedo[static_cast<std::size_t>(cluster_of[v])];
@@ -364,17 +382,18 @@ std::vector<std::array<float, 3>> vertex_colors(const Rig& rig, const RayScene& 
   if (mesh.faces.empty() || views.empty()) return {};
   const bool has_plain =
       std::any_of(views.begin(), views.end(), [](const ColorView& view) { return view.is_plain; });
-  const Samples samples = collect(rig, surface, views, options, has_plain);
+  std::optional<Graph> graph;
+  const Samples samples =
+      collect(rig, surface, views, options, has_plain, [&] { graph.emplace(mesh); });
   std::vector<Channels> ambient(views.size(), Channels::Zero());
   std::vector<Evidence> sums = evidence(samples, mesh.vertices.size(), ambient);
-  const Neighbors neighbors(mesh);
   const auto smoothing = static_cast<float>(options.smoothing);
-  std::vector<Channels> rho = coarse_albedo(neighbors, sums, smoothing, options.rounds);
-  solve(neighbors, sums, smoothing, options.rounds / 2, rho);
+  std::vector<Channels> rho = coarse_albedo(*graph, sums, smoothing, options.rounds);
+  solve(graph->neighbors, sums, smoothing, options.rounds / 2, rho);
   if (!has_plain) {
     ambient = ambient_light(samples, views.size(), rho);
     sums = evidence(samples, mesh.vertices.size(), ambient);
-    solve(neighbors, sums, smoothing, options.rounds, rho);
+    solve(graph->neighbors, sums, smoothing, options.rounds, rho);
   }
   std::vector<float> brightest;
   for (std::size_t v = 0; v < rho.size(); ++v) {
