@@ -26,12 +26,7 @@ void WindowEquations::resize(int unknowns, Family& family) {
 }
 
 bool WindowEquations::eliminate(double ridge) {
-  // In variables of its own, which stay in registers.
-  Row of_surface[kSurface];
-  for (int r = 0; r < kSurface; ++r) {
-    of_surface[r] = surface[r];
-    of_surface[r][r] *= 1 + ridge;
-  }
+  for (int r = 0; r < kSurface; ++r) surface[r][r] *= 1 + ridge;
   for (Family& family : families_) {
     const int n = family.unknowns;
     for (int j = 0; j < n; ++j) family.a(j, j) *= 1 + ridge;
@@ -49,10 +44,9 @@ bool WindowEquations::eliminate(double ridge) {
         family.B[static_cast<std::size_t>(i)] -= l * of_j;
       }
       const Row scaled = inverse * of_j;
-      for (int r = 0; r < kSurface; ++r) of_surface[r] -= of_j[r] * scaled;
+      for (int r = 0; r < kSurface; ++r) surface[r] -= of_j[r] * scaled;
     }
   }
-  for (int r = 0; r < kSurface; ++r) surface[r] = of_surface[r];
   Eigen::Matrix<double, 6, 6> C;
   for (int r = 0; r < kSurface; ++r) {
     for (int c = 0; c < kSurface; ++c) C(r, c) = surface[r][c];

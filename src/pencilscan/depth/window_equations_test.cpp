@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "pencilscan/core/random.h"
+#include "pencilscan/depth/family_equations.h"
 #include "pencilscan/depth/window_sums.h"
 
 namespace pencilscan {
@@ -205,6 +206,35 @@ TEST(WindowSums, GaussianLinesAreBoxesUnderAGaussian) {
           (profile_of(l, variance + step) - profile_of(l, variance - step)) / (2 * step);
       EXPECT_NEAR(widening[i], per_variance, 5e-3 / variance);
     }
+  }
+}
+
+// Of light that is not known yet, some of all columns are enough, and their sums the same bytes.
+TEST(FamilyEquations, LightAloneHasTheSameProducts) {
+  constexpr int kPatterns = 2;
+  Random random(14);
+  const WindowGrid grid(5);
+  const auto values = [&](double low) {
+    std::vector<float> result(grid.padded);
+    for (float& v : result) v = static_cast<float>(random.uniform(low, 1));
+    return result;
+  };
+  const std::vector<float> first = values(0), second = values(0), slope = values(-1);
+  const std::vector<float> image = values(0), root = values(0.1);
+  FamilyLight light;
+  light.patterns = kPatterns;
+  light.profile = {first.data(), second.data()};
+  light.slope = {slope.data(), slope.data()};
+  light.amplitude = {0, 0};
+  FamilyEquations of_all(grid, kPatterns), of_light(grid, kPatterns);
+  of_all.sum(light, image.data(), root.data(), 1);
+  of_light.sum_light(light, image.data(), root.data());
+  for (int i = 0; i <= kPatterns; ++i) {
+    for (int j = 0; j <= kPatterns; ++j)
+      EXPECT_EQ(of_light.product(i, j), of_all.product(i, j)) << i << ' ' << j;
+    EXPECT_EQ(of_light.product(i, kPatterns + 1),
+              of_all.product(i, FamilyColumns::residual(kPatterns)))
+        << i;
   }
 }
 
