@@ -112,7 +112,7 @@ PointResult check_pictures(const Rig& rig, const Frame& frame, PointResult curve
   if (std::optional<Warning> warning = interpolation_warning(rig, curves.detections))
     curves.warnings.push_back(std::move(*warning));
   const auto gammas = gammas_of_light(rig, frame, curves.graphs);
-  if (std::optional<Warning> warning = gamma_warning(rig, curves.detections, gammas))
+  if (std::optional<Warning> warning = gamma_warning(rig, gammas))
     curves.warnings.push_back(std::move(*warning));
   else if (std::string note = gamma_note(rig, frame, gammas); !note.empty())
     curves.notes.push_back(std::move(note));

@@ -245,6 +245,19 @@ TEST_F(Laws, AVolumeThatCutsTheObjectIsNamed) {
   EXPECT_GT(cut(narrow, *frame_), 0.2);
 }
 
+/// JPEG and colours that are filled in show less gamma than there is, and never so little as none.
+TEST_F(Laws, LessThanTheStatedGammaIsNamedBelowHalfOfIt) {
+  const Rig rig = with_gamma(*rig_);
+  const auto is_named = [&](double gamma) {
+    const std::vector<std::optional<GammaTrace>> traces(rig.cameras.size(),
+                                                        GammaTrace{gamma, 0.02, 500});
+    return gamma_warning(rig, traces).has_value();
+  };
+  EXPECT_FALSE(is_named(0.55 * kGamma));
+  EXPECT_TRUE(is_named(1));
+  EXPECT_TRUE(is_named(1.4 * kGamma));
+}
+
 /// Where crossings are few in each camera, all cameras' tell the gamma.
 TEST_F(Laws, AGammaIsNamedByFewCrossingsOfManyCameras) {
   for (const bool is_coded : {true, false}) {
@@ -262,8 +275,7 @@ TEST_F(Laws, AGammaIsNamedByFewCrossingsOfManyCameras) {
       sum += said.size();
     }
     ASSERT_GE(sum, 30U);
-    const auto warning =
-        gamma_warning(*rig_, points.detections, gammas_of_light(*rig_, frame, graphs));
+    const auto warning = gamma_warning(*rig_, gammas_of_light(*rig_, frame, graphs));
     EXPECT_EQ(warning.has_value(), is_coded);
     if (warning) {
       EXPECT_NEAR(warning->figures.front().second, kGamma, 0.3);
@@ -283,8 +295,7 @@ TEST_F(Laws, NoGammaBelowOneIsNamed) {
   const auto trace = gamma_of_crossings(said);
   ASSERT_TRUE(trace);
   ASSERT_LT(trace->gamma, 0.75);
-  EXPECT_FALSE(
-      gamma_warning(*rig_, points.detections, gammas_of_light(*rig_, frame, points.graphs)));
+  EXPECT_FALSE(gamma_warning(*rig_, gammas_of_light(*rig_, frame, points.graphs)));
 }
 
 TEST_F(Laws, ABlackLevelAboveThePictureIsNamed) {

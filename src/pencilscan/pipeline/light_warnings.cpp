@@ -31,20 +31,20 @@ std::optional<Warning> interpolation_warning(const Rig& rig,
 
 namespace {
 
-// Crossings say .7 to 1.05 of the gamma that values have: halved and filled-in colours take light
-// from crossings more than from the lines beside them (docs/sensors.md, "Gamma").
-constexpr double kWorthSaying = 1.3;    // above the one that is stated
-constexpr double kOfFilledIn = 2;       // below it, in such colours
+// Crossings say .7 to 1.05 of the gamma that values have, of JPEG 75 .64: halved and filled-in
+// colours and coarse values take light from crossings more than from the lines beside them
+// (docs/sensors.md, "Gamma"). All that errs downwards.
+constexpr double kAbove = 1.3;          // the one that is stated, to be worth saying
+constexpr double kBelow = 2;            // likewise
 constexpr double kGammaDeviations = 4;  // of the median of all crossings
 
 /// Whether a gamma other than the stated one is beyond doubt.
-bool is_another_gamma(const GammaTrace& trace, double stated, bool has_filled_in) {
+bool is_another_gamma(const GammaTrace& trace, double stated) {
   // Cameras code light with a gamma of one or more. What looks less is paint that is brighter at
   // the crossings than beside them.
-  if (trace.gamma < 1 / kWorthSaying) return false;
+  if (trace.gamma < 1 / kAbove) return false;
   const double off = std::log(trace.gamma / stated);
-  const double worth_saying = off < 0 && has_filled_in ? kOfFilledIn : kWorthSaying;
-  return std::abs(off) > std::log(worth_saying) &&
+  return std::abs(off) > std::log(off < 0 ? kBelow : kAbove) &&
          std::abs(off) > kGammaDeviations * trace.deviation;
 }
 
@@ -53,7 +53,7 @@ bool is_told(const std::optional<GammaTrace>& trace) {
   if (!trace) return false;
   const double log_gamma = std::log(trace->gamma);
   const double unsure = kGammaDeviations * trace->deviation;
-  return log_gamma + unsure < std::log(kWorthSaying) || log_gamma - unsure > 0;
+  return log_gamma + unsure < std::log(kAbove) || log_gamma - unsure > 0;
 }
 
 }  // namespace
@@ -80,14 +80,13 @@ std::vector<std::optional<GammaTrace>> gammas_of_light(const Rig& rig, const Fra
   return gammas;
 }
 
-std::optional<Warning> gamma_warning(const Rig& rig, std::span<const CameraDetection> detections,
+std::optional<Warning> gamma_warning(const Rig& rig,
                                      std::span<const std::optional<GammaTrace>> gammas) {
   std::string names;
   double first = 0;
   for (std::size_t c = 0; c < gammas.size(); ++c) {
     const Camera& camera = rig.cameras[c];
-    const bool has_filled_in = detections[c].is_filled_in || camera.mosaic.has_value();
-    if (!gammas[c] || !is_another_gamma(*gammas[c], camera.gamma, has_filled_in)) continue;
+    if (!gammas[c] || !is_another_gamma(*gammas[c], camera.gamma)) continue;
     const double gamma = gammas[c]->gamma;
     if (names.empty()) first = gamma;
     add_name(names, camera.name + " (" + formatted(gamma, "%.1f") + ")", ", ");

@@ -22,8 +22,7 @@ namespace pencilscan {
     const Rig& rig, const Frame& frame, std::span<const GridGraph> graphs);
 /// Which cameras' values are not the light that the rig says, and with which gamma they would be.
 [[nodiscard]] std::optional<Warning> gamma_warning(
-    const Rig& rig, std::span<const CameraDetection> detections,
-    std::span<const std::optional<GammaTrace>> gammas);
+    const Rig& rig, std::span<const std::optional<GammaTrace>> gammas);
 /// Which cameras have pictures of 8 bits, no gamma in the rig, and may have one; empty: none.
 [[nodiscard]] std::string gamma_note(const Rig& rig, const Frame& frame,
                                      std::span<const std::optional<GammaTrace>> gammas);
