@@ -5,6 +5,7 @@
 
 #include "pencilscan/pipeline/disagreement_warnings.h"
 #include "pencilscan/pipeline/frame.h"
+#include "pencilscan/pipeline/frame_warnings.h"
 #include "pencilscan/pipeline/light_warnings.h"
 #include "pencilscan/pipeline/line_naming.h"
 #include "pencilscan/pipeline/lost_cameras.h"
@@ -69,6 +70,8 @@ std::optional<Rig> label_lines(const Rig& rig, const Frame& frame, const PointOp
   if (naming.color_warning) result.warnings.push_back(std::move(*naming.color_warning));
   if (naming.warning) {
     result.warnings.push_back(std::move(*naming.warning));
+  } else if (share_of_named_points(result.graphs, result.labeling) < kHardlyNamed) {
+    // What few names say of devices may be names' fault.
   } else if (std::optional<Warning> warning = device_warning(rig, result.device_crossings)) {
     result.warnings.push_back(std::move(*warning));
   } else if (const auto turned = turned_camera(rig, result.families, result.graphs, result.labeling,

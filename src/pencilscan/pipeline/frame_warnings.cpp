@@ -141,17 +141,21 @@ Warning floor_warning(const FoundFloor& found) {
        {"normal_z", normal.z()}}};
 }
 
-std::optional<Warning> few_names_warning(const PointResult& result) {
-  // Another ring's rig, or one with two of the six cameras' names: .3 to 5.5 % (13 frames). Right
-  // rigs: 70 % and more (492 frames of drawn and kept-apart rigs), and down to 3 % where one
-  // projector's lines are 34 px apart.
-  constexpr double kHardly = 0.1;
+double share_of_named_points(std::span<const GridGraph> graphs, const Labeling& labeling) {
   std::size_t points = 0;
-  for (const GridGraph& graph : result.graphs)
+  for (const GridGraph& graph : graphs)
     for (const Curve& curve : graph.curves) points += curve.points.size();
-  const auto named = static_cast<double>(labelled_points(result.labeling));
-  if (points == 0 || named >= kHardly * static_cast<double>(points)) return std::nullopt;
-  const double share = named / static_cast<double>(points);
+  return points == 0 ? 1
+                     : static_cast<double>(labelled_points(labeling)) / static_cast<double>(points);
+}
+
+bool deny_rig(const CrossingDisagreement& crossings, double share_of_named_points) {
+  return disagrees(crossings) && share_of_named_points >= kHardlyNamed;
+}
+
+std::optional<Warning> few_names_warning(const PointResult& result) {
+  const double share = share_of_named_points(result.graphs, result.labeling);
+  if (share >= kHardlyNamed) return std::nullopt;
   return Warning{WarningCode::kFewNames,
                  "only " + formatted(100 * share, "%.1f") +
                      " % of the lines in the pictures could be named: are these the pictures of "

@@ -109,7 +109,8 @@ LineNaming name_lines(const Rig& rig, const std::vector<ColorFamily>& families,
       judge(rig, graphs, result);
     }
   }
-  if (is_off || result.corrected)
+  if (deny_rig(result.crossings, share_of_named_points(graphs, result.labeling)) ||
+      result.corrected)
     result.warning = rig_warning(result.crossings, result.rig_in_frame);
   return result;
 }

@@ -484,6 +484,17 @@ TEST(FewNames, IsSaidBelowATenthOfTheLines) {
   EXPECT_FALSE(few_names_warning(result));
 }
 
+TEST(FewNames, SayNothingOfTheRig) {
+  CrossingDisagreement crossings;
+  crossings.crossings = 40;
+  crossings.median_px = 0.3;
+  crossings.expected_px = 0.05;
+  EXPECT_TRUE(deny_rig(crossings, 0.5));
+  EXPECT_FALSE(deny_rig(crossings, 0.06));
+  crossings.median_px = 0.06;
+  EXPECT_FALSE(deny_rig(crossings, 0.5));
+}
+
 TEST(PlainFaults, ColorsOfAPictureOfManyPixelsAreSeen) {
   // In every eighth row more pixels than a thousandth of what an int holds.
   const Rig rig = sample::small_rig(480, 360, 110);
