@@ -16,8 +16,10 @@ struct FollowOptions {
   double width_nodes = 1.2;
   double farthest = 2;  ///< footprints; nodes farther off along the normal are another surface
   double robust = 0.6;  ///< footprints off the others at which a prediction counts a quarter
-  double least_weight = 0.6;  ///< sum of the nodes' bells below which a vertex has no depth, > 0
-  int rounds = 2;             ///< normals settle as vertices move
+  /// Sum of the nodes' bells below which a vertex has no depth, > 0: a tenth of what all nodes
+  /// around sum to, 2 pi width_nodes^2.
+  double least_weight = 0.9;
+  int rounds = 2;  ///< normals settle as vertices move
 };
 
 /// Moves each vertex along its normal to where the nodes of all cameras around its pixels say the
