@@ -245,11 +245,14 @@ TEST_F(Newcomer, FiguresReplaceFiguresOnly) {
   expect_bad("rig check --rig rig.json --json rig.json", "--json = rig.json: must be a new file");
   EXPECT_EQ(slurp(folder_ / "rig.json"), rig);
   // Files of results that say no format, and those of others.
-  for (const std::string text : {R"({"cameras": [], "points": 3})", R"({"mine": 1})", "[1]", ""}) {
+  for (const std::string text : {R"({"cameras": [], "points": 3})", R"({"mine": 1})", "[1]"}) {
     write("report.json", text);
     expect_bad("rig check --rig rig.json --json report.json", "figures of an earlier run");
     EXPECT_EQ(slurp(folder_ / "report.json"), text);
   }
+  write("empty.json", "");
+  EXPECT_EQ(run("rig check --rig rig.json --json empty.json").code, 0);
+  EXPECT_THAT(slurp(folder_ / "empty.json"), HasSubstr("\"figures/1\""));
 }
 
 TEST_F(Newcomer, AScanLeavesNoMeshOfAnEarlierOne) {

@@ -26,6 +26,7 @@ bool may_hold_figures(const std::filesystem::path& path) {
   std::error_code ignored;
   if (!std::filesystem::exists(path, ignored)) return true;
   if (!std::filesystem::is_regular_file(path, ignored)) return false;
+  if (std::filesystem::file_size(path, ignored) == 0) return true;  // as mktemp makes it
   std::ifstream stream(path);
   const Json json = Json::parse(stream, nullptr, false);
   return json.is_object() && json.contains("format") && json["format"] == kFiguresFormat;

@@ -1,7 +1,6 @@
 #include "pencilscan/depth/shared_bends.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
@@ -40,19 +39,15 @@ class BendPrior {
     sum_ += weight * difference;
     squares_ += (weight * difference) * difference.transpose();
   }
-  /// The prior of a node whose own window knows its bends as `own` says (covariance). False where
-  /// too few said anything.
-  [[nodiscard]] bool solve(const BendsMatrix& own, Bends& mean, BendsMatrix& information) const {
+  /// False where too few said anything.
+  [[nodiscard]] bool solve(Bends& mean, BendsMatrix& information) const {
     if (count_ < kLeastSaid) return false;
     constexpr double kRounding = 1e-6;
     mean = sum_ / weight_;
-    const auto n = static_cast<double>(count_);
-    BendsMatrix covariance = n / (n - 1) * (squares_ / weight_ - mean * mean.transpose());
+    // About the node's own: where a bend is greatest or least, it is farther from its neighbours'
+    // than these are from one another.
+    BendsMatrix covariance = squares_ / weight_;
     covariance.diagonal() *= 1 + kRounding;
-    // Where a bend is greatest or least, it is farther from its neighbours' than these are from one
-    // another: as wide as that, then.
-    const double apart2 = mean.dot((covariance + own).llt().solve(mean));
-    covariance *= std::max(1.0, apart2 / static_cast<double>(mean.size()));
     const Eigen::LLT<BendsMatrix> cholesky(covariance);
     if (cholesky.info() != Eigen::Success) return false;
     information = cholesky.solve(BendsMatrix::Identity());
@@ -92,10 +87,9 @@ void share_bends(const FittedWindows& fitted, DepthMap& map) {
     const DepthNode& node = shared.emplace_back(map.nodes[fitted.nodes[k]]);
     prior.clear();
     ask_neighbors(map, fitted.nodes[k], fitted.half, prior);
-    const FittedWindows::Information covariance = fitted.information[k].inverse();
     Bends mean;
     BendsMatrix information;
-    if (!prior.solve(covariance.bottomRightCorner<5, 5>(), mean, information)) continue;
+    if (!prior.solve(mean, information)) continue;
     FittedWindows::Information all = fitted.information[k];
     all.bottomRightCorner<5, 5>() += information;
     const Eigen::LLT<FittedWindows::Information> cholesky(all);

@@ -28,10 +28,9 @@ struct FittedWindows {
 /// of its depth: fitted with the bend known, the middle has half the deviation (the quadric's six
 /// unknowns over a disc, by Zernike polynomials). Windows around see the same surface. The slopes
 /// and bends that they predict for a node are its prior (empirical Bayes): their mean, and their
-/// covariance, which holds their noise and how much the surface changes. Neighbours that differ, as
-/// at a crease or a step, say little, and so do those whose mean is farther from the node's own
-/// bend than noise and that covariance let expect. Each node of `fitted` gets the mean of its
-/// window and that prior, and its sigma.
+/// mean square distance from the node's own, which holds the noise of both and how much the surface
+/// changes. Neighbours that differ, as at a crease, a step or in relief, say little. Each node of
+/// `fitted` gets the mean of its window and that prior, and its sigma.
 ///
 /// Neighbours are up to two nodes away and uncut: a window of which a side is left out tells its
 /// bend least. A node with fewer than seven of them keeps its own.
