@@ -94,12 +94,12 @@ TEST(ShareBends, WindowsOfOneBendKnowTheirDepthBetterAndSaySo) {
   EXPECT_NEAR(said / before, 1, 0.1);
   share_bends(windows.fitted, windows.map);
   const double after = windows.error(said);
-  // A known bend halves the deviation. Neighbours give half of that: how much they differ is noise
-  // alone here, theirs and the node's own, which the prior takes for differences of the surface.
-  EXPECT_LT(after, 0.85 * before);
+  // A known bend halves the deviation. What noise alone sets apart, theirs and the node's own, the
+  // prior takes for differences of the surface, so independent neighbours give a quarter of that.
+  EXPECT_LT(after, 0.9 * before);
   EXPECT_GT(after, 0.5 * before);
-  EXPECT_GT(said / after, 0.95);
-  EXPECT_LT(said / after, 1.25);
+  EXPECT_GT(said / after, 0.85);
+  EXPECT_LT(said / after, 1.1);
 }
 
 TEST(ShareBends, WhereBendsDifferEachWindowKeepsItsOwn) {
