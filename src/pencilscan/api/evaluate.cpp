@@ -37,7 +37,7 @@ std::string judge(const TriangleMesh& truth, const Rig& rig,
     if (const auto warning = unit_warning(rig, evaluation.align))
       figures["warnings"].push_back("rig: " + *warning);
     if (input.points) {
-      if (const auto warning = rig_warning(rig, *input.points))
+      if (const auto warning = other_rig_warning(rig, *input.points))
         figures["warnings"].push_back("rig: " + *warning);
     }
     text = json_text(figures);

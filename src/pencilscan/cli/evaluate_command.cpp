@@ -109,7 +109,7 @@ void run_evaluate(const EvaluateOptions& options) {
       figures["warnings"].push_back(options.rig_path + ": " + *warning);
     };
     warn_of_the_rig(unit_warning(rig, evaluation_options.align));
-    if (result.input.points) warn_of_the_rig(rig_warning(rig, *result.input.points));
+    if (result.input.points) warn_of_the_rig(other_rig_warning(rig, *result.input.points));
     for (const std::string& warning : evaluation.warnings)
       warn_of(options.truth_path + ": " + warning);
     if (evaluation.point_distance && !evaluation.labels) {

@@ -135,7 +135,8 @@ Json camera_figures(const RecordedCamera& camera, const CameraClock& clock, std:
   return figures;
 }
 
-void say_what_is_wrong(const Recording& recording, const FrameSets& sets) {
+void say_what_is_wrong(const Recording& recording, const FrameSets& sets,
+                       const LostPictures& lost) {
   if (!recording.is_closed())
     warn_of("the recording was cut off or goes on: it ends with the last picture that is whole");
   if (!sets.by_row)
@@ -153,7 +154,7 @@ void say_what_is_wrong(const Recording& recording, const FrameSets& sets) {
       warn_of(who + ": its clock counts from another moment; it was shifted onto the others'");
   }
   for (const std::string& warning : left_out_warnings(recording, sets)) warn_of(warning);
-  for (const std::string& warning : lost_warnings(recording, sets)) warn_of(warning);
+  for (const std::string& warning : lost_warnings(recording, lost)) warn_of(warning);
   for (const auto& [before, count] : sets.gaps)
     warn_of("before frame " + six_digits(before) + " " + std::to_string(count) +
             " moments are missing in all cameras");
@@ -174,12 +175,12 @@ void run_info(const InfoCommand& command) {
                             {"p90", lower_quantile(spreads, 0.9)},
                             {"max", *std::max_element(spreads.begin(), spreads.end())}};
   }
-  const auto lost = lost_pictures(recording, sets);
+  const LostPictures lost = lost_pictures(recording, sets);
   for (std::size_t c = 0; c < sets.clocks.size(); ++c)
     figures["cameras"][recording.cameras()[c].name] =
         camera_figures(recording.cameras()[c], sets.clocks[c], lost[c].size());
   print_figures({}, figures);
-  say_what_is_wrong(recording, sets);
+  say_what_is_wrong(recording, sets, lost);
   if (command.common.json_path.empty()) return;
   for (std::size_t c = 0; c < sets.clocks.size(); ++c) {
     Json& camera = figures["cameras"][recording.cameras()[c].name];

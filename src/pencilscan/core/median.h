@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <span>
 #include <vector>
 
 namespace pencilscan {
@@ -9,13 +10,19 @@ namespace pencilscan {
 /// Standard deviation of a Gaussian per median of its absolute value: 1 / quantile(0.75).
 inline constexpr double kDeviationPerMedian = 1.4826;
 
-/// The upper median: element size / 2 in order of size. 0 for no values.
+/// upper_median() of values that may be put into another order.
 template <typename Number>
-[[nodiscard]] Number upper_median(std::vector<Number> values) {
+[[nodiscard]] Number upper_median_in_place(std::span<Number> values) {
   if (values.empty()) return Number{0};
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
   return *middle;
+}
+
+/// The upper median: element size / 2 in order of size. 0 for no values.
+template <typename Number>
+[[nodiscard]] Number upper_median(std::vector<Number> values) {
+  return upper_median_in_place(std::span(values));
 }
 
 /// The value that a share of the others is not above: of n in order of size, element

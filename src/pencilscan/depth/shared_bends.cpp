@@ -26,12 +26,6 @@ double variance_of(const DepthNode& node) {
 /// What windows around say of one node's slopes and bends.
 class BendPrior {
  public:
-  void clear() {
-    count_ = 0;
-    weight_ = 0;
-    sum_.setZero();
-    squares_.setZero();
-  }
   /// Of like size for all: differences to the node's own.
   void add(const Bends& difference, double weight) {
     ++count_;
@@ -57,13 +51,13 @@ class BendPrior {
  private:
   std::size_t count_ = 0;
   double weight_ = 0;
-  Bends sum_;
-  BendsMatrix squares_;
+  Bends sum_ = Bends::Zero();
+  BendsMatrix squares_ = BendsMatrix::Zero();
 };
 
-/// Adds what the nodes around say of this one.
-void ask_neighbors(const DepthMap& map, std::size_t node, int half, BendPrior& prior) {
-  const Quadric own = quadric_at(map.nodes[node], Vec2::Zero(), half);
+/// What the nodes around say of this one, whose quadric is `own`.
+BendPrior prior_of(const DepthMap& map, std::size_t node, const Quadric& own, int half) {
+  BendPrior prior;
   const int row = static_cast<int>(node) / map.columns;
   const int column = static_cast<int>(node) % map.columns;
   for (int r = std::max(0, row - kReach); r <= std::min(map.rows - 1, row + kReach); ++r) {
@@ -75,6 +69,7 @@ void ask_neighbors(const DepthMap& map, std::size_t node, int half, BendPrior& p
       prior.add((quadric_at(other, way, half) - own).tail<5>(), 1 / variance_of(other));
     }
   }
+  return prior;
 }
 
 }  // namespace
@@ -82,20 +77,18 @@ void ask_neighbors(const DepthMap& map, std::size_t node, int half, BendPrior& p
 void share_bends(const FittedWindows& fitted, DepthMap& map) {
   std::vector<DepthNode> shared;
   shared.reserve(fitted.nodes.size());
-  BendPrior prior;
   for (std::size_t k = 0; k < fitted.nodes.size(); ++k) {
     const DepthNode& node = shared.emplace_back(map.nodes[fitted.nodes[k]]);
-    prior.clear();
-    ask_neighbors(map, fitted.nodes[k], fitted.half, prior);
+    const Quadric own = quadric_at(node, Vec2::Zero(), fitted.half);
     Bends mean;
     BendsMatrix information;
-    if (!prior.solve(mean, information)) continue;
-    FittedWindows::Information all = fitted.information[k];
+    if (!prior_of(map, fitted.nodes[k], own, fitted.half).solve(mean, information)) continue;
+    Mat6 all = fitted.information[k];
     all.bottomRightCorner<5, 5>() += information;
-    const Eigen::LLT<FittedWindows::Information> cholesky(all);
+    const Eigen::LLT<Mat6> cholesky(all);
     Quadric right = Quadric::Zero();
     right.tail<5>() = information * mean;
-    const Quadric q = quadric_at(node, Vec2::Zero(), fitted.half) + cholesky.solve(right);
+    const Quadric q = own + cholesky.solve(right);
     const double variance = cholesky.solve(Quadric::Unit(0))[0];
     if (cholesky.info() != Eigen::Success || !q.allFinite() || !(q[0] > 0) || !(variance > 0))
       continue;

@@ -1,24 +1,21 @@
 #pragma once
 
-#include <Eigen/Core>
 #include <cstddef>
 #include <vector>
 
 #include "pencilscan/depth/depth_map.h"
+#include "pencilscan/geometry/types.h"
 
 namespace pencilscan {
 
 /// Windows that were fitted together: the nodes that they gave, and how well each fit alone knows
 /// its quadric.
 struct FittedWindows {
-  using Information = Eigen::Matrix<double, 6, 6>;
-
   int half = 0;  ///< radius, px
   std::vector<std::size_t> nodes;
-  /// Inverse covariance of a node's Quadric (window_fit.h).
-  std::vector<Information> information;
+  std::vector<Mat6> information;  ///< inverse covariance of a node's Quadric (window_fit.h)
 
-  void add(std::size_t node, const Information& known) {
+  void add(std::size_t node, const Mat6& known) {
     nodes.push_back(node);
     information.push_back(known);
   }

@@ -19,8 +19,8 @@ constexpr double kNoise = 1e-5;  // of a pixel's inverse depth, which is about k
 constexpr double kW = 1e-3;
 
 /// Of a quadric that is fitted to all pixels of a disc.
-FittedWindows::Information information_of_disc() {
-  FittedWindows::Information sum = FittedWindows::Information::Zero();
+Mat6 information_of_disc() {
+  Mat6 sum = Mat6::Zero();
   for (int v = -kHalf; v <= kHalf; ++v) {
     for (int u = -kHalf; u <= kHalf; ++u) {
       if (u * u + v * v > kHalf * kHalf) continue;
@@ -37,9 +37,9 @@ FittedWindows::Information information_of_disc() {
 struct Windows {
   explicit Windows(const std::function<Quadric(double u, double v)>& truth, int seed = 1)
       : quadric(truth) {
-    const FittedWindows::Information information = information_of_disc();
-    const FittedWindows::Information covariance = information.inverse();
-    const FittedWindows::Information root = covariance.llt().matrixL();
+    const Mat6 information = information_of_disc();
+    const Mat6 covariance = information.inverse();
+    const Mat6 root = covariance.llt().matrixL();
     Random random(static_cast<std::uint64_t>(seed));
     map.stride = kStride;
     map.columns = map.rows = kSide;
@@ -104,7 +104,7 @@ TEST(ShareBends, WindowsOfOneBendKnowTheirDepthBetterAndSaySo) {
 
 TEST(ShareBends, WhereBendsDifferEachWindowKeepsItsOwn) {
   Random random(7);
-  const FittedWindows::Information covariance = information_of_disc().inverse();
+  const Mat6 covariance = information_of_disc().inverse();
   std::vector<Quadric> quadrics(static_cast<std::size_t>(kSide) * kSide, Quadric::Zero());
   for (Quadric& q : quadrics) {
     q[0] = kW;

@@ -47,11 +47,7 @@ bool WindowEquations::eliminate(double ridge) {
       for (int r = 0; r < kSurface; ++r) surface[r] -= of_j[r] * scaled;
     }
   }
-  Eigen::Matrix<double, 6, 6> C;
-  for (int r = 0; r < kSurface; ++r) {
-    for (int c = 0; c < kSurface; ++c) C(r, c) = surface[r][c];
-  }
-  const Eigen::LLT<Eigen::Matrix<double, 6, 6>> cholesky(C);
+  const Eigen::LLT<Mat6> cholesky(surface_information());
   factor_ = cholesky.matrixL();
   return cholesky.info() == Eigen::Success;
 }
@@ -78,6 +74,14 @@ void WindowEquations::solve_light(std::size_t f, const Surface& s,
     for (int i = k + 1; i < n; ++i) value -= family.a(i, k) * light[static_cast<std::size_t>(i)];
     light[at] = value;
   }
+}
+
+Mat6 WindowEquations::surface_information() const {
+  Mat6 C;
+  for (int r = 0; r < kSurface; ++r) {
+    for (int c = 0; c < kSurface; ++c) C(r, c) = surface[r][c];
+  }
+  return C;
 }
 
 double WindowEquations::surface_variance() const {

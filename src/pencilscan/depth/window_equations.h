@@ -3,6 +3,8 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "pencilscan/geometry/types.h"
+
 namespace pencilscan {
 
 /// Normal equations of a window's fit. The six unknowns s of the surface are shared; those of each
@@ -44,14 +46,16 @@ class WindowEquations {
   [[nodiscard]] Surface solve_surface() const;
   /// The light of a family beside this surface.
   void solve_light(std::size_t f, const Surface& s, std::vector<double>& light) const;
-  /// The first diagonal element of the inverse.
+  /// The matrix of the six: the inverse of their covariance.
+  [[nodiscard]] Mat6 surface_information() const;
+  /// The first diagonal element of its inverse.
   [[nodiscard]] double surface_variance() const;
   /// That of one unknown of a family.
   [[nodiscard]] double light_variance(std::size_t f, int unknown) const;
 
  private:
   std::vector<Family> families_;
-  Eigen::Matrix<double, 6, 6> factor_;  ///< L of the Cholesky decomposition of the six
+  Mat6 factor_;  ///< L of the Cholesky decomposition of the six
 };
 
 }  // namespace pencilscan

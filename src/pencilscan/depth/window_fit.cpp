@@ -356,9 +356,7 @@ std::optional<WindowFit> WindowFitter::finish(const Quadric& q, bool cut) {
   const double inflate = std::max(1.0, chi2_ / degrees_);
   const double unit2 = inflate * q[0] * q[0];
   fit.variance = equations_.surface_variance() * unit2;
-  for (int r = 0; r < 6; ++r) {
-    for (int c = 0; c < 6; ++c) fit.information(r, c) = equations_.surface[r][c] / unit2;
-  }
+  fit.information = equations_.surface_information() / unit2;
   for (const Lit& lit : lit_) {
     if (lit.on) fit.amplitude = std::max(fit.amplitude, lit.amplitude);
   }

@@ -52,14 +52,14 @@ void set_quadric(const Quadric& q, int half, DepthNode& node);
 
 struct WindowFit {
   Quadric q = Quadric::Zero();
-  double variance = 0;                      ///< of q[0], 1/mm^2, misfit included
-  Eigen::Matrix<double, 6, 6> information;  ///< of q: inverse covariance, misfit included
-  float misfit = 0;                         ///< chi^2 per degree of freedom against the noise model
-  float relative_residual = 0;              ///< root mean square over the largest amplitude
-  LitPatterns lit;                          ///< patterns found
-  bool cut = false;                         ///< a side of the window does not belong to the surface
-  float amplitude = 0;                      ///< largest, image value
-  float lines_per_w = 0;                    ///< largest |dl / dw| of a lit pattern
+  double variance = 0;          ///< of q[0], 1/mm^2, misfit included
+  Mat6 information;             ///< of q: inverse covariance, misfit included
+  float misfit = 0;             ///< chi^2 per degree of freedom against the noise model
+  float relative_residual = 0;  ///< root mean square over the largest amplitude
+  LitPatterns lit;              ///< patterns found
+  bool cut = false;             ///< a side of the window does not belong to the surface
+  float amplitude = 0;          ///< largest, image value
+  float lines_per_w = 0;        ///< largest |dl / dw| of a lit pattern
 };
 
 /// Fits inverse depth to the image of a circular window by Gauss-Newton. The image of family f is

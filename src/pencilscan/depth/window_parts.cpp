@@ -16,12 +16,6 @@ constexpr int kStripsPerPx = 2;
 using PixelLight __attribute__((vector_size(16))) = float;
 enum : int { kShown, kExpected, kSeen, kPredicted };
 
-WindowParts::Edge edge_of(std::size_t direction, std::size_t directions, float offset) {
-  const double angle =
-      2 * std::numbers::pi * static_cast<double>(direction) / static_cast<double>(directions);
-  return {static_cast<float>(std::cos(angle)), static_cast<float>(std::sin(angle)), offset};
-}
-
 // Deviations of the noise that a part lacks of its light: one in 160 is as dark by noise alone.
 constexpr float kPartBelow = 2.5F;
 // Of the 200 edges of a window of 5 px (most of them share pixels) noise makes one in 150 windows.
@@ -54,13 +48,18 @@ WindowParts::WindowParts(const WindowGrid& grid) : grid_(&grid), masks_(kParts *
   reset();
 }
 
+WindowParts::Edge WindowParts::edge_of(std::size_t direction, float offset) {
+  const double angle = 2 * std::numbers::pi * static_cast<double>(direction) / kDirections;
+  return {static_cast<float>(std::cos(angle)), static_cast<float>(std::sin(angle)), offset};
+}
+
 void WindowParts::list_strips() {
   const float* x = grid_->monomial(1);
   const float* y = grid_->monomial(2);
   // How many strips out each pixel lies, from 1; 0: inwards of the middle.
   std::vector<int> strip_of(static_cast<std::size_t>(grid_->count));
   for (std::size_t direction = 0; direction < kDirections; ++direction) {
-    const Edge edge = edge_of(direction, kDirections, 0);
+    const Edge edge = edge_of(direction, 0);
     for (std::size_t i = 0; i < strip_of.size(); ++i) {
       const float out = static_cast<float>(grid_->half) * (x[i] * edge.cosine + y[i] * edge.sine);
       strip_of[i] = std::max(0, static_cast<int>(std::floor(kStripsPerPx * out + 1)));
@@ -118,7 +117,7 @@ std::optional<WindowParts::Edge> WindowParts::edge(float misfit) const {
           !is_dark(certainty * beyond[kSeen], certainty * beyond[kPredicted], kEdgeBelow))
         continue;
       least = lit;
-      best = edge_of(direction, kDirections, strip.offset);
+      best = edge_of(direction, strip.offset);
     }
   }
   return best;

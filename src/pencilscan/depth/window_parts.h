@@ -46,6 +46,7 @@ class WindowParts {
   static constexpr std::size_t kParts = kSides + 1;
   static constexpr std::size_t kDirections = 16;  ///< of edges
 
+  static Edge edge_of(std::size_t direction, float offset);
   void list_strips();
 
   const WindowGrid* grid_;

@@ -525,19 +525,19 @@ TEST(Evaluate, WarnsOfATruthThatIsNoneUnlessItIsMovedThere) {
   EXPECT_TRUE(evaluate(truth, rig, input, options).warnings.empty());
 }
 
-TEST(RigWarning, NamesARigThatDidNotMakeThePoints) {
+TEST(OtherRigWarning, NamesARigThatDidNotMakeThePoints) {
   const Rig rig = oracle::ring(3);
   const std::vector<MeasuredPoint> points = oracle::sphere_points(rig);
-  EXPECT_FALSE(rig_warning(rig, points));
-  EXPECT_FALSE(rig_warning(rig, {}));
+  EXPECT_FALSE(other_rig_warning(rig, points));
+  EXPECT_FALSE(other_rig_warning(rig, {}));
   Rig other = rig;
   std::swap(other.cameras[0], other.cameras[1]);
-  EXPECT_TRUE(rig_warning(other, points));
+  EXPECT_TRUE(other_rig_warning(other, points));
   // Devices that moved a little since are those of the result.
   const auto turned_by = [&](double px) {
     Rig turned = rig;
     for (Camera& camera : turned.cameras) camera.K(0, 2) += px;
-    return rig_warning(turned, points);
+    return other_rig_warning(turned, points);
   };
   EXPECT_FALSE(turned_by(0.9));
   ASSERT_TRUE(turned_by(3));

@@ -82,7 +82,8 @@ std::optional<std::string> unit_warning(const Rig& rig, AlignmentKind align) {
          "--align similarity measures in the truth's";
 }
 
-std::optional<std::string> rig_warning(const Rig& rig, std::span<const MeasuredPoint> points) {
+std::optional<std::string> other_rig_warning(const Rig& rig,
+                                             std::span<const MeasuredPoint> points) {
   constexpr double kBesidePx = 1;
   std::vector<double> beside;
   for (const MeasuredPoint& point : evenly_picked(points, kLooked)) {

@@ -29,7 +29,7 @@ namespace pencilscan {
 /// Why a rig can hardly be the one that a result was made with: a point lies on its camera's ray
 /// through its pixel, and half of them lie more than a pixel beside it, in which a label counts as
 /// right. Nothing where it may be, or where there are no points; their cameras are the rig's.
-[[nodiscard]] std::optional<std::string> rig_warning(const Rig& rig,
-                                                     std::span<const MeasuredPoint> points);
+[[nodiscard]] std::optional<std::string> other_rig_warning(const Rig& rig,
+                                                           std::span<const MeasuredPoint> points);
 
 }  // namespace pencilscan

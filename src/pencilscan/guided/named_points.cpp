@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <span>
 #include <vector>
+
+#include "pencilscan/core/median.h"
 
 namespace pencilscan {
 
@@ -51,9 +54,7 @@ std::optional<float> NamedPoints::amplitude_around(const Eigen::Vector2f& place,
     });
   }
   if (static_cast<int>(amplitudes.size()) < options_.min_support) return std::nullopt;
-  const auto middle = amplitudes.begin() + static_cast<std::ptrdiff_t>(amplitudes.size() / 2);
-  std::nth_element(amplitudes.begin(), middle, amplitudes.end());
-  return *middle;
+  return upper_median_in_place(std::span(amplitudes));
 }
 
 }  // namespace pencilscan

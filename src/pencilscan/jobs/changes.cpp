@@ -12,9 +12,6 @@
 namespace pencilscan {
 namespace {
 
-// Short, so that slow motion of the object is followed: waves of 15 deviations with a period of 125
-// values gave no change in 100 sequences of 300 values; with 25 values 12.
-constexpr std::size_t kReference = 15;
 constexpr std::size_t kFewest = 8;  // values that a median and its spread can be trusted of
 // Noise may bring one value of a small change back a little; with two, slow motion as above gave
 // two changes in 200 sequences.

@@ -25,6 +25,7 @@ struct Series {
   bool is_ratio = false;   ///< its logarithm is watched: what counts is the factor
   double smallest = 0;     ///< change that counts, of the logarithm where is_ratio
   Reading value;
+  bool follows = true;  ///< ChangeOptions; false: motion hardly changes it, a device's drift does
   Reading beside = {};  ///< a change counts where this one's logarithm changes as much, too
   Reading beyond = {};  ///< a rise counts where this is above `smallest` after it, a fall before
 };
@@ -62,6 +63,7 @@ std::vector<Series> all_series(const SequenceDevices& devices) {
     // A share also falls where more is seen that is no line.
     all.back().beside = [c](const FrameRow& row) { return row.cameras[c].labelled_points; };
     of_camera("width", true, kWidth, &CameraRow::line_width_px);
+    all.back().follows = false;  // a lens creeps out of focus
     of_camera("level", true, kLevel, &CameraRow::image_level);
     of_camera(kShift, false, kShiftPx, &CameraRow::shift_x_px);
     of_camera(kShift, false, kShiftPx, &CameraRow::shift_y_px);
@@ -205,7 +207,6 @@ double size_of(const Found& found) { return std::abs(found.change.after - found.
 /// Where noise hides how much they miss, the change is noticed some frames late: medians of many
 /// frames on both sides, so that these are outvoted.
 bool is_steady(std::span<const FrameRow> rows, const Found& found) {
-  constexpr std::size_t kFramesBeside = 15;  // as the running median of find_changes()
   const std::size_t camera = found.series->device;
   if (camera >= rows[0].cameras.size()) return false;
   const auto at = rows.begin() + static_cast<std::ptrdiff_t>(found.change.at);
@@ -214,9 +215,9 @@ bool is_steady(std::span<const FrameRow> rows, const Found& found) {
   const auto change = [&](double CameraRow::*shift) {
     const Reading reading = [&](const FrameRow& row) { return row.cameras[camera].*shift; };
     double before =
-        median_of_done(std::make_reverse_iterator(at), rows.rend(), kFramesBeside, reading);
-    if (!std::isfinite(before)) before = median_of_done(end, rows.end(), kFramesBeside, reading);
-    return median_of_done(at, end, kFramesBeside, reading) - before;
+        median_of_done(std::make_reverse_iterator(at), rows.rend(), kReference, reading);
+    if (!std::isfinite(before)) before = median_of_done(end, rows.end(), kReference, reading);
+    return median_of_done(at, end, kReference, reading) - before;
   };
   return std::hypot(change(&CameraRow::shift_x_px), change(&CameraRow::shift_y_px)) < kShiftPx;
 }
@@ -330,8 +331,7 @@ std::vector<Found> find_all(std::span<const FrameRow> rows, const SequenceDevice
       values.push_back(series.is_ratio ? finite_log(value) : value);
     }
     ChangeOptions options{series.smallest, all.size() * rows.size()};
-    // The object's motion hardly changes it, and a lens creeps out of focus.
-    options.follows = series.kind != "width";
+    options.follows = series.follows;
     const ChangeReport changes = find_changes(values, options);
     for (const Change& change : changes.changes) {
       if (!is_confirmed(rows, series, change.at, kFramesOfChange)) continue;

@@ -71,7 +71,7 @@ TEST(StatedFloor, LeavesTheObjectAloneWithoutFlapsBesideIt) {
   // Without a word of the floor it is found, its lines have their names, and it is measured like
   // the ball.
   EXPECT_GT(points[0].on_floor, points[0].on_ball / 50);
-  EXPECT_GT(surface[0].on_floor, surface[0].on_ball / 20);
+  EXPECT_GT(surface[0].on_floor, surface[0].on_ball / 500);
   EXPECT_EQ(points[1].on_floor, 0U);
   EXPECT_EQ(surface[1].on_floor, 0U);
   EXPECT_LT(points[1].in_air, points[0].in_air);

@@ -182,9 +182,8 @@ PackReport pack_recording(const fs::path& frames, const fs::path& out, const Pac
   return report;
 }
 
-std::vector<std::vector<std::size_t>> lost_pictures(const Recording& recording,
-                                                    const FrameSets& sets) {
-  std::vector<std::vector<std::size_t>> lost(recording.cameras().size());
+LostPictures lost_pictures(const Recording& recording, const FrameSets& sets) {
+  LostPictures lost(recording.cameras().size());
   for (const FrameSet& set : sets.sets) {
     for (std::size_t c = 0; c < lost.size(); ++c) {
       const auto row = set.rows[c];
@@ -195,9 +194,8 @@ std::vector<std::vector<std::size_t>> lost_pictures(const Recording& recording,
   return lost;
 }
 
-std::vector<std::string> lost_warnings(const Recording& recording, const FrameSets& sets) {
+std::vector<std::string> lost_warnings(const Recording& recording, const LostPictures& lost) {
   std::vector<std::string> warnings;
-  const auto lost = lost_pictures(recording, sets);
   for (std::size_t c = 0; c < lost.size(); ++c) {
     std::vector<std::string> names;
     for (const std::size_t number : lost[c]) names.push_back(six_digits(number));
@@ -237,7 +235,7 @@ PackReport unpack_recording(const Recording& recording, const FrameSets& sets, c
   report.pictures = pictures;
   report.missing = report.frames * cameras - report.pictures;
   report.warnings = left_out_warnings(recording, sets);
-  for (std::string& warning : lost_warnings(recording, sets))
+  for (std::string& warning : lost_warnings(recording, lost_pictures(recording, sets)))
     report.warnings.push_back(std::move(warning));
   if (!has_times(recording, sets)) return report;
   std::string table = "frame";

@@ -48,10 +48,10 @@ PackReport unpack_recording(const Recording& recording, const FrameSets& sets,
 
 /// Per camera the numbers of the sets whose picture of it was lost: it was recorded, and its file
 /// is no longer there.
-[[nodiscard]] std::vector<std::vector<std::size_t>> lost_pictures(const Recording& recording,
-                                                                  const FrameSets& sets);
+using LostPictures = std::vector<std::vector<std::size_t>>;
+[[nodiscard]] LostPictures lost_pictures(const Recording& recording, const FrameSets& sets);
 /// A sentence for each camera of them.
 [[nodiscard]] std::vector<std::string> lost_warnings(const Recording& recording,
-                                                     const FrameSets& sets);
+                                                     const LostPictures& lost);
 
 }  // namespace pencilscan

@@ -112,10 +112,8 @@ class Light {
   std::vector<std::vector<PatternView>> patterns_;  ///< per view
 };
 
-/// `meanwhile`: what another thread may do.
-template <class Meanwhile>
 Samples collect(const Rig& rig, const RayScene& surface, std::span<const ColorView> views,
-                const ColorOptions& options, bool has_plain, const Meanwhile& meanwhile) {
+                const ColorOptions& options, bool has_plain) {
   const TriangleMesh& mesh = surface.mesh();
   const Light light(rig, surface, views, options);
   const std::vector<Vec3> normals = vertex_normals(mesh);
@@ -148,9 +146,7 @@ Samples collect(const Rig& rig, const RayScene& surface, std::span<const ColorVi
   };
   const std::size_t count = mesh.vertices.size();
   Samples samples((count + kVerticesPerRun - 1) / kVerticesPerRun);
-  parallel_for(samples.size() + 1, [&](std::size_t k) {
-    if (k == 0) return meanwhile();
-    const std::size_t r = k - 1;
+  parallel_for(samples.size(), [&](std::size_t r) {
     for (std::size_t v = r * kVerticesPerRun; v < std::min(count, (r + 1) * kVerticesPerRun); ++v)
       look(v, samples[r]);
   });
@@ -383,8 +379,13 @@ std::vector<std::array<float, 3>> vertex_colors(const Rig& rig, const RayScene& 
   const bool has_plain =
       std::any_of(views.begin(), views.end(), [](const ColorView& view) { return view.is_plain; });
   std::optional<Graph> graph;
-  const Samples samples =
-      collect(rig, surface, views, options, has_plain, [&] { graph.emplace(mesh); });
+  Samples samples;
+  parallel_for(2, [&](std::size_t part) {
+    if (part == 0)
+      graph.emplace(mesh);
+    else
+      samples = collect(rig, surface, views, options, has_plain);
+  });
   std::vector<Channels> ambient(views.size(), Channels::Zero());
   std::vector<Evidence> sums = evidence(samples, mesh.vertices.size(), ambient);
   const auto smoothing = static_cast<float>(options.smoothing);
