@@ -177,12 +177,13 @@ double cost(const WindowFit& fit) { return static_cast<double>(fit.misfit); }
 
 /// A mosaic leaves a quarter of the samples, also where the camera fills its colours in, so noise
 /// at a window's centre doubles. It falls as 1 / r with the radius r, what a quadric leaves of the
-/// surface grows as r^4: the best r goes as the fifth root of the noise.
+/// surface grows as r^4: the best r goes as the fifth root of the noise. That is so on the whole:
+/// at a rim or a crease windows may fit that are not widened.
 DepthOptions options_for(const CameraLight& light, DepthOptions options) {
   constexpr double kWider = 1.1487;  // 2^(1/5)
   constexpr int kWidestHalf = 10;    // of what a window may be (dense_depth.h)
   constexpr int kLargestStride = 8;
-  const int narrow = 2 * options.half + 1;
+  const int plain = options.half;
   if (light.of_mosaic)
     options.half = static_cast<int>(std::lround((options.half + 0.5) * kWider - 0.5));
   // A window holds a line with half as much of the dark on both its sides. One that holds an edge
@@ -191,9 +192,10 @@ DepthOptions options_for(const CameraLight& light, DepthOptions options) {
   if (of_line > options.half) {
     options.half = of_line;
     // As dense in windows as before; wider windows beside these need an even number.
-    const int even = options.stride * (2 * of_line + 1) / narrow / 2 * 2;
+    const int even = options.stride * (2 * of_line + 1) / (2 * plain + 1) / 2 * 2;
     options.stride = std::clamp(even, options.stride, kLargestStride);
   }
+  options.narrow_half = std::clamp(of_line, plain, options.half);
   return options;
 }
 
@@ -237,6 +239,65 @@ std::vector<PilotWindow> pilot_windows(const CameraLight& light, const RayScene&
 }
 
 namespace {
+
+/// Windows of full radius, then those that are narrower.
+std::vector<DepthOptions> by_radius(const DepthOptions& options) {
+  std::vector<DepthOptions> passes{options};
+  if (options.narrow_half < options.half) {
+    passes.push_back(options);
+    passes.back().half = options.narrow_half;
+  }
+  return passes;
+}
+
+/// Nodes near labelled curves.
+void seed(const CameraLight& light, const CurveSeeds& seeds, const Background& background,
+          const DepthOptions& options, DepthMap& map, FittedWindows& fitted) {
+  WindowFitter fitter(light, options.half);
+  const BackgroundView behind(light, background, options);
+  const ObjectSpace& space = background.space;
+  for (std::size_t i = 0; i < map.nodes.size(); ++i) {
+    if (map.nodes[i].measured()) continue;
+    const Vec2 pixel = map.pixel(i);
+    std::optional<WindowFit> best;
+    for (const Quadric& start : seeds.planes(pixel, options.seed_radius_px, options.half)) {
+      const auto fit = fitter.fit(pixel, start, 5);
+      if (fit && acceptable(light, pixel, *fit, space, options.half, options) &&
+          (!best || cost(*fit) < cost(*best))) {
+        best = fit;
+      }
+    }
+    if (!best || behind.shows(pixel, *best, fitter)) continue;
+    map.nodes[i] = node_of(*best, options.half, map.lit_sets);
+    map.nodes[i].seeded = true;
+    fitted.add(i, best->information);
+  }
+}
+
+/// Nodes whose rays meet the closed surface.
+void seed(const CameraLight& light, const RayScene& surface, const Background& background,
+          const DepthOptions& options, DepthMap& map, FittedWindows& fitted) {
+  constexpr float kConfidence = 0.9F;  // of rendered objects' nodes, 96 % or more are right
+  const Camera& camera = *light.camera;
+  WindowFitter fitter(light, options.half);
+  const BackgroundView behind(light, background, options);
+  const ObjectSpace& space = background.space;
+  for (std::size_t i = 0; i < map.nodes.size(); ++i) {
+    if (map.nodes[i].measured()) continue;
+    const Vec2 pixel = map.pixel(i);
+    const auto hit = surface.first_hit(camera.ray(pixel));
+    if (!hit) continue;
+    const Vec3 normal = face_normal(surface.mesh(), hit->face);
+    const Quadric start = quadric_of(TangentView(camera, hit->point, normal), options.half);
+    const auto fit = fitter.fit(pixel, start, 5);
+    if (!fit || !acceptable(light, pixel, *fit, space, options.half, options)) continue;
+    const double move = (camera.point_at_depth(pixel, 1 / fit->q[0]) - hit->point).norm();
+    if (move > options.max_move || behind.shows(pixel, *fit, fitter)) continue;
+    map.nodes[i] = node_of(*fit, options.half, map.lit_sets);
+    map.nodes[i].confidence = kConfidence;
+    fitted.add(i, fit->information);
+  }
+}
 
 void grow(const CameraLight& light, const Background& background, const DepthOptions& options,
           DepthMap& map, FittedWindows& fitted) {
@@ -304,28 +365,13 @@ DepthMap dense_depth(const CameraLight& light, int camera, std::span<const Measu
   map.rows = (light.camera->height - 1) / options.stride + 1;
   map.nodes.resize(static_cast<std::size_t>(map.columns) * static_cast<std::size_t>(map.rows));
   const CurveSeeds seeds(*light.camera, camera, points);
-  WindowFitter fitter(light, options.half);
-  const BackgroundView behind(light, background, options);
-  const ObjectSpace& space = background.space;
-  FittedWindows fitted{options.half, {}, {}};
-  // Nodes near labelled curves.
-  for (std::size_t i = 0; i < map.nodes.size(); ++i) {
-    const Vec2 pixel = map.pixel(i);
-    std::optional<WindowFit> best;
-    for (const Quadric& start : seeds.planes(pixel, options.seed_radius_px, options.half)) {
-      const auto fit = fitter.fit(pixel, start, 5);
-      if (fit && acceptable(light, pixel, *fit, space, options.half, options) &&
-          (!best || cost(*fit) < cost(*best))) {
-        best = fit;
-      }
-    }
-    if (!best || behind.shows(pixel, *best, fitter)) continue;
-    map.nodes[i] = node_of(*best, options.half, map.lit_sets);
-    map.nodes[i].seeded = true;
-    fitted.add(i, best->information);
+  std::vector<FittedWindows> passes;
+  for (const DepthOptions& pass : by_radius(options)) {
+    FittedWindows& fitted = passes.emplace_back(FittedWindows{pass.half, {}, {}});
+    seed(light, seeds, background, pass, map, fitted);
+    grow(light, background, pass, map, fitted);
   }
-  grow(light, background, options, map, fitted);
-  share_bends(fitted, map);
+  for (const FittedWindows& fitted : passes) share_bends(fitted, map);
   mark_saturated(light, options.half, map);
   return map;
 }
@@ -333,32 +379,20 @@ DepthMap dense_depth(const CameraLight& light, int camera, std::span<const Measu
 std::size_t complete_map(const CameraLight& light, const RayScene& surface,
                          const Background& background, double sigma_factor,
                          const DepthOptions& options, DepthMap& map) {
-  constexpr float kConfidence = 0.9F;  // of rendered objects' nodes, 96 % or more are right
   constexpr double kHardPlaces = 1.8;  // rims and gaps: errors beyond what the window's fit says
-  const Camera& camera = *light.camera;
-  WindowFitter fitter(light, options.half);
-  const BackgroundView behind(light, background, options);
-  const ObjectSpace& space = background.space;
-  FittedWindows fitted{options.half, {}, {}};
-  for (std::size_t i = 0; i < map.nodes.size(); ++i) {
-    if (map.nodes[i].measured()) continue;
-    const Vec2 pixel = map.pixel(i);
-    const auto hit = surface.first_hit(camera.ray(pixel));
-    if (!hit) continue;
-    const Vec3 normal = face_normal(surface.mesh(), hit->face);
-    const Quadric start = quadric_of(TangentView(camera, hit->point, normal), options.half);
-    const auto fit = fitter.fit(pixel, start, 5);
-    if (!fit || !acceptable(light, pixel, *fit, space, options.half, options)) continue;
-    const double move = (camera.point_at_depth(pixel, 1 / fit->q[0]) - hit->point).norm();
-    if (move > options.max_move || behind.shows(pixel, *fit, fitter)) continue;
-    map.nodes[i] = node_of(*fit, options.half, map.lit_sets);
-    map.nodes[i].confidence = kConfidence;
-    fitted.add(i, fit->information);
+  std::vector<FittedWindows> passes;
+  for (const DepthOptions& pass : by_radius(options)) {
+    FittedWindows& fitted = passes.emplace_back(FittedWindows{pass.half, {}, {}});
+    seed(light, surface, background, pass, map, fitted);
   }
-  share_bends(fitted, map);
-  for (const std::size_t i : fitted.nodes)
-    map.nodes[i].sigma *= static_cast<float>(kHardPlaces * sigma_factor);
-  return fitted.nodes.size();
+  std::size_t count = 0;
+  for (const FittedWindows& fitted : passes) {
+    share_bends(fitted, map);
+    for (const std::size_t i : fitted.nodes)
+      map.nodes[i].sigma *= static_cast<float>(kHardPlaces * sigma_factor);
+    count += fitted.nodes.size();
+  }
+  return count;
 }
 
 }  // namespace pencilscan

@@ -16,6 +16,7 @@ namespace pencilscan {
 struct DepthOptions {
   int stride = 4;              ///< px between nodes, in [1, 8]
   int half = 5;                ///< radius of a window, px, in [2, 10]
+  int narrow_half = 5;         ///< where that does not fit: px, in [2, half]
   double seed_radius_px = 10;  ///< around a node: labelled points that it may start from
   double max_misfit = 8;       ///< chi^2 per degree of freedom
   /// Root mean square over the largest amplitude; or twice the usual one (JPEG), if that is more.
@@ -34,7 +35,7 @@ struct Background {
 };
 
 /// The options as they are for one camera's pictures: windows behind a mosaic are wider, and so are
-/// those of wide lines.
+/// those of wide lines. What noise makes wider is tried as it was where it does not fit.
 [[nodiscard]] DepthOptions options_for(const CameraLight& light, DepthOptions options);
 
 /// Evenly picked labelled points of a camera.
@@ -47,9 +48,9 @@ struct Background {
                                                      const DepthOptions& options);
 
 /// The depth map of camera `camera` (index in the rig), one node every options.stride px. Windows
-/// of nodes near labelled curve points start from these; grow() goes on from there. Of `points`,
-/// those of this camera count. What lies outside the object's space has no depth, nor has a window
-/// that the background explains as well.
+/// of nodes near labelled curve points start from these; grow() goes on from there; then narrow
+/// windows of nodes that have no depth. Of `points`, those of this camera count. What lies outside
+/// the object's space has no depth, nor has a window that the background explains as well.
 [[nodiscard]] DepthMap dense_depth(const CameraLight& light, int camera,
                                    std::span<const MeasuredPoint> points,
                                    const Background& background, const DepthOptions& options);
@@ -58,10 +59,10 @@ struct Background {
 void grow(const CameraLight& light, const Background& background, const DepthOptions& options,
           DepthMap& map);
 
-/// Fits the windows of nodes without depth whose rays meet `surface`. Each fit starts from the
-/// surface's tangent plane. It is kept if it ends near the surface; a fit that is off by a line
-/// does not end there. sigma is multiplied by `sigma_factor`. Returns the number of nodes that got
-/// depth.
+/// Fits the windows, then the narrow ones, of nodes without depth whose rays meet `surface`. Each
+/// fit starts from the surface's tangent plane. It is kept if it ends near the surface; a fit that
+/// is off by a line does not end there. sigma is multiplied by `sigma_factor`. Returns the number
+/// of nodes that got depth.
 std::size_t complete_map(const CameraLight& light, const RayScene& surface,
                          const Background& background, double sigma_factor,
                          const DepthOptions& options, DepthMap& map);

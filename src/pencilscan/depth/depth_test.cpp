@@ -256,9 +256,42 @@ TEST(DenseDepth, WindowsHoldAWholeLine) {
   EXPECT_EQ(wide.stride, 6);  // even: wider windows beside these join 2 x 2 pixels
   light.of_mosaic = true;
   EXPECT_EQ(options_for(light, {}).half, 8);
+  EXPECT_EQ(options_for(light, {}).narrow_half, 8);
   light.line_px = 30;
   EXPECT_EQ(options_for(light, {}).half, 10);
   EXPECT_LE(options_for(light, {}).stride, 8);
+}
+
+TEST(DenseDepth, NarrowWindowsMeasureWhereWideOnesDoNotFit) {
+  CameraLight mosaic;
+  mosaic.spacing_px = 11.4F;
+  mosaic.line_px = 3.8F;
+  mosaic.of_mosaic = true;
+  EXPECT_EQ(options_for(mosaic, {}).half, 6);
+  EXPECT_EQ(options_for(mosaic, {}).narrow_half, 5);
+
+  // Beside the rim of so small a ball.
+  const BallScene& scene = ball_scene();
+  const DepthResult measured = scene.measure();
+  const auto depth = [&](int narrow_half) {
+    DepthOptions options;
+    options.half = 10;
+    options.narrow_half = narrow_half;
+    return dense_depth(measured.lights[0], 0, scene.points, {ObjectSpace(scene.rig), {}}, options);
+  };
+  const DepthMap wide = depth(10);
+  DepthMap both = depth(5);
+  std::size_t added = 0;
+  for (std::size_t i = 0; i < both.nodes.size(); ++i) {
+    if (wide.nodes[i].measured()) {
+      EXPECT_TRUE(both.nodes[i].measured());
+      both.nodes[i] = DepthNode{};
+    } else if (both.nodes[i].measured()) {
+      ++added;
+    }
+  }
+  EXPECT_GT(added, 20u);
+  EXPECT_LT(median_size(scene.errors(both)), 0.6);  // a pixel, where the ball turns away
 }
 
 TEST(DenseDepth, BlurIsFound) {
