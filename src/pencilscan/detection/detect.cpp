@@ -8,6 +8,7 @@
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/detection/ghosts.h"
 #include "pencilscan/detection/mosaic_trace.h"
+#include "pencilscan/detection/room_light.h"
 #include "pencilscan/rig/camera_light.h"
 #include "pencilscan/rig/object_space.h"
 
@@ -36,6 +37,28 @@ cv::Rect lit_area(const cv::Mat& image) {
                           lit.width * kBlock + 2 * kMargin, lit.height * kBlock + 2 * kMargin);
 }
 
+/// Each pixel's colour times a matrix.
+cv::Mat transformed(const cv::Mat& colors, const Mat3& matrix) {
+  cv::Matx33f m;
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) m(i, j) = static_cast<float>(matrix(i, j));
+  }
+  cv::Mat result;
+  cv::transform(colors, result, m);
+  return result;
+}
+
+/// Unmixed light without the room's. Colours that were found in the light of both are found again.
+cv::Mat projector_light_alone(const Camera& camera, const Rig& rig,
+                              const std::vector<ColorFamily>& families, const cv::Mat& rgb,
+                              double pitch_px, Unmixing& unmixing) {
+  cv::Mat alone = without_room_light(rgb, pitch_px);
+  if (camera.states_color_matrix()) return alone;
+  const Mat3 back = unmixing.projector_from_camera.inverse();
+  unmixing = estimate_unmixing(camera, rig, families, transformed(alone, back));
+  return transformed(alone, unmixing.projector_from_camera * back);
+}
+
 }  // namespace
 
 CameraDetection detect_curves(const Camera& camera, const Rig& rig,
@@ -50,7 +73,10 @@ CameraDetection detect_curves(const Camera& camera, const Rig& rig,
   result.is_filled_in = !camera.mosaic && looks_interpolated(values);
   result.saturated_pixels = static_cast<std::size_t>(cv::countNonZero(overexposed(image(area))));
   result.unmixing = estimate_unmixing(camera, rig, families, registered(camera, linear, area.tl()));
-  const cv::Mat rgb = projector_light(camera, linear, result.unmixing, area.tl());
+  cv::Mat rgb = projector_light(camera, linear, result.unmixing, area.tl());
+  const double pitch_px = pixels_at_center(rig, camera, line_spacing(rig));
+  if (lines_lack_a_channel(families) && has_room_light(rgb, pitch_px))
+    rgb = projector_light_alone(camera, rig, families, rgb, pitch_px, result.unmixing);
   // Find and trace the curves of each family, then fit them together.
   RidgeOptions ridge = options.ridge;
   ridge.usual_px = pixels_at_center(rig, camera, line_width(rig));
