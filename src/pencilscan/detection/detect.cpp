@@ -75,7 +75,7 @@ CameraDetection detect_curves(const Camera& camera, const Rig& rig,
   result.unmixing = estimate_unmixing(camera, rig, families, registered(camera, linear, area.tl()));
   cv::Mat rgb = projector_light(camera, linear, result.unmixing, area.tl());
   const double pitch_px = pixels_at_center(rig, camera, line_spacing(rig));
-  if (lines_lack_a_channel(families) && has_room_light(rgb, pitch_px))
+  if (lines_lack_a_channel(families) && room_shows_prints(rgb, pitch_px))
     rgb = projector_light_alone(camera, rig, families, rgb, pitch_px, result.unmixing);
   // Find and trace the curves of each family, then fit them together.
   RidgeOptions ridge = options.ridge;

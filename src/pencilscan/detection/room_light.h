@@ -19,9 +19,11 @@ namespace pencilscan {
 /// Whether every line of these families lacks a channel, which law 1 needs.
 [[nodiscard]] bool lines_lack_a_channel(const std::vector<ColorFamily>& families);
 
-/// Whether the room lights most of what lines light, with a tenth of their light or more. `light`:
-/// unmixed, CV_32FC3; `pitch_px`: of neighbouring lines. Looks at a sample of the picture.
-[[nodiscard]] bool has_room_light(const cv::Mat& light, double pitch_px);
+/// Whether the room lights most of what lines light, with a tenth of their light or more, and shows
+/// stripes or prints there: a plain surface gives it back evenly, and lines on it are found as in
+/// the dark. `light`: unmixed, CV_32FC3; `pitch_px`: of neighbouring lines. Looks at a sample of
+/// the picture.
+[[nodiscard]] bool room_shows_prints(const cv::Mat& light, double pitch_px);
 
 /// The picture without the room's light.
 [[nodiscard]] cv::Mat without_room_light(const cv::Mat& light, double pitch_px);

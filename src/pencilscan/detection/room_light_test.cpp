@@ -78,12 +78,13 @@ const cv::Vec3d kDark = {0.01, 0.01, 0.01};
 const cv::Vec3d kLamp = {0.4, 0.36, 0.28};
 
 TEST(RoomLight, IsToldFromLines) {
-  EXPECT_FALSE(has_room_light(picture(white, kDark), kPitch));
-  EXPECT_FALSE(has_room_light(picture(black_and_white, kDark), kPitch));
-  EXPECT_TRUE(has_room_light(picture(white, kLamp), kPitch));
-  EXPECT_TRUE(has_room_light(picture(black_and_white, kLamp), kPitch));
-  EXPECT_TRUE(has_room_light(picture(red_and_white, kLamp), kPitch));
-  EXPECT_FALSE(has_room_light(picture(white, kLamp), 0)) << "a rig that does not say its pitch";
+  EXPECT_FALSE(room_shows_prints(picture(white, kDark), kPitch));
+  EXPECT_FALSE(room_shows_prints(picture(black_and_white, kDark), kPitch));
+  EXPECT_FALSE(room_shows_prints(picture(white, kLamp), kPitch)) << "it shows nothing";
+  EXPECT_TRUE(room_shows_prints(picture(black_and_white, kLamp), kPitch));
+  EXPECT_TRUE(room_shows_prints(picture(red_and_white, kLamp), kPitch));
+  EXPECT_FALSE(room_shows_prints(picture(black_and_white, kLamp), 0))
+      << "a rig that does not say its pitch";
 }
 
 TEST(RoomLight, NeedsLinesThatLackAChannel) {
