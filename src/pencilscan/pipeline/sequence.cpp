@@ -14,6 +14,7 @@
 #include "pencilscan/io/file.h"
 #include "pencilscan/io/hash.h"
 #include "pencilscan/io/mesh_file.h"
+#include "pencilscan/io/output_place.h"
 #include "pencilscan/labeling/point_file.h"
 #include "pencilscan/pipeline/curve_output.h"
 #include "pencilscan/pipeline/depth_output.h"
@@ -256,20 +257,6 @@ std::vector<FrameOutcome> make_frames(const Run& run, const std::vector<std::siz
     chain.end(k, make(step.frame, step.is_written, chain.linked(links, k)));
   });
   return outcomes;
-}
-
-/// What is read is not written to, and a result among frame folders would be taken for a frame the
-/// next time.
-void refuse_as_output(const std::string& option, const fs::path& input, const fs::path& out) {
-  if (input.empty()) return;
-  std::error_code ignored;
-  if (fs::equivalent(input, out, ignored))
-    throw InputError("--out", "", out.string(), "must not be that of " + option);
-  const fs::path read = fs::weakly_canonical(fs::absolute(input, ignored), ignored);
-  const fs::path written = fs::weakly_canonical(fs::absolute(out, ignored), ignored);
-  const auto end = std::mismatch(read.begin(), read.end(), written.begin(), written.end());
-  if (end.first == read.end())
-    throw InputError("--out", "", out.string(), "must not lie in that of " + option);
 }
 
 struct SequenceInput {

@@ -14,6 +14,7 @@
 #include "pencilscan/io/file.h"
 #include "pencilscan/io/found_files.h"
 #include "pencilscan/io/image.h"
+#include "pencilscan/io/output_place.h"
 #include "pencilscan/io/partial_folder.h"
 #include "pencilscan/io/zarr_array.h"
 #include "pencilscan/recording/frame_folders.h"
@@ -132,6 +133,7 @@ std::vector<std::string> left_out_warnings(const Recording& recording, const Fra
 PackReport pack_recording(const fs::path& frames, const fs::path& out, const PackOptions& options,
                           const Progress& progress) {
   refuse_frames_as_output(frames, out);
+  refuse_as_output("--frames", frames, out);
   const FoundFrames found = find_pictures(frames);
   fs::path times_file = options.times;
   if (times_file.empty() && fs::exists(frames / kTimesFile)) times_file = frames / kTimesFile;
@@ -209,6 +211,7 @@ std::vector<std::string> lost_warnings(const Recording& recording, const LostPic
 
 PackReport unpack_recording(const Recording& recording, const FrameSets& sets, const fs::path& out,
                             const Progress& progress) {
+  refuse_as_output("--frames", recording.folder(), out);
   refuse_what_would_stay(recording, sets, out);
   PackReport report;
   report.frames = sets.sets.size();

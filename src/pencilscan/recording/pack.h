@@ -31,13 +31,15 @@ struct PackOptions {
 /// pictures, which are no frames. Folders without a picture are left out with a warning. InputError
 /// for pictures that are damaged or of another size or type than the camera's others, and for time
 /// stamps of other cameras, of a frame that stands twice, or of none of the frames. Warns of
-/// pictures and time stamps that found no partner. The recording is made in `<out>.partial` and
+/// pictures and time stamps that found no partner. Nothing is written among what is packed. The
+/// recording is made in `<out>.partial` and
 /// appears whole; an earlier one stays until then. Warns of what order_warning() says, too.
 PackReport pack_recording(const std::filesystem::path& frames, const std::filesystem::path& out,
                           const PackOptions& options = {}, const Progress& progress = {});
 
 /// The opposite: a folder of PNG files per frame set, and timestamps.csv where there are times.
-/// InputError where `out` holds pictures or times that would stay, and be taken for this set's.
+/// InputError where `out` is the recording, lies in it, or holds pictures or times that would stay,
+/// and be taken for this set's.
 PackReport unpack_recording(const Recording& recording, const FrameSets& sets,
                             const std::filesystem::path& out, const Progress& progress = {});
 

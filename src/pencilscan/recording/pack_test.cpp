@@ -159,6 +159,10 @@ TEST_F(Pack, TheFramesThemselvesAreNoOutput) {
   for (const fs::path& out : {frames(), frames() / "", temporary_.path()})
     EXPECT_THAT(error_of([&] { pack_recording(frames(), out, options); }),
                 HasSubstr("must not be the folder of --frames"));
+  for (const fs::path& out : {frames() / "film.zarr", frames() / "000000" / "film.zarr"})
+    EXPECT_THAT(error_of([&] { pack_recording(frames() / "", out); }),
+                HasSubstr("must not lie in that of --frames"));
+  EXPECT_FALSE(fs::exists(frames() / "film.zarr"));
   EXPECT_TRUE(fs::exists(frames() / "000000" / "cam0.png"));
 }
 
@@ -214,6 +218,19 @@ TEST_F(Pack, PicturesThatWouldStayAmongUnpackedOnesAreNamed) {
   write_text(out / "timestamps.csv", "frame,cam0\n000000,1\n");
   EXPECT_THAT(error_of([&] { unpack_recording(recording, sets, out); }),
               HasSubstr("timestamps.csv: must not stay"));
+}
+
+TEST_F(Pack, NothingIsUnpackedIntoTheRecording) {
+  put("000000/cam0.png", CV_8UC1, 3);
+  pack_recording(frames(), packed());
+  const Recording recording = Recording::open(packed());
+  const FrameSets sets = group_frames(recording);
+  EXPECT_THAT(error_of([&] { unpack_recording(recording, sets, packed()); }),
+              HasSubstr("must not be that of --frames"));
+  EXPECT_THAT(error_of([&] { unpack_recording(recording, sets, packed() / "frames"); }),
+              HasSubstr("must not lie in that of --frames"));
+  EXPECT_FALSE(fs::exists(packed() / "000000"));
+  EXPECT_FALSE(fs::exists(packed() / "frames"));
 }
 
 TEST_F(Pack, TheTimesOfOneRowComeBack) {
