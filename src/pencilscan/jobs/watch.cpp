@@ -4,6 +4,7 @@
 #include <cmath>
 #include <functional>
 #include <iterator>
+#include <optional>
 #include <set>
 #include <tuple>
 
@@ -32,8 +33,13 @@ struct Series {
 
 struct Found {
   const Series* series = nullptr;
-  Change change;  ///< of the figure itself
+  Change change;                     ///< of the figure itself
+  std::optional<Change> named = {};  ///< of a lamp's light: of the camera's named share with it
 };
+
+bool in_order(const Found& a, const Found& b) {
+  return std::tie(a.change.at, a.series->kind) < std::tie(b.change.at, b.series->kind);
+}
 
 bool rises(const Found& found) { return found.change.after > found.change.before; }
 
@@ -162,6 +168,7 @@ SequenceEvent event_of(std::span<const FrameRow> rows, const SequenceDevices& de
       name_of(devices, found.series->device) + ": " + quantity(kind) + from_to(kind, change);
   const std::string cause = usual_cause(kind, up, false, lines_too);
   if (!cause.empty()) event.text += " (" + cause + ")";
+  if (found.named) event.text += "; " + quantity("labelled") + from_to("labelled", *found.named);
   return event;
 }
 
@@ -171,6 +178,22 @@ std::optional<std::size_t> end_of_most(const std::vector<Found>& together, std::
   for (const Found& f : together) ends.push_back(f.change.end.value_or(rows));
   const std::size_t end = upper_median(std::move(ends));
   return end < rows ? std::optional(end) : std::nullopt;
+}
+
+/// What cameras lost of their named curves, or won, with a lamp.
+std::string named_with(const std::vector<Found>& together, const SequenceDevices& devices) {
+  const Found* most = nullptr;
+  std::size_t count = 0;
+  const auto size = [](const Found& f) { return std::abs(f.named->after - f.named->before); };
+  for (const Found& f : together) {
+    if (!f.named) continue;
+    ++count;
+    if (most == nullptr || size(f) > size(*most)) most = &f;
+  }
+  if (most == nullptr) return "";
+  return "; with it the share of curves that has a line, in " + std::to_string(count) +
+         " of them, most in " + bare_name(devices, most->series->device) + ": " +
+         from_to("labelled", *most->named);
 }
 
 /// The same change in most cameras, or most projectors, at once is one event, of none of them.
@@ -186,7 +209,8 @@ SequenceEvent event_of_all(std::span<const FrameRow> rows, const SequenceDevices
   SequenceEvent event = event_from(rows, middle, "");
   event.text = std::to_string(together.size()) +
                (kind == "light" ? " projectors: " : " cameras: ") + quantity(kind) +
-               from_to(kind, middle.change) + " (" + usual_cause(kind, up, true, lines_too) + ")";
+               from_to(kind, middle.change) + " (" + usual_cause(kind, up, true, lines_too) + ")" +
+               named_with(together, devices);
   return event;
 }
 
@@ -383,6 +407,35 @@ void drop_explained(std::vector<Found>& found) {
   });
 }
 
+/// Takes out the named shares of cameras that change with a lamp, and tells its light of them:
+/// lines drown in light, and come out of it again. What begins without it, or stays lost after it,
+/// has another cause.
+void join_with_lamps(std::vector<Found>& found) {
+  const auto apart = [](std::size_t a, std::size_t b) { return std::max(a, b) - std::min(a, b); };
+  const auto goes_with = [&](const Found& f, const Found& lamp) {
+    const bool outlasts =
+        lamp.change.end && (!f.change.end || *f.change.end > *lamp.change.end + kFramesApart);
+    return lamp.series->kind == "level" && f.series->device == lamp.series->device &&
+           rises(f) != rises(lamp) && apart(f.change.at, lamp.change.at) <= kFramesApart &&
+           !outlasts;
+  };
+  std::vector<Found> rest;
+  for (const Found& f : found)
+    if (f.series->kind != "labelled") rest.push_back(f);
+  for (const Found& f : found) {
+    if (f.series->kind != "labelled") continue;
+    const auto lamp = std::find_if(rest.begin(), rest.end(),
+                                   [&](const Found& other) { return goes_with(f, other); });
+    if (lamp == rest.end()) {
+      rest.push_back(f);
+    } else {
+      lamp->named = f.change;
+    }
+  }
+  std::stable_sort(rest.begin(), rest.end(), in_order);
+  found = std::move(rest);
+}
+
 /// Takes out crossings of a device that frames themselves name, from the same or an earlier one on
 /// to no earlier one than the last that these tell of.
 void drop_said(std::vector<SequenceEvent>& events) {
@@ -452,10 +505,9 @@ WatchReport watch_sequence(std::span<const FrameRow> rows, const SequenceDevices
   WatchReport report;
   const std::vector<Series> all = all_series(devices);
   std::vector<Found> found = find_all(rows, devices, all, report);
-  std::stable_sort(found.begin(), found.end(), [](const Found& a, const Found& b) {
-    return std::tie(a.change.at, a.series->kind) < std::tie(b.change.at, b.series->kind);
-  });
+  std::stable_sort(found.begin(), found.end(), in_order);
   drop_explained(found);
+  join_with_lamps(found);
   while (!found.empty()) {
     const std::vector<Found> together = take_together(found);
     const Found& first = together.front();

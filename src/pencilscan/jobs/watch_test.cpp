@@ -165,6 +165,52 @@ TEST_F(Watch, ALampOfThreeFramesEnds) {
   EXPECT_THAT(found[0].text, HasSubstr("a lamp"));
 }
 
+// Lines drown in its light.
+TEST_F(Watch, WhatALampTakesOfTheNamedCurvesIsOneEventWithIt) {
+  const std::vector<FrameRow> steady = rows_;
+  const auto lamp_from = [&](std::size_t first, std::size_t end, double lost) {
+    for (std::size_t k = first; k < end; ++k)
+      for (CameraRow& camera : rows_[k].cameras) {
+        camera.image_level *= 2;
+        camera.labelled_share -= lost;
+      }
+  };
+  lamp_from(100, kFrames, 0.2);
+  auto found = events();
+  ASSERT_THAT(found, SizeIs(1));
+  EXPECT_EQ(found[0].kind, "level");
+  EXPECT_THAT(found[0].text,
+              HasSubstr("a lamp); with it the share of curves that has a line, in 3 of them"));
+  // It goes off; what it took of the curves of one camera stays lost.
+  rows_ = steady;
+  lamp_from(100, 150, 0.2);
+  ASSERT_THAT(events(), SizeIs(1));
+  for (std::size_t k = 150; k < kFrames; ++k) rows_[k].cameras[2].labelled_share -= 0.2;
+  found = events();
+  ASSERT_THAT(found, SizeIs(2));
+  EXPECT_EQ(found[0].kind == "labelled" ? found[0].device : found[1].device, "cam2");
+  // A projector that goes off meanwhile, and lines that are lost at another time, stay.
+  rows_ = steady;
+  lamp_from(100, kFrames, 0.2);
+  from(102, [](FrameRow& row) { row.projector_points[0] = 0; });
+  from(200, [](FrameRow& row) { row.cameras[1].labelled_share -= 0.2; });
+  found = events();
+  ASSERT_THAT(found, SizeIs(3));
+  EXPECT_EQ(found[0].kind, "level");
+  EXPECT_EQ(found[1].kind, "projector");
+  EXPECT_EQ(found[2].kind, "labelled");
+  // Of one camera alone: something bright before it.
+  rows_ = steady;
+  from(100, [](FrameRow& row) {
+    row.cameras[1].image_level *= 2;
+    row.cameras[1].labelled_share -= 0.5;
+  });
+  found = events();
+  ASSERT_THAT(found, SizeIs(1));
+  EXPECT_EQ(found[0].device, "cam1");
+  EXPECT_THAT(found[0].text, HasSubstr("; the share of its curves that has a line is 0.3"));
+}
+
 TEST_F(Watch, ACameraThatIsPutBackSoonIsBack) {
   let_crossings_say_shifts();
   for (std::size_t k = 30; k < 34; ++k) {
