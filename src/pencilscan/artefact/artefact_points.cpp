@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "pencilscan/core/error.h"
+#include "pencilscan/io/curve_file.h"
 #include "pencilscan/io/frame_failure.h"
 #include "pencilscan/io/ply.h"
 
@@ -115,6 +116,7 @@ ArtefactPoints read_artefact_points(const fs::path& path) {
   const PlyFile file = read_ply(path);
   const PlyElement* vertices = file.find("vertex");
   if (vertices == nullptr) throw InputError(path.string(), "", "", "must have an element `vertex`");
+  refuse_curves(path, *vertices);
   const auto& x = coordinate(path, *vertices, "x");
   const auto& y = coordinate(path, *vertices, "y");
   const auto& z = coordinate(path, *vertices, "z");

@@ -132,6 +132,14 @@ void write_curves(const std::filesystem::path& path, const CurveFile& curves) {
   });
 }
 
+void refuse_curves(const std::filesystem::path& path, const PlyElement& vertices) {
+  if (vertices.find("sigma_px") == nullptr || vertices.find("curve") == nullptr) return;
+  throw InputError(
+      path.string(), "", "",
+      "must hold points of the object, as points.ply does: these are curves in pictures "
+      "(curves.ply), which lie where a viewer shows the pictures");
+}
+
 CurveFile read_curves(const std::filesystem::path& path) {
   const PlyFile file = read_ply(path);
   CurveFile curves;

@@ -7,6 +7,8 @@
 
 namespace pencilscan {
 
+struct PlyElement;
+
 /// What became of a curve point.
 enum class CurveState : std::uint8_t {
   kLabelled,
@@ -55,6 +57,9 @@ struct CurveFile {
 /// Writes curves.ply, binary little endian: elements `vertex`, `edge` (neighbours on a curve, which
 /// viewers draw as lines) and `crossing`. Whole or not at all.
 void write_curves(const std::filesystem::path& path, const CurveFile& curves);
+/// For readers of points: InputError where these are the vertices of curves.ply, which lie where
+/// a viewer shows pictures.
+void refuse_curves(const std::filesystem::path& path, const PlyElement& vertices);
 /// Reads what write_curves() wrote, but for what is for viewers; InputError when a property is
 /// missing or out of range.
 [[nodiscard]] CurveFile read_curves(const std::filesystem::path& path);

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "pencilscan/core/error.h"
+#include "pencilscan/io/curve_file.h"
 #include "pencilscan/io/file.h"
 #include "pencilscan/io/little_endian.h"
 #include "pencilscan/io/ply.h"
@@ -52,7 +53,9 @@ class Columns {
   [[nodiscard]] const std::vector<double>& required(const char* name) const {
     const auto* values = optional(name);
     if (values == nullptr)
-      throw InputError(path_, name, "", "the vertices must have this property");
+      throw InputError(path_, name, "",
+                       "the vertices must have this property, as those of points.ply: points of "
+                       "another program do not say which line they are of");
     return *values;
   }
   [[nodiscard]] const std::vector<double>* optional(const char* name) const {
@@ -121,6 +124,7 @@ std::vector<MeasuredPoint> read_points(const std::filesystem::path& path) {
   const PlyFile file = read_ply(path);
   const PlyElement* vertices = file.find("vertex");
   if (vertices == nullptr) throw InputError(path.string(), "", "", "must have an element `vertex`");
+  refuse_curves(path, *vertices);
   const Columns columns(path.string(), *vertices);
   const auto& x = columns.required("x");
   const auto& y = columns.required("y");

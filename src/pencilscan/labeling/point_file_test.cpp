@@ -6,6 +6,7 @@
 #include <fstream>
 
 #include "pencilscan/core/error.h"
+#include "pencilscan/io/curve_file.h"
 #include "pencilscan/io/file.h"
 #include "pencilscan/io/temporary_folder.h"
 
@@ -33,6 +34,11 @@ class PointFile : public ::testing::Test {
   TemporaryFolder temporary_{::testing::UnitTest::GetInstance()->current_test_info()->name()};
   fs::path folder_ = temporary_.path();
 };
+
+TEST_F(PointFile, CurvesOfPicturesAreNoPoints) {
+  write_curves(folder_ / "curves.ply", {{CurveSample{}, CurveSample{}}, {}});
+  EXPECT_THAT(error_of(folder_ / "curves.ply"), ::testing::HasSubstr("these are curves in pict"));
+}
 
 TEST_F(PointFile, PointsRoundTrip) {
   std::vector<MeasuredPoint> points(1000);
