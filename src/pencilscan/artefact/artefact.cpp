@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "pencilscan/artefact/find_shapes.h"
+#include "pencilscan/artefact/known_ball.h"
 #include "pencilscan/artefact/plate_face.h"
 #include "pencilscan/artefact/sphere_fit.h"
 #include "pencilscan/artefact/trimmed.h"
@@ -33,7 +34,7 @@ Box box_of(std::span<const Vec3> points) {
   return box;
 }
 
-[[noreturn]] void no_fit(const ArtefactPoints& points, const char* shape,
+[[noreturn]] void no_fit(const ArtefactPoints& points, const std::string& shape,
                          const std::string& why = {}) {
   const Box box = box_of(points.points);
   throw StageError(
@@ -153,41 +154,15 @@ ArtefactPoints without_cone(const ArtefactPoints& points, const Vec3& center,
   return points.subset(kept);
 }
 
-bool is_near(const Sphere& sphere, const Vec3& point) {
-  constexpr double kNear = 0.05;  // of the radius; more than twice what a vote allows
-  return std::abs(signed_distance(sphere, point)) < kNear * sphere.radius;
-}
-
-/// A found sphere refined by the points near it alone, so that stems and bars do not pull at it.
-Sphere refined(std::span<const Vec3> points, const Sphere& found) {
-  std::vector<Vec3> near;
-  for (const Vec3& point : points)
-    if (is_near(found, point)) near.push_back(point);
-  return fit_sphere(near, found).value_or(found);
-}
-
-bool has_size(const Sphere& sphere, double radius) {
-  return std::abs(sphere.radius - radius) <= kSizeTolerance * radius;
-}
-
-/// Whether a ball was found, and not some points of another thing that lie on one by chance: of
-/// balls that hold fewer than a quarter of the points the search cannot be sure (find_shapes.cpp).
-bool is_ball(const ArtefactPoints& points, const Sphere& found, double radius) {
-  constexpr double kLeastShare = 0.25;
-  const auto near = std::count_if(points.points.begin(), points.points.end(),
-                                  [&](const Vec3& point) { return is_near(found, point); });
-  return has_size(found, radius) &&
-         static_cast<double>(near) >= kLeastShare * static_cast<double>(points.points.size());
-}
-
 /// The figures of one ball whose rough place is known.
 BallFigures measure_ball(ArtefactPoints points, const Sphere& start, const Rig* rig,
-                         const ArtefactOptions& options) {
+                         const ArtefactOptions& options, const std::string& name = "sphere",
+                         const std::string& why_not = {}) {
   BallFigures ball;
   ball.points = std::move(points);
   const std::span<const Vec3> all(ball.points.points);
   const auto fits = fit_both(all, start);
-  if (!fits) no_fit(ball.points, "sphere");
+  if (!fits) no_fit(ball.points, name, why_not);
   ball.sphere = fits->all;
   ball.trimmed = fits->trimmed.model;
   ball.removed = all.size() - fits->trimmed.kept.size();
@@ -209,6 +184,12 @@ BallFigures measure_ball(ArtefactPoints points, const Sphere& start, const Rig* 
   return ball;
 }
 
+/// Why no ball of the stated size was found, where it is a matter of units.
+std::string advice_on_unit(const ArtefactPoints& points, const ArtefactOptions& options) {
+  if (!options.diameter_mm || !points.unit_known) return {};
+  return unit_advice(points.points, *options.diameter_mm, options.seed);
+}
+
 std::optional<double> radius_of(const ArtefactOptions& options) {
   if (!options.diameter_mm) return std::nullopt;
   return *options.diameter_mm / 2;
@@ -227,6 +208,44 @@ std::size_t count_between(std::span<const Vec3> points, const Vec3& a, const Vec
   return static_cast<std::size_t>(std::count_if(points.begin(), points.end(), lies_between));
 }
 
+/// What to do where the points of one of the balls are not those of a ball.
+std::string ball_advice(const ArtefactOptions& options, std::size_t between) {
+  if (between == 0) return "; --region leaves out what is not the balls";
+  return "; " + std::to_string(between) + " of them lie between the balls; " +
+         (options.bar_diameter_mm > 0 ? "the bar is probably thicker than --bar-diameter = " +
+                                            formatted(options.bar_diameter_mm, "%.6g") + " mm"
+                                      : "--bar-diameter leaves a bar out") +
+         ", --region leaves out what is farther off";
+}
+
+/// Of all points of a ball, which are to be its own. StageError.
+void require_size(const BallFigures& ball, const std::string& name, const ArtefactOptions& options,
+                  const std::string& advice) {
+  if (has_size(ball.sphere, *options.diameter_mm / 2)) return;
+  throw StageError(ball.points.source + ": " + name + " is " +
+                   formatted(2 * ball.sphere.radius, "%.4g") + " mm across by its " +
+                   std::to_string(ball.points.points.size()) + " points, and --diameter says " +
+                   formatted(*options.diameter_mm, "%.6g") + advice);
+}
+
+/// Points of which both sides are a unit smaller than the stated ones are in that unit: of a plate
+/// a tenth of which was measured along both sides, nothing could be said anyway.
+void require_points_in_mm(const PlateFigures& plate, double length, double width,
+                          const std::string& of_surface) {
+  constexpr double kUnitTolerance = 0.15;  // of the surface's sides: its rim may be missing
+  const PlaneSurface& surface = plate.surface;
+  if (!plate.points.unit_known || !(surface.width_mm > 0)) return;
+  const UnitFactor* along =
+      unit_behind_factor(std::max(length, width) / surface.length_mm, kUnitTolerance);
+  const UnitFactor* across =
+      unit_behind_factor(std::min(length, width) / surface.width_mm, kUnitTolerance);
+  if (along == nullptr || along != across || along->factor < 1) return;
+  throw InputError(plate.points.source, "--length x --width", mm_text(length, width),
+                   "must be the sides of the plate in mm, whose surface is " + of_surface +
+                       " mm large: the points are probably in " + along->words +
+                       ", to be multiplied by " + formatted(along->factor, "%.6g"));
+}
+
 /// A plate's surface that covers as much beyond the stated sides as on them is that of another
 /// plate, of sides in another unit (which makes one side 2.5 times as long at least), or of a
 /// table.
@@ -235,12 +254,13 @@ void require_stated_sides(const PlateFigures& plate, const ArtefactOptions& opti
   if (!options.plate_length_mm || !options.plate_width_mm) return;
   const double length = *options.plate_length_mm, width = *options.plate_width_mm;
   const PlaneSurface& surface = plate.surface;
+  const std::string of_surface =
+      formatted(surface.length_mm, "%.4g") + " x " + formatted(surface.width_mm, "%.4g");
+  require_points_in_mm(plate, length, width, of_surface);
   if (surface.area_mm2 <= kFarBeyond * length * width) return;
   constexpr double kUnitTolerance = 0.15;  // of the surface's sides: its rim may be missing
   const UnitFactor* unit = unit_behind_factor(
       std::sqrt(surface.length_mm * surface.width_mm / (length * width)), kUnitTolerance);
-  const std::string of_surface =
-      formatted(surface.length_mm, "%.4g") + " x " + formatted(surface.width_mm, "%.4g");
   const std::string why =
       !plate.points.unit_known ? " of the rig's units (which unit, it does not say)"
       : unit != nullptr        ? " mm: they are probably in " + std::string(unit->words)
@@ -256,7 +276,7 @@ BallFigures measure_sphere(const ArtefactPoints& given, const Rig* rig,
                            const ArtefactOptions& options) {
   ArtefactPoints points = of_region(given, rig, options);
   const auto start = find_sphere(points.points, {radius_of(options), {}, options.seed});
-  if (!start) no_fit(points, "sphere");
+  if (!start) no_fit(points, "sphere", advice_on_unit(points, options));
   std::size_t left_out = 0;
   if (options.stem) {
     ArtefactPoints kept =
@@ -270,10 +290,14 @@ BallFigures measure_sphere(const ArtefactPoints& given, const Rig* rig,
   }
   BallFigures ball = measure_ball(std::move(points), *start, rig, options);
   if (options.diameter_mm && !has_size(ball.sphere, *options.diameter_mm / 2)) {
+    const std::string advice = advice_on_unit(ball.points, options);
     no_fit(ball.points, "sphere",
-           ": the one nearest to all of them is " + formatted(2 * ball.sphere.radius, "%.4g") +
-               " mm across, and --diameter says " + formatted(*options.diameter_mm, "%.6g") +
-               "; --region and --stem leave out what is not the ball");
+           !advice.empty()
+               ? advice
+               : ": the one nearest to all of them is " +
+                     formatted(2 * ball.sphere.radius, "%.4g") +
+                     " mm across, and --diameter says " + formatted(*options.diameter_mm, "%.6g") +
+                     "; --region and --stem leave out what is not the ball");
   }
   ball.left_out = left_out;
   return ball;
@@ -286,7 +310,7 @@ BallBarFigures measure_ball_bar(const ArtefactPoints& given, const Rig* rig,
   const ArtefactPoints points = of_region(given, rig, options);
   SphereSearch search{radius, {}, options.seed};
   auto first = find_sphere(points.points, search);
-  if (!first) no_fit(points, "ball of this diameter");
+  if (!first) no_fit(points, "ball of this diameter", advice_on_unit(points, options));
   first = refined(points.points, *first);
   search.not_here = Sphere{first->center, *options.diameter_mm};
   // What lies on the first ball has no vote about the second.
@@ -295,7 +319,7 @@ BallBarFigures measure_ball_bar(const ArtefactPoints& given, const Rig* rig,
     if (std::abs((point - first->center).norm() - radius) > 0.1 * radius) others.push_back(point);
   }
   auto second = find_sphere(others, search);
-  if (!second) no_fit(points, "second ball of this diameter");
+  if (!second) no_fit(points, "second ball of this diameter", advice_on_unit(points, options));
   second = refined(others, *second);
 
   BallBarFigures bar;
@@ -318,13 +342,17 @@ BallBarFigures measure_ball_bar(const ArtefactPoints& given, const Rig* rig,
                           {(other.center - own.center).normalized(), std::asin(sine)});
     }
     const auto held = fit_both(part.points, own, radius);
-    if (!held || !is_ball(part, own, radius)) no_fit(part, "ball of this diameter");
+    const std::size_t between = count_between(part.points, first->center, second->center, radius);
+    const std::string advice = ball_advice(options, between);
+    const std::string name = "ball " + std::to_string(b + 1);
+    if (!held || !is_ball(part.points, own, radius))
+      no_fit(part, name + " of this diameter", advice);
     center[b] = held->all.center;
     trimmed_center[b] = held->trimmed.model.center;
-    bar.balls.push_back(measure_ball(std::move(part), own, rig, options));
+    bar.balls.push_back(measure_ball(std::move(part), own, rig, options, name, advice));
+    require_size(bar.balls.back(), name, options, advice);
     bar.balls.back().left_out = whole - bar.balls.back().points.points.size();
-    bar.between +=
-        count_between(bar.balls.back().points.points, first->center, second->center, radius);
+    bar.between += between;
   }
   bar.distance_mm = {(center[1] - center[0]).norm(),
                      (trimmed_center[1] - trimmed_center[0]).norm()};

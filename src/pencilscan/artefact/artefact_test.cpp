@@ -12,6 +12,7 @@
 #include "pencilscan/artefact/sphere_fit.h"
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/random.h"
+#include "pencilscan/io/curve_file.h"
 #include "pencilscan/io/file.h"
 #include "pencilscan/io/mesh_file.h"
 #include "pencilscan/io/temporary_folder.h"
@@ -20,7 +21,10 @@
 namespace pencilscan {
 namespace {
 
+using ::testing::AllOf;
+using ::testing::Contains;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 /// Places spread evenly over a sphere (a Fibonacci lattice); `deviation(i)` is radial.
 template <typename Deviation>
@@ -43,6 +47,17 @@ ArtefactPoints as_points(std::vector<Vec3> points) {
 
 std::vector<Vec3> plate_points(double thickness, const RigidTransform& world_from_plate,
                                std::uint64_t seed);
+
+/// What measuring ends with, where it does.
+template <typename Measure>
+std::string complaint_of(const Measure& measure) {
+  try {
+    (void)measure();
+  } catch (const std::runtime_error& error) {
+    return error.what();
+  }
+  return "none";
+}
 
 constexpr int kMany = 20'000;  // dense enough for whole coverage: 1 % of the diameter apart
 
@@ -242,14 +257,25 @@ TEST(ArtefactBallBar, TheBarIsLeftOutWhereItIsStatedAndElsewhereNoticed) {
   std::vector<Vec3> points;
   add_ball(points, {{-80, 0, 0}, 15}, 6000, [](int) { return 0.0; });
   add_ball(points, {{80, 0, 0}, 15}, 6000, [](int) { return 0.0; });
-  for (int i = 0; i < 2000; ++i)
+  std::vector<Vec3> few = points;
+  for (int i = 0; i < 2000; ++i) {
     points.emplace_back(-65 + 0.065 * i, 3 * std::cos(0.1 * i), 3 * std::sin(0.1 * i));
+    if (i % 100 == 0) few.push_back(points.back());
+  }
   ArtefactOptions options;
   options.diameter_mm = 30;
   options.length_mm = 160;
-  const BallBarFigures with = measure_ball_bar(as_points(points), nullptr, options);
-  EXPECT_GT(with.between, 1500U);
-  EXPECT_GT(std::abs(with.spacing_mm->all), 0.05);
+  // The sphere of all points of a ball and half of the bar is none of this size.
+  const auto with = [&] { return measure_ball_bar(as_points(points), nullptr, options); };
+  EXPECT_THAT(complaint_of(with), AllOf(HasSubstr("ball 1 is "), HasSubstr("--diameter says 30"),
+                                        HasSubstr("--bar-diameter leaves a bar out")));
+  options.bar_diameter_mm = 0.5;
+  EXPECT_THAT(complaint_of(with), HasSubstr("thicker than --bar-diameter = 0.5 mm"));
+  options.bar_diameter_mm = 0;
+  const BallBarFigures noticed = measure_ball_bar(as_points(few), nullptr, options);
+  EXPECT_GT(noticed.between, 10U);
+  EXPECT_THAT(artefact_warnings(noticed, options),
+              Contains(HasSubstr("if that is the bar, give --bar-diameter")));
   options.bar_diameter_mm = 6;
   const BallBarFigures without = measure_ball_bar(as_points(points), nullptr, options);
   EXPECT_NEAR(without.spacing_mm->all, 0, 1e-6);
@@ -291,6 +317,75 @@ TEST(ArtefactBallBar, SizesThatAreNotAsStatedAreNotSaidToBe) {
   EXPECT_THAT(artefact_warnings(bar, options),
               ::testing::ElementsAre(HasSubstr("ball 2 is 23.6 mm across, 21.3 % less"),
                                      HasSubstr("30 and 23.6 mm across, and --diameter says 30")));
+}
+
+std::vector<Vec3> scaled(std::vector<Vec3> points, double factor) {
+  for (Vec3& point : points) point *= factor;
+  return points;
+}
+
+TEST(ArtefactUnits, OfPointsAreToldByTheStatedSize) {
+  std::vector<Vec3> ball, bar;
+  add_ball(ball, {{3, 4, 700}, 25}, 3000, [](int i) { return i % 2 == 0 ? 0.01 : -0.01; });
+  add_ball(bar, {{-80, 0, 0}, 15}, 3000, [](int) { return 0.0; });
+  add_ball(bar, {{80, 0, 0}, 15}, 3000, [](int) { return 0.0; });
+  const std::vector<Vec3> plate = plate_points(10, RigidTransform(), 21);
+  Rig unknown;
+  unknown.unit_known = false;
+  for (const auto& [factor, unit] :
+       {std::pair{10.0, "centimetres"}, std::pair{25.4, "inches"}, std::pair{1000.0, "metres"}}) {
+    const std::string words = std::string("the points are probably in ") + unit;
+    ArtefactOptions options;
+    const auto sphere = [&](double scale, const Rig* rig = nullptr) {
+      return complaint_of(
+          [&] { return measure_sphere(as_points(scaled(ball, scale)), rig, options); });
+    };
+    options.diameter_mm = 50;
+    EXPECT_THAT(sphere(1 / factor), HasSubstr(words));
+    EXPECT_THAT(sphere(1 / factor, &unknown), Not(HasSubstr("probably"))) << unit;
+    EXPECT_THAT(sphere(1 / 3.0), AllOf(HasSubstr("no sphere fits"), Not(HasSubstr("probably"))));
+    options.diameter_mm = 50 / factor;
+    EXPECT_THAT(sphere(1), HasSubstr(std::string("--diameter is probably in ") + unit));
+    options.diameter_mm = 30;
+    EXPECT_THAT(complaint_of([&, factor = factor] {
+                  return measure_ball_bar(as_points(scaled(bar, 1 / factor)), nullptr, options);
+                }),
+                HasSubstr(words));
+    options.plate_length_mm = 120;
+    options.plate_width_mm = 200;
+    for (const double thickness : {0.0, 10.0}) {
+      if (thickness > 0) options.plate_thickness_mm = thickness;
+      EXPECT_THAT(complaint_of([&, factor = factor] {
+                    return measure_plate(as_points(scaled(plate, 1 / factor)), nullptr, options);
+                  }),
+                  HasSubstr(words))
+          << thickness;
+    }
+  }
+}
+
+TEST(ArtefactUnits, OfPointsAreDoubtedWhereNoArtefactIsSoLarge) {
+  std::vector<Vec3> ball;
+  add_ball(ball, {{3, 4, 700}, 25}, kMany, [](int) { return 0.0; });
+  const std::vector<Vec3> plate = plate_points(0, RigidTransform(), 22);
+  const auto of_ball = [&](double factor, ArtefactOptions options = {}) {
+    return artefact_warnings(measure_sphere(as_points(scaled(ball, factor)), nullptr, options),
+                             options);
+  };
+  const auto of_plate = [&](double factor) {
+    return artefact_warnings(measure_plate(as_points(scaled(plate, factor)), nullptr, {}), {});
+  };
+  using ::testing::ElementsAre;
+  EXPECT_THAT(of_ball(1), ::testing::IsEmpty());
+  EXPECT_THAT(of_plate(1), ::testing::IsEmpty());
+  EXPECT_THAT(of_ball(0.001), ElementsAre(HasSubstr("0.05 mm large: the points are probably in "
+                                                    "metres; multiply them by 1000, for")));
+  EXPECT_THAT(of_ball(1 / 25.4), ElementsAre(HasSubstr("in metres or inches;")));
+  EXPECT_THAT(of_ball(1000), ElementsAre(HasSubstr("probably in micrometres")));
+  EXPECT_THAT(of_plate(0.001), ElementsAre(HasSubstr("the plate is 0.2 mm large")));
+  ArtefactOptions both;  // in metres, and so no error of size
+  both.diameter_mm = 0.05;
+  EXPECT_THAT(of_ball(0.001, both), ElementsAre(HasSubstr("probably in metres;")));
 }
 
 TEST(ArtefactWarnings, AnUnknownUnitIsToldOfEveryArtefact) {
@@ -467,6 +562,13 @@ TEST(ArtefactPlate, CoverageIsTheShareOfTheStatedPlate) {
   // The rectangle is centred on what was measured: 1 % of the diagonal is more on both sides.
   const PlateFigures plate = measure_plate(as_points(points), nullptr, options);
   EXPECT_NEAR(plate.coverage, (100 + 2 * 2.236) / 200, 0.01);
+}
+
+TEST(ArtefactFiles, CurvesOfPicturesAreNoPoints) {
+  const TemporaryFolder folder("artefact_curves");
+  write_curves(folder.path() / "curves.ply", {{CurveSample{}, CurveSample{}}, {}});
+  EXPECT_THAT(complaint_of([&] { return read_artefact_points(folder.path() / "curves.ply"); }),
+              HasSubstr("these are curves in pictures"));
 }
 
 TEST(ArtefactFiles, AnyPlyIsReadAndPointsWithoutPositionAreCounted) {

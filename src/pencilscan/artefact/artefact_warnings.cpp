@@ -18,6 +18,22 @@ std::vector<std::string> unit_warnings(const ArtefactPoints& points) {
       "from the stated ones says nothing"};
 }
 
+/// That an artefact is smaller or larger than any, with the unit that its points are probably in.
+void warn_of_unit(double size_mm, const std::string& what, const ArtefactPoints& points,
+                  std::vector<std::string>& warnings) {
+  // Artefacts of 2 mm or less and of 10 m or more are none that lines of a projector measure: these
+  // are 2 m and a centimetre in metres and micrometres. In inches, 0.2 mm would be 5 mm.
+  constexpr double kSmallestMm = 2, kInchesFromMm = 0.2, kLargestMm = 1e4;
+  if (!points.unit_known || !(size_mm > 0)) return;
+  if (size_mm > kSmallestMm && size_mm < kLargestMm) return;
+  warnings.push_back(what + " is " + formatted(size_mm, "%.3g") +
+                     " mm large: the points are probably in " +
+                     (size_mm >= kLargestMm      ? "micrometres; multiply them by 0.001"
+                      : size_mm >= kInchesFromMm ? "metres or inches; multiply them by 1000 or 25.4"
+                                                 : "metres; multiply them by 1000") +
+                     ", for no figure is in mm");
+}
+
 /// Of a ball less than what one camera sees of it at up to 60 degrees from head on, which is
 /// (1 - cos 60) / 2 of the whole.
 constexpr double kLittleCoverage = 0.25;
@@ -80,6 +96,7 @@ std::string reason_of(const BallBarFigures& bar, const ArtefactOptions& options,
 std::vector<std::string> artefact_warnings(const BallFigures& ball,
                                            const ArtefactOptions& options) {
   std::vector<std::string> warnings = unit_warnings(ball.points);
+  warn_of_unit(2 * ball.trimmed.radius, "the ball", ball.points, warnings);
   warn_of_size(ball, "the ball", options, warnings);
   warn_of_coverage(ball.coverage, "the ball", warnings);
   return warnings;
@@ -94,6 +111,7 @@ std::vector<std::string> artefact_warnings(const BallBarFigures& bar,
   }
   for (std::size_t b = 0; b < bar.balls.size(); ++b) {
     const std::string name = "ball " + std::to_string(b + 1);
+    warn_of_unit(2 * bar.balls[b].trimmed.radius, name, bar.balls[b].points, warnings);
     warn_of_size(bar.balls[b], name, options, warnings);
     warn_of_coverage(bar.balls[b].coverage, name, warnings);
   }
@@ -112,6 +130,7 @@ std::vector<std::string> artefact_warnings(const PlateFigures& plate,
   // A tenth of both sides, which no scale of a scanner is off by, is a fifth of the area.
   constexpr double kNoticed = (1 + kSizeTolerance) * (1 + kSizeTolerance);
   std::vector<std::string> warnings = unit_warnings(plate.points);
+  warn_of_unit(plate.surface.length_mm, "the plate", plate.points, warnings);
   warn_of_coverage(plate.coverage, "the plate", warnings);
   if (!options.plate_length_mm || !options.plate_width_mm || !plate.points.unit_known)
     return warnings;

@@ -65,7 +65,7 @@ void measure(const ArtefactCommand& command, const fs::path& file, ArtefactTest&
 }
 
 void print_ball(const BallFigures& ball) {
-  std::printf("%9.4f %9.4f ", ball.form_mm.all, ball.form_mm.trimmed);
+  std::printf("%9.6g %9.4f %9.4f ", 2 * ball.sphere.radius, ball.form_mm.all, ball.form_mm.trimmed);
   if (ball.size_mm) {
     std::printf("%+9.4f %+9.4f ", ball.size_mm->all, ball.size_mm->trimmed);
   } else {
@@ -75,15 +75,16 @@ void print_ball(const BallFigures& ball) {
 }
 
 constexpr const char* kBallHead =
-    "       PF   PF trim        PS   PS trim  coverage    points left out";
+    " diameter        PF   PF trim        PS   PS trim  coverage    points left out";
 
 void print_table(const ArtefactTest& test) {
   if (!test.plates.empty()) {
-    std::printf("        F    F trim  coverage    points left out  position\n");
+    std::printf("              sides         F    F trim  coverage    points left out  position\n");
     for (const PlateFigures& plate : test.plates) {
-      std::printf("%9.4f %9.4f %7.1f %% %9zu %8zu  %s\n", plate.flatness_mm.all,
-                  plate.flatness_mm.trimmed, 100 * plate.coverage, plate.points.points.size(),
-                  plate.left_out, plate.points.source.c_str());
+      std::printf("%8.5g x %8.5g %9.4f %9.4f %7.1f %% %9zu %8zu  %s\n", plate.surface.length_mm,
+                  plate.surface.width_mm, plate.flatness_mm.all, plate.flatness_mm.trimmed,
+                  100 * plate.coverage, plate.points.points.size(), plate.left_out,
+                  plate.points.source.c_str());
     }
     return;
   }
@@ -95,9 +96,14 @@ void print_table(const ArtefactTest& test) {
     }
     return;
   }
-  std::printf("       SD   SD trim  ball %s  position\n", kBallHead);
+  std::printf(" distance        SD   SD trim  ball %s  position\n", kBallHead);
   for (const BallBarFigures& bar : test.ball_bars) {
     for (std::size_t b = 0; b < bar.balls.size(); ++b) {
+      if (b == 0) {
+        std::printf("%9.6g ", bar.distance_mm.all);
+      } else {
+        std::printf("%9s ", "");
+      }
       if (b == 0 && bar.spacing_mm) {
         std::printf("%+9.4f %+9.4f ", bar.spacing_mm->all, bar.spacing_mm->trimmed);
       } else {
@@ -144,6 +150,8 @@ All in mm, after the manner of VDI/VDE 2634 part 3 and ISO 10360-13.
   PF        form: greatest minus least distance of the points to their least-squares sphere
   PS        size: diameter of that sphere minus --diameter
   SD        distance of the centres of spheres of --diameter, minus --length
+  diameter  of that sphere, distance of those centres, and sides of the plate's surface: as they
+            were measured, by which points in another unit are noticed
   F         flatness: greatest minus least distance of the points to their least-squares plane
   trim      with the worst 3 per mille of the points removed; elsewhere nothing is removed
   coverage  share of the artefact's surface within 1 % of its diameter (diagonal) of a point
