@@ -139,7 +139,9 @@ TEST_F(Newcomer, IsToldWhichOptionsWouldHaveNoEffect) {
       {reconstruct + "--no-depth --depth-maps", "--no-depth and --depth-maps do not go together"},
       {reconstruct + "--method linear --depth-maps", "--depth-maps needs --method joint"},
       {submit + "--no-mesh --mesh-formats obj", "--no-mesh and --mesh-formats do not go together"},
-      {submit + "--depth-maps --method multiview", "--depth-maps needs --method joint"}};
+      {submit + "--depth-maps --method multiview", "--depth-maps needs --method joint"},
+      {"artefact plate p.ply --length 300", "--length requires --width"},
+      {"artefact plate p.ply --width 300", "--width requires --length"}};
   for (const auto& [arguments, complaint] : mistakes) expect_bad(arguments, complaint);
   // What asks for no output is told, and what is wrong beside it stays the error.
   const std::pair<std::string, const char*> told[] = {
@@ -150,7 +152,16 @@ TEST_F(Newcomer, IsToldWhichOptionsWouldHaveNoEffect) {
       {simulate + "--contrast 0.3", "--contrast has no effect here: it needs --texture checker"},
       {simulate + "--texture none --texture-mm 3", "--texture-mm has no effect"},
       {simulate + "--roughness 0.1", "--roughness has no effect here: it needs --specular above 0"},
-      {reconstruct + "--multiview-cost published", "it needs --method multiview"}};
+      {reconstruct + "--multiview-cost published", "it needs --method multiview"},
+      {"sequence export --result r --zarr z --frames-per-second 5", "it needs --usd"},
+      {submit + "--limit 3", "--limit has no effect here: it needs --slurm"},
+      {"scan --captures c --rig r --out o --no-mesh --cell-mm 2", "it changes the mesh alone"},
+      {"artefact plate p.ply --overwrite", "--overwrite has no effect here: it needs --report"},
+      {"artefact plate p.ply --surface mesh", "--surface has no effect here: it needs a result"},
+      {"capture --rig r --lab l --out o --overwrite", "it needs --test"},
+      {"rig check --rig r --overwrite", "it needs --put-back"},
+      {"rig ring --out none/r.json --lines vertical --horizontal-elevation-deg 30 --pitch-px 3",
+       "it needs a projector of horizontal lines"}};
   for (const auto& [arguments, warning] : told) {
     const Outcome outcome = run(arguments);
     EXPECT_EQ(outcome.code, 2) << arguments;

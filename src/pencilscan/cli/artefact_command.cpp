@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
@@ -246,10 +247,12 @@ std::shared_ptr<ArtefactCommand> add_artefact(CLI::App& group, Artefact artefact
         ->check(above_zero());
   }
   if (artefact == Artefact::kPlate) {
-    add_positive(*command, "--length", sizes.plate_length_mm,
-                 "Of the plate, mm: with --width for the coverage");
-    add_positive(*command, "--width", sizes.plate_width_mm,
-                 "Of the plate, mm: with --length for the coverage");
+    CLI::Option* length = add_positive(*command, "--length", sizes.plate_length_mm,
+                                       "Of the plate, mm: with --width for the coverage");
+    CLI::Option* width = add_positive(*command, "--width", sizes.plate_width_mm,
+                                      "Of the plate, mm: with --length for the coverage");
+    length->needs(width);
+    width->needs(length);
     CLI::Option* thickness =
         add_positive(*command, "--thickness", sizes.plate_thickness_mm,
                      "Of the plate, mm, where more than one face was measured: takes the face that "
@@ -270,12 +273,20 @@ std::shared_ptr<ArtefactCommand> add_artefact(CLI::App& group, Artefact artefact
       ->add_option("--surface", options->surface,
                    "Of a result folder: points (points.ply) or mesh (mesh_measured.ply)")
       ->check(one_of({"points", "mesh"}))
+      ->check(told_where_not(
+          "--surface",
+          [options] {
+            return std::any_of(options->files.begin(), options->files.end(),
+                               [](const std::string& file) { return fs::is_directory(file); });
+          },
+          "needs a result folder"))
       ->capture_default_str();
   command->add_option("--rig", options->rig_path,
                       "Where the cameras are, for errors against their sigma; default: the "
                       "devices.json of a result folder");
-  command->add_option("--report", options->report_path, "Also write this HTML page");
-  add_overwrite(*command, options->overwrite, "Replace a report that is there");
+  CLI::Option* report =
+      command->add_option("--report", options->report_path, "Also write this HTML page");
+  add_overwrite(*command, options->overwrite, "Replace a report that is there", report);
   add_common_options(*command, options->common, example);
   command->callback([options] { run_artefact(*options); });
   return options;

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <filesystem>
 #include <iostream>
 #include <memory>
@@ -29,6 +30,7 @@ struct CalibrateCommand {
   std::size_t max_tracks = GrayTrackOptions{}.max_tracks;
   double focal_tolerance_percent = 100 * GivenTolerance{}.focal;
   double center_tolerance_px = GivenTolerance{}.center_px;
+  bool has_tolerance = false;  ///< one was given
   bool keep_unusable = false;
   bool overwrite = false;
 };
@@ -132,6 +134,9 @@ void run_calibrate(const CalibrateCommand& command) {
   const Stopwatch watch;
   check_command(command);
   const UncalibratedRig devices = read_devices(command.devices);
+  if (command.has_tolerance && std::none_of(devices.given.begin(), devices.given.end(),
+                                            [](const auto& given) { return given.K; }))
+    warn_of("--focal-tolerance and --center-tolerance have no effect here: no device has a K");
   CapturesOptions options;
   options.distance = known_distance(command, devices.rig);
   options.board = command.board;
@@ -189,24 +194,29 @@ void add_calibrate_command(CLI::App& app) {
   command->add_option("--max-tracks", options->max_tracks, "Surface points to use at most")
       ->check(between<std::size_t>(200, 1000000))
       ->capture_default_str();
-  command
-      ->add_option("--focal-tolerance", options->focal_tolerance_percent,
-                   "How far off given focal lengths may be, one standard deviation in per cent; 0: "
-                   "they are exact")
-      ->check(between(0.0, 100 * GivenTolerance::kMostFocal))
-      ->capture_default_str();
-  command
-      ->add_option("--center-tolerance", options->center_tolerance_px,
-                   "The same of given principal points, px")
-      ->check(between(0.0, GivenTolerance::kMostCenterPx))
-      ->capture_default_str();
+  CLI::Option* focal =
+      command
+          ->add_option(
+              "--focal-tolerance", options->focal_tolerance_percent,
+              "How far off given focal lengths may be, one standard deviation in per cent; 0: "
+              "they are exact")
+          ->check(between(0.0, 100 * GivenTolerance::kMostFocal))
+          ->capture_default_str();
+  CLI::Option* center = command
+                            ->add_option("--center-tolerance", options->center_tolerance_px,
+                                         "The same of given principal points, px")
+                            ->check(between(0.0, GivenTolerance::kMostCenterPx))
+                            ->capture_default_str();
   command->add_flag("--keep-unusable", options->keep_unusable,
                     "Write an unusable rig, too: rig.unusable.json for --out rig.json");
   command->add_flag("--overwrite", options->overwrite, "Replace an earlier rig and its report");
   add_common_options(*command, options->common,
                      "pencilscan calibrate --captures pose1 --captures pose2 --devices "
                      "devices.json --known-distance cam0 cam1 850 --out rig.json");
-  command->callback([options] { run_calibrate(*options); });
+  command->callback([options, focal, center] {
+    options->has_tolerance = focal->count() + center->count() > 0;
+    run_calibrate(*options);
+  });
 }
 
 }  // namespace pencilscan::cli

@@ -270,7 +270,7 @@ void add_capture_command(CLI::App& app) {
       command->add_option("--test", options->test_to,
                           "Flash the projectors instead: who sees whom, delays, flicker; writes "
                           "lab.json with them, also the one of --lab");
-  add_overwrite(*command, options->overwrite, "With --test: replace a file that is there");
+  add_overwrite(*command, options->overwrite, "With --test: replace a file that is there", test);
   CLI::Option* list =
       command->add_flag("--list", options->list, "List the cameras that answer instead");
   excludes_all_but(

@@ -90,8 +90,12 @@ void add_common_options(CLI::App& command, CommonOptions& options, const std::st
   command.footer("Example:\n  " + example);
 }
 
-void add_overwrite(CLI::App& command, bool& overwrite, const std::string& text) {
-  command.add_flag("--overwrite", overwrite, text);
+void add_overwrite(CLI::App& command, bool& overwrite, const std::string& text,
+                   const CLI::Option* of) {
+  CLI::Option* option = command.add_flag("--overwrite", overwrite, text);
+  if (of != nullptr)
+    option->check(told_where_not(
+        "--overwrite", [of] { return of->count() > 0; }, "needs " + of->get_name()));
 }
 
 void warn_of(const std::optional<std::string>& warning) {

@@ -21,8 +21,10 @@ struct CommonOptions {
 
 /// Adds --threads, --seed, --json to a command, and an example to its help.
 void add_common_options(CLI::App& command, CommonOptions& options, const std::string& example);
-/// Adds --overwrite, without which no file is replaced: see refuse_existing().
-void add_overwrite(CLI::App& command, bool& overwrite, const std::string& text);
+/// Adds --overwrite, without which no file is replaced: see refuse_existing(). Where nothing would
+/// be written without the option `of`, which was added before, it is told to have no effect.
+void add_overwrite(CLI::App& command, bool& overwrite, const std::string& text,
+                   const CLI::Option* of = nullptr);
 
 /// Progress on stderr, with the time that is probably left: a bar on a terminal, a line every few
 /// seconds elsewhere. Ctrl-C prints a last line: how far it was, and `if_interrupted`, what that

@@ -71,6 +71,24 @@ void set_patterns(const RingCommand& command, RingOptions& ring) {
   for (const double roll : command.rolls_deg) ring.rolls_rad.push_back(roll * kDegree);
 }
 
+/// Of what goes round the projectors and was given for more of them than there are.
+template <class Value>
+void warn_of_left_over(const std::string& option, const std::vector<Value>& values,
+                       const std::vector<Value>& of_default, int projectors) {
+  const auto used = static_cast<std::size_t>(projectors);
+  if (values.size() <= used || values == of_default) return;
+  warn_of(option + ": " + std::to_string(values.size()) + " values for " + std::to_string(used) +
+          " projectors, those after them have no effect");
+}
+
+/// Whether a projector has such lines.
+bool has_lines(const RingCommand& command, const char* which) {
+  const std::size_t used =
+      std::min(command.lines.size(), static_cast<std::size_t>(command.ring.projectors));
+  const auto end = command.lines.begin() + static_cast<std::ptrdiff_t>(used);
+  return std::find(command.lines.begin(), end, which) != end;
+}
+
 void run_ring(RingCommand command) {
   const ThreadLimit threads(command.common.threads);
   RingOptions& ring = command.ring;
@@ -89,6 +107,9 @@ void run_ring(RingCommand command) {
   ring.vertical_elevation_rad = command.vertical_elevation_deg * kDegree;
   ring.horizontal_elevation_rad = command.horizontal_elevation_deg * kDegree;
   set_patterns(command, ring);
+  warn_of_left_over("--lines", command.lines, RingCommand().lines, ring.projectors);
+  warn_of_left_over("--colors", command.colors, RingCommand().colors, ring.projectors);
+  warn_of_left_over("--roll-deg", command.rolls_deg, RingCommand().rolls_deg, ring.projectors);
   write_rig(make_ring(ring), command.out);
   print_figures(command.common, {{"rig", command.out},
                                  {"cameras", ring.cameras},
@@ -111,10 +132,20 @@ void add_ring(CLI::App& group) {
              "Radius of the working volume");
   add_number(*command, "--arc-deg", options->arc_deg, 1, 360, "Part of the circle to use");
   add_number(*command, "--camera-elevation-deg", options->camera_elevation_deg, -80, 80, "Cameras");
+  command->add_option("--lines", options->lines, "Lines of the projectors in turn")
+      ->check(one_of({"vertical", "horizontal"}))
+      ->capture_default_str();
+  const auto of_lines = [options](const char* option, const char* which) {
+    return told_where_not(
+        option, [options, which] { return has_lines(*options, which); },
+        std::string("needs a projector of ") + which + " lines");
+  };
   add_number(*command, "--vertical-elevation-deg", options->vertical_elevation_deg, -80, 80,
-             "Projectors of vertical lines");
+             "Projectors of vertical lines")
+      ->check(of_lines("--vertical-elevation-deg", "vertical"));
   add_number(*command, "--horizontal-elevation-deg", options->horizontal_elevation_deg, -80, 80,
-             "Projectors of horizontal lines: about 30 degrees off the cameras");
+             "Projectors of horizontal lines: about 30 degrees off the cameras")
+      ->check(of_lines("--horizontal-elevation-deg", "horizontal"));
   add_number(*command, "--camera-width", ring.camera_width, 16, 65536, "px");
   add_number(*command, "--camera-height", ring.camera_height, 16, 65536, "px");
   add_number(*command, "--camera-focal-px", ring.camera_focal_px, 1, 1e6, "px");
@@ -126,9 +157,6 @@ void add_ring(CLI::App& group) {
   add_number(*command, "--offset-px", ring.offset_px, -0.5, 1e5, "Centre of the first line");
   add_number(*command, "--order", ring.order, 1, 20,
              "Lines in a row whose colours tell where they are");
-  command->add_option("--lines", options->lines, "Lines of the projectors in turn")
-      ->check(one_of({"vertical", "horizontal"}))
-      ->capture_default_str();
   command->add_option("--colors", options->colors, "Colours of the projectors in turn, with commas")
       ->capture_default_str();
   command

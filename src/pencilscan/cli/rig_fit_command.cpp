@@ -50,11 +50,13 @@ void add_rig_fit_options(CLI::App& command, RigFitCommand& options) {
   add_number(command, "--frame-count", options.frame_count, 1, 1000,
              "Frames to look at, evenly picked")
       ->needs(frames);
-  command
-      .add_option("--put-back", options.put_back,
-                  "Write the rig with the devices that moved put back (rig.json)")
-      ->needs(frames);
-  add_overwrite(command, options.overwrite, "With --put-back: replace a rig file that is there");
+  CLI::Option* put_back =
+      command
+          .add_option("--put-back", options.put_back,
+                      "Write the rig with the devices that moved put back (rig.json)")
+          ->needs(frames);
+  add_overwrite(command, options.overwrite, "With --put-back: replace a rig file that is there",
+                put_back);
 }
 
 void run_rig_fit(const CommonOptions& common, const std::string& rig_path,

@@ -104,10 +104,12 @@ void add_scan_command(CLI::App& app) {
   command->add_option("--step", options->scan.step_px, "Measure every n-th pixel and row")
       ->check(between(1, 64))
       ->capture_default_str();
+  command->add_flag("--no-mesh", options->no_mesh, "Write points.ply only");
   command->add_option("--cell-mm", options->cell_mm, "Size of the mesh's cells; 0: from the points")
       ->check(zero_or_more())
+      ->check(told_where_not(
+          "--cell-mm", [options] { return !options->no_mesh; }, "changes the mesh alone"))
       ->capture_default_str();
-  command->add_flag("--no-mesh", options->no_mesh, "Write points.ply only");
   add_overwrite(*command, options->overwrite, "Replace an earlier result in --out");
   add_common_options(*command, options->common,
                      "pencilscan scan --captures captures --rig rig.json --out surface");

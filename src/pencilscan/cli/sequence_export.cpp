@@ -63,8 +63,9 @@ void add_sequence_export(CLI::App& group) {
   command->add_option("--zarr", options->zarr, "A Zarr group for Python (surface.zarr)");
   command->add_option("--usd", options->usd,
                       "USD text with time samples for Blender and Houdini (film.usda)");
-  add_number(*command, "--frames-per-second", options->frames_per_second, 0.001, 1e6,
-             "Of the film");
+  add_number(*command, "--frames-per-second", options->frames_per_second, 0.001, 1e6, "Of the film")
+      ->check(told_where_not(
+          "--frames-per-second", [options] { return !options->usd.empty(); }, "needs --usd"));
   command->add_flag("--measured", options->measured_only,
                     "What was measured, without what closes the surface");
   add_overwrite(*command, options->overwrite, "Replace files that are there");

@@ -222,7 +222,8 @@ void add_show_command(CLI::App& app) {
           ->check(only_where(
               [options, what] { return what->count() == 0 || options->what == "identify"; },
               "needs --what identify"));
-  add_overwrite(*command, options->overwrite, "With --assign: replace a file that is there");
+  add_overwrite(*command, options->overwrite, "With --assign: replace a file that is there",
+                assign);
   excludes_all_but(*command, *assign, {"--rig", "--what", "--overwrite"});
   excludes_all_but(*command, *list, {});
   add_common_options(*command, options->common, "pencilscan show --rig rig.json --what identify");
