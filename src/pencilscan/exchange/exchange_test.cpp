@@ -207,6 +207,23 @@ distortion_coefficients:
   EXPECT_FALSE(rig.given[1].pose);  // head: nobody says where it stands
 }
 
+TEST_F(Exchange, CoefficientsOfOtherLensModelsAreRefused) {
+  for (const char* model : {"distortion_model: equidistant", "camera_model: omni", "xi: 1.2",
+                            "fisheye_model: 1", "distortion_model: plumb_bob"}) {
+    const fs::path file =
+        write("lens.yml", std::string("image_width: 640\nimage_height: 480\n") + model +
+                              "\ncamera_matrix:\n  rows: 3\n  cols: 3\n"
+                              "  data: [700, 0, 320, 0, 701, 240, 0, 0, 1]\n");
+    ExchangedRig files;
+    const auto read = [&] { read_opencv(file, {}, files); };
+    if (std::string(model).ends_with("plumb_bob")) {
+      EXPECT_NO_THROW(read());
+    } else {
+      expect_bad(read, "must be a pinhole with k1 k2 p1 p2 k3");
+    }
+  }
+}
+
 TEST_F(Exchange, BaseKeepsPatternsAndTakesValuesOver) {
   Device found = rig_.cameras[0];
   found.K(0, 0) = 911;

@@ -274,8 +274,17 @@ bool read_single(const OpencvReader& file, ExchangedRig& rig) {
   if (d.device.name.empty()) d.device.name = std::filesystem::path(file.path()).stem().string();
   d.device.K = file.camera_matrix(K);
   d.given.K = true;
-  const std::string model = file.text({"distortion_model", "camera_model"});
-  if (model == "equidistant" || model == "fisheye" || !file.find({"fisheye_model"}).empty()) {
+  // What other lens models are called, whose coefficients would be read as k1 k2 p1 p2; xi is that
+  // of cv::omnidir and of Mei's model.
+  constexpr std::array kOtherModels = {
+      "equidistant", "fisheye", "kannala_brandt", "equi", "omni", "mei", "eucm", "ds", "fov"};
+  for (const char* key : {"distortion_model", "camera_model"}) {
+    const std::string model = file.text({key});
+    if (std::find(kOtherModels.begin(), kOtherModels.end(), model) != kOtherModels.end())
+      file.fail(key, model, "must be a pinhole with k1 k2 p1 p2 k3");
+  }
+  if (!file.find({"xi"}).empty()) file.fail("xi", "", "must be a pinhole with k1 k2 p1 p2 k3");
+  if (!file.find({"fisheye_model"}).empty()) {
     const cv::FileNode flag = file.find({"fisheye_model"});
     if (flag.empty() || static_cast<int>(flag) != 0)
       file.fail("distortion_model", "fisheye", "must be a pinhole with k1 k2 p1 p2 k3");
