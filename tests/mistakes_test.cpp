@@ -171,6 +171,21 @@ TEST_F(Newcomer, IsToldWhichOptionsWouldHaveNoEffect) {
   }
 }
 
+TEST_F(Newcomer, IsToldWhichValuesAreOfNoDevice) {
+  const std::string ring = "rig ring --overwrite --out ring.json --projectors 2 ";
+  EXPECT_EQ(run(ring).error, "");
+  EXPECT_EQ(run(ring + "--colors red,blue --colors green,cyan").error, "");
+  EXPECT_THAT(run(ring + "--colors red,blue --colors green,cyan --colors red,white").error,
+              HasSubstr("--colors: 3 values for 2 projectors"));
+  EXPECT_THAT(run(ring + "--roll-deg 1 --roll-deg 2 --roll-deg 3").error, HasSubstr("--roll-deg"));
+  write("d.json", R"({"format": "rig/1", "unit": "mm",)"
+                  R"( "cameras": [{"name": "cam0", "width": 64, "height": 48}],)"
+                  R"( "projectors": [{"name": "proj0", "width": 64, "height": 48}]})");
+  const std::string calibrate = "calibrate --captures none --devices d.json --out c/rig.json ";
+  EXPECT_THAT(run(calibrate).error, Not(HasSubstr("no effect")));
+  EXPECT_THAT(run(calibrate + "--focal-tolerance 1").error, HasSubstr("no device has a K"));
+}
+
 TEST_F(Newcomer, IsToldThatAMosaicOfTheRigStandsAboveThatOfTheSimulator) {
   const std::string simulate = small_scene();
   EXPECT_THAT(run(simulate + "--interpolated RGGB --out a").error, Not(HasSubstr("no effect")));
