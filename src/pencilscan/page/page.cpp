@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <array>
+#include <optional>
 #include <utility>
 
 #include "pencilscan/core/counted_progress.h"
 #include "pencilscan/core/error.h"
+#include "pencilscan/core/name_list.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/io/file.h"
 #include "pencilscan/page/advice.h"
@@ -215,6 +217,33 @@ ExperimentDetail experiment_detail(const PageData& data, std::size_t max_bytes) 
 
 }  // namespace
 
+namespace {
+
+/// Nothing in a folder belongs to a result: it is not the one that was meant.
+void require_some_used(const fs::path& given, const std::vector<ResultEntry>& results,
+                       fs::path ResultEntry::*used, const char* rule) {
+  if (given.empty() || results.empty()) return;
+  const bool is_used = std::any_of(results.begin(), results.end(), [&](const ResultEntry& entry) {
+    return !(entry.*used).empty();
+  });
+  if (!is_used)
+    throw InputError(given.string(), "", "",
+                     rule + std::string(", as of result ") + results.front().name);
+}
+
+/// "3 (000001, ...) have no mesh in this folder" of results without what others have there.
+std::optional<std::string> lacking(const std::vector<ResultEntry>& results, const fs::path& given,
+                                   fs::path ResultEntry::*used, const char* what) {
+  if (given.empty()) return std::nullopt;
+  std::vector<std::string> names;
+  for (const ResultEntry& entry : results)
+    if ((entry.*used).empty()) names.push_back(entry.name);
+  if (names.empty()) return std::nullopt;
+  return given.string() + " has no " + what + " of " + counted_names(names) + " of the results";
+}
+
+}  // namespace
+
 PageData::PageData(const fs::path& root, const PageOptions& options) : options_(options) {
   for (const fs::path& path :
        {options.sources.rig, options.sources.frames, options.sources.truth}) {
@@ -222,6 +251,10 @@ PageData::PageData(const fs::path& root, const PageOptions& options) : options_(
       throw InputError(path.string(), "", "", "no such file or folder");
   }
   folder_ = find_results(root, options.sources);
+  require_some_used(options.sources.truth, folder_.results, &ResultEntry::truth,
+                    "must be a mesh, or hold mesh.ply or <frame>/mesh.ply");
+  require_some_used(options.sources.frames, folder_.results, &ResultEntry::captured,
+                    "must hold <frame>/ with the pictures");
   experiment_ = find_experiment(root);
   if (experiment_) {  // what the page shows whole need not be named
     std::erase_if(experiment_->runs, [&](const fs::path& run) {
@@ -341,6 +374,11 @@ PageReport write_report(const fs::path& root, const fs::path& file, const PageOp
       report.missing.push_back(data.folder().results[i].name + ": " + missing.what + ": " +
                                missing.why);
   }
+  const ResultSources& given = options.sources;
+  for (const auto& lack :
+       {lacking(data.folder().results, given.truth, &ResultEntry::truth, "mesh"),
+        lacking(data.folder().results, given.frames, &ResultEntry::captured, "pictures")})
+    if (lack) report.missing.push_back(*lack);
   if (experiment) {
     for (const auto& missing : experiment->json["missing"])
       report.missing.push_back(missing["what"].get<std::string>() + ": " +

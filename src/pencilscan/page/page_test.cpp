@@ -12,6 +12,7 @@
 #include <random>
 
 #include "pencilscan/core/error.h"
+#include "pencilscan/core/error_of.h"
 #include "pencilscan/io/temporary_folder.h"
 #include "pencilscan/labeling/point_file.h"
 #include "pencilscan/page/advice.h"
@@ -442,6 +443,39 @@ TEST_F(Folder, ATruthAddsDistancesAndFigures) {
   EXPECT_TRUE(ReadBlock(*reader->part("points")).header["arrays"].contains("distance"));
   options.sources.truth = "none.ply";
   EXPECT_THROW(PageData(root_, options), InputError);
+}
+
+TEST_F(Folder, ARigOfOtherPointsIsTold) {
+  sample::write_output(root_, 1);
+  static_cast<void>(report({}));
+  EXPECT_THAT(last_.missing, Not(Contains(HasSubstr("json: "))));
+  Rig other = sample::rig();
+  for (Camera& camera : other.cameras) camera.K(0, 0) *= 1.2;
+  write_rig(other, root_ / "other.json");
+  PageOptions options;
+  options.sources.rig = root_ / "other.json";
+  static_cast<void>(report(options));
+  EXPECT_THAT(last_.missing, Contains(HasSubstr("other.json: ")));
+}
+
+TEST_F(Folder, WhatBelongsToNoResultIsNoTruthAndNoCapture) {
+  sample::write_output(root_ / "out", 2);
+  fs::create_directories(root_ / "scene");
+  PageOptions options;
+  const auto data = [&] { return PageData(root_ / "out", options); };
+  options.sources.truth = root_ / "scene";
+  EXPECT_THAT(error_of(data), HasSubstr("scene: must be a mesh, or hold mesh.ply or <frame>/mesh"));
+  options.sources.truth.clear();
+  options.sources.frames = root_ / "scene";
+  EXPECT_THAT(error_of(data), HasSubstr("scene: must hold <frame>/ with the pictures"));
+  const std::string first = find_results(root_ / "out").results.at(0).name;
+  fs::create_directories(root_ / "scene" / first);
+  EXPECT_EQ(error_of(data), "");
+  options.sources.truth = root_ / "scene";
+  write_mesh(root_ / "scene" / first / "mesh.ply", sample::ball());
+  const PageReport made = write_report(root_ / "out", root_ / "page.html", options, {});
+  EXPECT_THAT(made.missing, Contains(HasSubstr("scene has no mesh of 1 (")));
+  EXPECT_THAT(made.missing, Contains(HasSubstr("scene has no pictures of 1 (")));
 }
 
 }  // namespace

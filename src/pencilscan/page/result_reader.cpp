@@ -243,6 +243,23 @@ bool ResultReader::is_truth(const RayScene& truth) {
   return !warning;
 }
 
+/// Where the points are hardly those of this rig, whose cameras show them.
+void ResultReader::note_other_rig() {
+  const auto* points = rig_ == nullptr || detail_.shape_only ? nullptr : files_.points();
+  if (points == nullptr) return;
+  const auto camera = [](const MeasuredPoint& a, const MeasuredPoint& b) {
+    return a.camera < b.camera;
+  };
+  const auto last = std::max_element(points->begin(), points->end(), camera);
+  if (last == points->end()) return;
+  const std::optional<std::string> warning =
+      last->camera < rig_->cameras.size()
+          ? other_rig_warning(*rig_, *points)
+          : "the points are of camera " + std::to_string(last->camera) +
+                " and the rig's last one is " + std::to_string(rig_->cameras.size() - 1);
+  if (warning) note(files_.entry().rig.string(), *warning, Flaw::kDoubtful);
+}
+
 ordered_json ResultReader::details() {
   ordered_json result;
   if (const json* report = files_.report()) {
@@ -254,6 +271,7 @@ ordered_json ResultReader::details() {
   if (const json* timing = files_.timing()) result["timing"] = *timing;
   const RayScene* truth = files_.truth();
   const bool has_truth = truth != nullptr && is_truth(*truth);
+  note_other_rig();
   for (const Missing& m : missing_) {  // `view` makes its index before it knows
     if (m.kind == Flaw::kDoubtful)
       result["doubts"].push_back({{"what", m.what}, {"why", m.why}, {"kind", to_string(m.kind)}});

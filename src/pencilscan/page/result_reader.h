@@ -60,6 +60,7 @@ class ResultReader {
   [[nodiscard]] nlohmann::ordered_json histograms(bool has_truth);
   /// Notes a true mesh that can hardly be that of the result; false then.
   [[nodiscard]] bool is_truth(const RayScene& truth);
+  void note_other_rig();
   void note(const std::string& what, const std::string& why, Flaw kind);
   void note_missing_files();
 
