@@ -104,6 +104,7 @@ void warn_of(const std::optional<std::string>& warning) {
 
 void warn_of_rig(const Rig& rig) {
   warn_of(pose_unit_warning(rig));
+  warn_of(shared_pose_warning(rig));
   warn_of(volume_unit_warning(rig));
   warn_of(pose_convention_warning(rig));
   warn_of(intrinsics_convention_warning(rig));

@@ -11,12 +11,14 @@
 #include "pencilscan/cli/device_arguments.h"
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/name_list.h"
+#include "pencilscan/evaluation/truth_check.h"
 #include "pencilscan/exchange/colmap_model.h"
 #include "pencilscan/exchange/opencv_file.h"
 #include "pencilscan/exchange/unheld.h"
 #include "pencilscan/io/file.h"
 #include "pencilscan/io/image.h"
 #include "pencilscan/labeling/point_file.h"
+#include "pencilscan/planning/conventions.h"
 #include "pencilscan/planning/units.h"
 #include "pencilscan/report/rig_picture.h"
 #include "pencilscan/rig/device_list.h"
@@ -162,6 +164,7 @@ void run_import(const ImportCommand& command) {
     note(missing + ": the file is for calibrate --devices, no rig yet");
   else if (const auto warning = pose_unit_warning(only_these(names, rig.rig)))
     warn_of(*warning + ": --unit says what the files are in");
+  if (missing.empty()) warn_of(shared_pose_warning(rig.rig));
   print_figures(command.common, {{"rig", command.out},
                                  {"cameras", rig.rig.cameras.size()},
                                  {"projectors", rig.rig.projectors.size()},
@@ -276,6 +279,8 @@ void run_export(const ExportCommand& command) {
     std::vector<MeasuredPoint> points;
     if (!command.points.empty()) points = read_points(command.points);
     write_colmap(rig, points, command.colmap);
+    if (const auto warning = other_rig_warning(rig, points))
+      warn_of(command.points + ": " + *warning);
     if (points.size() > kMostColmapPoints)
       note("points3D.txt holds " + std::to_string(kMostColmapPoints) + " of " +
            std::to_string(points.size()) + " points, evenly picked");

@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "pencilscan/core/formatted.h"
+#include "pencilscan/rig/device_list.h"
 
 namespace pencilscan {
 namespace {
@@ -146,6 +147,28 @@ std::optional<std::string> intrinsics_convention_warning(const Rig& rig) {
   for (const Camera& camera : rig.cameras) look(camera, true);
   for (const Projector& projector : rig.projectors) look(projector, false);
   return warning;
+}
+
+std::optional<std::string> shared_pose_warning(const Rig& rig) {
+  constexpr double kSame = 1e-9;  // of the numbers: copies, as far as files round them
+  // The pictures in plain light may be another camera's, named once more.
+  const auto measures = [&](std::size_t d) {
+    return d >= rig.cameras.size() || !rig.cameras[d].sees_texture_only;
+  };
+  for (std::size_t a = 0; a < device_count(rig); ++a) {
+    for (std::size_t b = 0; b < a; ++b) {
+      if (!measures(a) || !measures(b)) continue;
+      const RigidTransform& one = device_at(rig, a).device_from_world;
+      const RigidTransform& other = device_at(rig, b).device_from_world;
+      if ((one.rotation - other.rotation).norm() > kSame ||
+          (one.translation - other.translation).norm() > kSame * one.translation.norm())
+        continue;
+      return device_at(rig, b).name + " and " + device_at(rig, a).name +
+             " have the same R and t: two devices stand in two places; was the calibration of one "
+             "given to both?";
+    }
+  }
+  return std::nullopt;
 }
 
 }  // namespace pencilscan

@@ -20,4 +20,7 @@ namespace pencilscan {
 /// than OpenCV's, or of another model.
 [[nodiscard]] std::optional<std::string> intrinsics_convention_warning(const Rig& rig);
 
+/// Two devices in the same place that look the same way: one's calibration was given to both.
+[[nodiscard]] std::optional<std::string> shared_pose_warning(const Rig& rig);
+
 }  // namespace pencilscan

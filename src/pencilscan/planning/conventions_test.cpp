@@ -49,6 +49,17 @@ TEST(PoseConvention, OtherReadingsAreNamed) {
   }
 }
 
+TEST(SharedPose, OfTwoDevicesIsNamed) {
+  Rig rig = make_ring({});
+  EXPECT_FALSE(shared_pose_warning(rig));
+  rig.cameras[3].device_from_world = rig.cameras[1].device_from_world;
+  EXPECT_THAT(shared_pose_warning(rig).value_or(""), HasSubstr("cam1 and cam3 have the same R"));
+  rig.cameras[3].device_from_world.translation.x() += 0.1;
+  EXPECT_FALSE(shared_pose_warning(rig));
+  rig.cameras[3].device_from_world = rig.projectors[0].device_from_world;
+  EXPECT_THAT(shared_pose_warning(rig).value_or(""), HasSubstr("cam3 and proj0"));
+}
+
 TEST(IntrinsicsConvention, OtherUnitsAreNamed) {
   EXPECT_FALSE(intrinsics_convention_warning(make_ring({})));
   Rig rig = make_ring({});

@@ -77,6 +77,7 @@ class Collector {
 
   void check_conventions() {
     if (auto warning = pose_unit_warning(rig_)) warn(false, "unit", *std::move(warning));
+    if (auto warning = shared_pose_warning(rig_)) warn(true, "same_pose", *std::move(warning));
     if (auto warning = pose_convention_warning(rig_)) warn(true, "convention", *std::move(warning));
     if (auto warning = intrinsics_convention_warning(rig_))
       warn(true, "convention", *std::move(warning));

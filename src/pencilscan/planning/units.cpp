@@ -142,6 +142,7 @@ std::optional<std::string> pose_unit_warning(const Rig& rig) {
           std::max(farthest, (device_at(rig, a).center() - device_at(rig, b).center()).norm());
   }
   if (farthest >= kNearestMm && farthest <= kFarthestMm) return std::nullopt;
+  if (!(farthest > 0)) return std::nullopt;  // that is no matter of units
   std::string text = "the devices that are farthest apart are so by " + rounded(farthest) + " mm";
   text += farthest < kNearestMm ? ": t is probably in metres: multiply it by 1000"
                                 : ": t is probably in micrometres: multiply it by 0.001";
