@@ -251,8 +251,10 @@ std::shared_ptr<ArtefactCommand> add_artefact(CLI::App& group, Artefact artefact
                                        "Of the plate, mm: with --width for the coverage");
     CLI::Option* width = add_positive(*command, "--width", sizes.plate_width_mm,
                                       "Of the plate, mm: with --length for the coverage");
-    length->needs(width);
-    width->needs(length);
+    length->check(told_where_not(
+        "--length", [width] { return width->count() > 0; }, "needs --width"));
+    width->check(told_where_not(
+        "--width", [length] { return length->count() > 0; }, "needs --length"));
     CLI::Option* thickness =
         add_positive(*command, "--thickness", sizes.plate_thickness_mm,
                      "Of the plate, mm, where more than one face was measured: takes the face that "
