@@ -1,6 +1,5 @@
 #include "pencilscan/artefact/coverage.h"
 
-#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
@@ -9,6 +8,7 @@
 #include <optional>
 #include <vector>
 
+#include "pencilscan/geometry/least_squares.h"
 #include "pencilscan/surface/point_grid.h"
 
 namespace pencilscan {
@@ -167,7 +167,7 @@ Vec3 step_inwards(const PlateRectangle& now, std::span<const Vec3> points, doubl
   }
   if (rest.isZero(0)) return Vec3::Zero();
   squares.diagonal().array() += 1e-3 * squares.trace();  // where one side alone has points
-  return -squares.ldlt().solve(rest);
+  return -solve_symmetric(squares, rest);
 }
 
 }  // namespace

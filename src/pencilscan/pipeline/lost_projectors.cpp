@@ -7,6 +7,7 @@
 
 #include "pencilscan/core/evenly_picked.h"
 #include "pencilscan/core/median.h"
+#include "pencilscan/geometry/least_squares.h"
 #include "pencilscan/pipeline/projector_places.h"
 
 namespace pencilscan {
@@ -122,8 +123,8 @@ class CloseFit {
     for (int round = 0; round < kRounds; ++round) {
       const Equations at = equations(pose.correction, lines);
       pose.scale = std::max(kLeastScale, at.deviation);
-      Eigen::Matrix<double, 6, 6> normal = Eigen::Matrix<double, 6, 6>::Zero();
-      Eigen::Matrix<double, 6, 1> right = Eigen::Matrix<double, 6, 1>::Zero();
+      Mat6 normal = Mat6::Zero();
+      Vec6 right = Vec6::Zero();
       for (const Equation& e : at.all) {
         const double weight = 1 / (1 + std::pow(e.residual / (kLossScale * pose.scale), 2));
         normal += weight * e.row.transpose() * e.row;
@@ -131,7 +132,7 @@ class CloseFit {
       }
       // The step along the lines, which nothing tells, is none.
       normal.diagonal().array() += 1e-3;
-      const Eigen::Matrix<double, 6, 1> change = normal.ldlt().solve(right);
+      const Vec6 change = solve_symmetric(normal, right);
       pose.correction.rotation_px += change.head<3>();
       pose.correction.translation_mm += change.tail<3>();
     }

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -12,6 +11,7 @@
 #include <vector>
 
 #include "pencilscan/core/parallel.h"
+#include "pencilscan/geometry/least_squares.h"
 #include "pencilscan/refinement/correction.h"
 
 namespace pencilscan {
@@ -126,8 +126,8 @@ class PoseSearch {
       const double reach = step_ * (kFirstReach - (kFirstReach - 1) * round / (kRounds - 1));
       Device moved = device_;
       moved.device_from_world = corrected_pose(device_, correction);
-      Eigen::Matrix<double, 6, 6> normal = Eigen::Matrix<double, 6, 6>::Zero();
-      Eigen::Matrix<double, 6, 1> right = Eigen::Matrix<double, 6, 1>::Zero();
+      Mat6 normal = Mat6::Zero();
+      Vec6 right = Vec6::Zero();
       for (const PlaceOfLine& place : places_) {
         const Vec3 x = moved.device_from_world * place.position;
         const std::optional<Vec2> pixel = moved.project(place.position);
@@ -141,7 +141,7 @@ class PoseSearch {
       }
       // Of turn and shift a pixel or a footprint each, as far as nothing tells them apart.
       normal.diagonal().array() += 1;
-      const Eigen::Matrix<double, 6, 1> change = normal.ldlt().solve(right);
+      const Vec6 change = solve_symmetric(normal, right);
       correction.rotation_px += change.head<3>();
       correction.translation_mm += change.tail<3>();
     }
