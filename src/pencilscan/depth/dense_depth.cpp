@@ -250,53 +250,62 @@ std::vector<DepthOptions> by_radius(const DepthOptions& options) {
   return passes;
 }
 
-/// Nodes near labelled curves.
-void seed(const CameraLight& light, const CurveSeeds& seeds, const Background& background,
-          const DepthOptions& options, DepthMap& map, FittedWindows& fitted) {
+/// Fits the windows of nodes without depth, each from all of starts_of(pixel), and keeps the best
+/// fit. keep(pixel, fit, node) may refuse it, and marks the new node.
+template <class Starts, class Keep>
+void fit_nodes(const CameraLight& light, const Background& background, const DepthOptions& options,
+               DepthMap& map, FittedWindows& fitted, Starts starts_of, Keep keep) {
   WindowFitter fitter(light, options.half);
   const BackgroundView behind(light, background, options);
-  const ObjectSpace& space = background.space;
   for (std::size_t i = 0; i < map.nodes.size(); ++i) {
     if (map.nodes[i].measured()) continue;
     const Vec2 pixel = map.pixel(i);
     std::optional<WindowFit> best;
-    for (const Quadric& start : seeds.planes(pixel, options.seed_radius_px, options.half)) {
+    for (const Quadric& start : starts_of(pixel)) {
       const auto fit = fitter.fit(pixel, start, 5);
-      if (fit && acceptable(light, pixel, *fit, space, options.half, options) &&
+      if (fit && acceptable(light, pixel, *fit, background.space, options.half, options) &&
           (!best || cost(*fit) < cost(*best))) {
         best = fit;
       }
     }
-    if (!best || behind.shows(pixel, *best, fitter)) continue;
-    map.nodes[i] = node_of(*best, options.half, map.lit_sets);
-    map.nodes[i].seeded = true;
+    if (!best) continue;
+    DepthNode node = node_of(*best, options.half, map.lit_sets);
+    if (!keep(pixel, *best, node) || behind.shows(pixel, *best, fitter)) continue;
+    map.nodes[i] = node;
     fitted.add(i, best->information);
   }
 }
 
-/// Nodes whose rays meet the closed surface.
-void seed(const CameraLight& light, const RayScene& surface, const Background& background,
-          const DepthOptions& options, DepthMap& map, FittedWindows& fitted) {
+/// Nodes near labelled curves.
+void fit_at_curves(const CameraLight& light, const CurveSeeds& seeds, const Background& background,
+                   const DepthOptions& options, DepthMap& map, FittedWindows& fitted) {
+  const auto starts_of = [&](const Vec2& pixel) {
+    return seeds.planes(pixel, options.seed_radius_px, options.half);
+  };
+  const auto keep = [](const Vec2&, const WindowFit&, DepthNode& node) {
+    node.seeded = true;
+    return true;
+  };
+  fit_nodes(light, background, options, map, fitted, starts_of, keep);
+}
+
+/// Nodes whose rays meet the closed surface; what ends far from it is off by a line.
+void fit_at_surface(const CameraLight& light, const RayScene& surface, const Background& background,
+                    const DepthOptions& options, DepthMap& map, FittedWindows& fitted) {
   constexpr float kConfidence = 0.9F;  // of rendered objects' nodes, 96 % or more are right
   const Camera& camera = *light.camera;
-  WindowFitter fitter(light, options.half);
-  const BackgroundView behind(light, background, options);
-  const ObjectSpace& space = background.space;
-  for (std::size_t i = 0; i < map.nodes.size(); ++i) {
-    if (map.nodes[i].measured()) continue;
-    const Vec2 pixel = map.pixel(i);
-    const auto hit = surface.first_hit(camera.ray(pixel));
-    if (!hit) continue;
+  std::optional<RayScene::Hit> hit;  // of the pixel whose starts were asked for last
+  const auto starts_of = [&](const Vec2& pixel) -> std::vector<Quadric> {
+    hit = surface.first_hit(camera.ray(pixel));
+    if (!hit) return {};
     const Vec3 normal = face_normal(surface.mesh(), hit->face);
-    const Quadric start = quadric_of(TangentView(camera, hit->point, normal), options.half);
-    const auto fit = fitter.fit(pixel, start, 5);
-    if (!fit || !acceptable(light, pixel, *fit, space, options.half, options)) continue;
-    const double move = (camera.point_at_depth(pixel, 1 / fit->q[0]) - hit->point).norm();
-    if (move > options.max_move || behind.shows(pixel, *fit, fitter)) continue;
-    map.nodes[i] = node_of(*fit, options.half, map.lit_sets);
-    map.nodes[i].confidence = kConfidence;
-    fitted.add(i, fit->information);
-  }
+    return {quadric_of(TangentView(camera, hit->point, normal), options.half)};
+  };
+  const auto keep = [&](const Vec2& pixel, const WindowFit& fit, DepthNode& node) {
+    node.confidence = kConfidence;
+    return (camera.point_at_depth(pixel, 1 / fit.q[0]) - hit->point).norm() <= options.max_move;
+  };
+  fit_nodes(light, background, options, map, fitted, starts_of, keep);
 }
 
 void grow(const CameraLight& light, const Background& background, const DepthOptions& options,
@@ -368,7 +377,7 @@ DepthMap dense_depth(const CameraLight& light, int camera, std::span<const Measu
   std::vector<FittedWindows> passes;
   for (const DepthOptions& pass : by_radius(options)) {
     FittedWindows& fitted = passes.emplace_back(FittedWindows{pass.half, {}, {}});
-    seed(light, seeds, background, pass, map, fitted);
+    fit_at_curves(light, seeds, background, pass, map, fitted);
     grow(light, background, pass, map, fitted);
   }
   for (const FittedWindows& fitted : passes) share_bends(fitted, map);
@@ -383,7 +392,7 @@ std::size_t complete_map(const CameraLight& light, const RayScene& surface,
   std::vector<FittedWindows> passes;
   for (const DepthOptions& pass : by_radius(options)) {
     FittedWindows& fitted = passes.emplace_back(FittedWindows{pass.half, {}, {}});
-    seed(light, surface, background, pass, map, fitted);
+    fit_at_surface(light, surface, background, pass, map, fitted);
   }
   std::size_t count = 0;
   for (const FittedWindows& fitted : passes) {
