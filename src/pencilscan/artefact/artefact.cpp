@@ -228,11 +228,12 @@ void require_size(const BallFigures& ball, const std::string& name, const Artefa
                    formatted(*options.diameter_mm, "%.6g") + advice);
 }
 
+constexpr double kUnitTolerance = 0.15;  // of the surface's sides: its rim may be missing
+
 /// Points of which both sides are a unit smaller than the stated ones are in that unit: of a plate
 /// a tenth of which was measured along both sides, nothing could be said anyway.
 void require_points_in_mm(const PlateFigures& plate, double length, double width,
                           const std::string& of_surface) {
-  constexpr double kUnitTolerance = 0.15;  // of the surface's sides: its rim may be missing
   const PlaneSurface& surface = plate.surface;
   if (!plate.points.unit_known || !(surface.width_mm > 0)) return;
   const UnitFactor* along =
@@ -258,7 +259,6 @@ void require_stated_sides(const PlateFigures& plate, const ArtefactOptions& opti
       formatted(surface.length_mm, "%.4g") + " x " + formatted(surface.width_mm, "%.4g");
   require_points_in_mm(plate, length, width, of_surface);
   if (surface.area_mm2 <= kFarBeyond * length * width) return;
-  constexpr double kUnitTolerance = 0.15;  // of the surface's sides: its rim may be missing
   const UnitFactor* unit = unit_behind_factor(
       std::sqrt(surface.length_mm * surface.width_mm / (length * width)), kUnitTolerance);
   const std::string why =

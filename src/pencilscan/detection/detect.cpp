@@ -37,17 +37,6 @@ cv::Rect lit_area(const cv::Mat& image) {
                           lit.width * kBlock + 2 * kMargin, lit.height * kBlock + 2 * kMargin);
 }
 
-/// Each pixel's colour times a matrix.
-cv::Mat transformed(const cv::Mat& colors, const Mat3& matrix) {
-  cv::Matx33f m;
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) m(i, j) = static_cast<float>(matrix(i, j));
-  }
-  cv::Mat result;
-  cv::transform(colors, result, m);
-  return result;
-}
-
 /// Unmixed light without the room's. Colours that were found in the light of both are found again.
 cv::Mat projector_light_alone(const Camera& camera, const Rig& rig,
                               const std::vector<ColorFamily>& families, const cv::Mat& rgb,
@@ -55,8 +44,8 @@ cv::Mat projector_light_alone(const Camera& camera, const Rig& rig,
   cv::Mat alone = without_room_light(rgb, pitch_px);
   if (camera.states_color_matrix()) return alone;
   const Mat3 back = unmixing.projector_from_camera.inverse();
-  unmixing = estimate_unmixing(camera, rig, families, transformed(alone, back));
-  return transformed(alone, unmixing.projector_from_camera * back);
+  unmixing = estimate_unmixing(camera, rig, families, mixed(alone, back));
+  return mixed(alone, unmixing.projector_from_camera * back);
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <system_error>
 
 #include "pencilscan/core/error.h"
+#include "pencilscan/io/partial_folder.h"
 
 namespace pencilscan {
 
@@ -14,10 +15,8 @@ void refuse_as_output(const std::string& option, const fs::path& input, const fs
   std::error_code ignored;
   if (fs::equivalent(input, out, ignored))
     throw InputError("--out", "", out.string(), "must not be that of " + option);
-  // With a slash behind it, a path ends with an empty name.
   const auto whole = [&](const fs::path& path) {
-    const fs::path resolved = fs::weakly_canonical(fs::absolute(path, ignored), ignored);
-    return resolved.has_filename() ? resolved : resolved.parent_path();
+    return fs::weakly_canonical(fs::absolute(bare_folder(path), ignored), ignored);
   };
   const fs::path read = whole(input), written = whole(out);
   const auto end = std::mismatch(read.begin(), read.end(), written.begin(), written.end());

@@ -215,10 +215,6 @@ ExperimentDetail experiment_detail(const PageData& data, std::size_t max_bytes) 
   return detail;
 }
 
-}  // namespace
-
-namespace {
-
 /// Nothing in a folder belongs to a result: it is not the one that was meant.
 void require_some_used(const fs::path& given, const std::vector<ResultEntry>& results,
                        fs::path ResultEntry::*used, const char* rule) {

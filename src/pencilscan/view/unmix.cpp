@@ -166,16 +166,19 @@ Unmixing estimate_unmixing(const Camera& camera, const Rig& rig,
   return result;
 }
 
-cv::Mat projector_light(const Camera& camera, const cv::Mat& linear, const Unmixing& unmixing,
-                        cv::Point corner) {
-  cv::Matx33f matrix;
+cv::Mat mixed(const cv::Mat& colors, const Mat3& matrix) {
+  cv::Matx33f m;
   for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j)
-      matrix(i, j) = static_cast<float>(unmixing.projector_from_camera(i, j));
+    for (int j = 0; j < 3; ++j) m(i, j) = static_cast<float>(matrix(i, j));
   }
   cv::Mat result;
-  cv::transform(linear, result, matrix);
-  return registered(camera, result, corner);
+  cv::transform(colors, result, m);
+  return result;
+}
+
+cv::Mat projector_light(const Camera& camera, const cv::Mat& linear, const Unmixing& unmixing,
+                        cv::Point corner) {
+  return registered(camera, mixed(linear, unmixing.projector_from_camera), corner);
 }
 
 cv::Mat presence_samples(const Camera& camera, const Unmixing& unmixing,

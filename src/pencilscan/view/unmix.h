@@ -21,6 +21,9 @@ struct Unmixing {
                                          const std::vector<ColorFamily>& families,
                                          const cv::Mat& image);
 
+/// Each pixel's colour times a matrix, CV_32FC3.
+[[nodiscard]] cv::Mat mixed(const cv::Mat& colors, const Mat3& matrix);
+
 /// Red, green and blue each where the camera's K, distortion and pose say (color_registration of
 /// the rig), CV_32FC3. `corner`: pixel of the camera that is the image's first. The image itself
 /// where the rig states nothing.
