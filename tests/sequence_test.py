@@ -260,6 +260,21 @@ class BumpedCamera(unittest.TestCase):
         fit = self.check(self.at("put_back.json"), frames, 0)
         self.assertEqual(fit["verdict"], "fits")
 
+    def test_rig_check_says_between_which_frames_a_camera_moved(self):
+        fit = self.check(self.at("ring.json"), self.at("frames"), 1)
+        self.assertEqual((fit["verdict"], fit["moved"]), ("moved meanwhile", ["cam1"]))
+        before, after = fit["periods"]
+        # Of 16 frames, eight are looked at.
+        self.assertEqual((before["first_frame"], before["last_frame"], before["verdict"]),
+                         ("000000", "000010", "fits"))
+        self.assertEqual((after["first_frame"], after["last_frame"], after["verdict"]),
+                         ("000012", "000015", "one moved"))
+        self.assertEqual(after["moved_before"], "cam1")
+        self.assertAlmostEqual(after["moved_before_px"], 0.5, delta=0.1)
+        # What is put back is how the rig stands now.
+        fit = self.check(self.at("put_back.json"), self.at("after/frames"), 0)
+        self.assertEqual(fit["verdict"], "fits")
+
     def test_rig_check_without_light_knows_nothing(self):
         dark = self.at("dark/000000")
         os.makedirs(dark)

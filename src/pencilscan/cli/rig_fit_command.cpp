@@ -4,29 +4,40 @@
 #include <cstdio>
 #include <iostream>
 #include <nlohmann/json.hpp>
+#include <string>
 #include <vector>
 
 #include "pencilscan/cli/arguments.h"
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/pipeline/frame_source.h"
-#include "pencilscan/pipeline/rig_fit.h"
+#include "pencilscan/pipeline/rig_periods.h"
 #include "pencilscan/pipeline/sensor_frame.h"
 
 namespace pencilscan::cli {
 namespace {
 
-std::vector<FrameCurves> curves_of(const Rig& rig, const FrameSource& frames, std::size_t wanted) {
+struct PickedFrames {
+  std::vector<FrameCurves> curves;
+  std::vector<std::string> names;
+};
+
+/// The curves of so many frames, evenly picked, the first and the last one among them.
+PickedFrames picked_frames(const Rig& rig, const FrameSource& frames, std::size_t wanted) {
   const Progress progress = stderr_progress();
   const std::size_t count = std::min(frames.size(), wanted);
-  std::vector<FrameCurves> curves;
+  PickedFrames picked;
   for (std::size_t i = 0; i < count; ++i) {
     progress("lines of the frames", static_cast<double>(i) / static_cast<double>(count));
-    PointResult detected = detect_stored_frame(rig, frames.read(rig, i * frames.size() / count));
-    curves.push_back({std::move(detected.families), std::move(detected.graphs)});
+    // Of one frame that is looked at, the last: what the rig is like now.
+    const std::size_t frame =
+        count == 1 ? frames.size() - 1 : i * (frames.size() - 1) / (count - 1);
+    PointResult detected = detect_stored_frame(rig, frames.read(rig, frame));
+    picked.curves.push_back({std::move(detected.families), std::move(detected.graphs)});
+    picked.names.push_back(frames.name(frame));
   }
   progress("crossings", 0);
-  return curves;
+  return picked;
 }
 
 void print_devices(const RigFit& fit) {
@@ -65,19 +76,28 @@ void run_rig_fit(const CommonOptions& common, const std::string& rig_path,
   const Rig rig = read_rig(rig_path);
   require_patterns(rig, rig_path, "there is nothing to see of this projector");
   const FrameSource frames = FrameSource::open(rig, options.frames);
-  const RigFit fit = check_rig_on_frames(rig, curves_of(rig, frames, options.frame_count));
-  print_devices(fit);
-  nlohmann::ordered_json report = rig_fit_json(fit);
+  const PickedFrames picked = picked_frames(rig, frames, options.frame_count);
+  const std::vector<RigPeriod> periods = check_rig_over_frames(rig, picked.curves);
+  for (const RigPeriod& period : periods) {
+    if (periods.size() > 1) {
+      std::printf("frames %s to %s\n", picked.names[period.first].c_str(),
+                  picked.names[period.last].c_str());
+    }
+    print_devices(period.fit);
+  }
+  const RigFit& fit = periods.back().fit;  // how the rig stands now
+  nlohmann::ordered_json report = periods_json(periods, picked.names);
   write_figures(common, report);
   report.erase("devices");
+  report.erase("periods");
   print_figures({}, report);
   const bool is_known = fit.verdict == RigVerdict::kFits || fit.verdict == RigVerdict::kOneMoved ||
                         fit.verdict == RigVerdict::kSeveralMoved;
   if (is_known && !options.put_back.empty()) write_rig(fit.put_back, options.put_back);
-  if (fit.verdict != RigVerdict::kFits) {
-    throw StageError(fit.text + (is_known || options.put_back.empty()
-                                     ? ""
-                                     : "; " + options.put_back + " was not written"));
+  if (!fits(periods)) {
+    throw StageError(
+        describe_periods(periods, picked.names) +
+        (is_known || options.put_back.empty() ? "" : "; " + options.put_back + " was not written"));
   }
 }
 

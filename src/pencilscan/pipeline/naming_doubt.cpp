@@ -34,7 +34,16 @@ std::size_t unnamed_points(const GridGraph& graph, const Labeling& labeling, std
 
 }  // namespace
 
-NamingDoubt::NamingDoubt(const Rig& rig) : rig_(&rig), devices_(device_count(rig)), colors_(rig) {}
+NamingDoubt::NamingDoubt(const Rig& rig)
+    : rig_(&rig), devices_(device_count(rig)), sharing_(device_count(rig), 1), colors_(rig) {
+  for (const ColorFamily& family : color_families(rig)) {
+    const std::vector<std::size_t> projectors = projectors_of(family);
+    for (const std::size_t p : projectors) {
+      std::size_t& sharing = sharing_[rig.cameras.size() + p];
+      sharing = std::max(sharing, projectors.size());
+    }
+  }
+}
 
 void NamingDoubt::add(const std::vector<ColorFamily>& families, std::span<const GridGraph> graphs,
                       const Labeling& labeling) {
@@ -67,13 +76,15 @@ bool NamingDoubt::shows_lines(std::size_t projector) const {
   return static_cast<double>(devices_[first + projector].all()) >= kShown * usual;
 }
 
-bool NamingDoubt::lacks_names(std::size_t device, std::size_t sharing) const {
+bool NamingDoubt::lacks_names(std::size_t device) const {
   const TellingPoints& points = devices_[device];
-  return points.are_enough() && points.named_share() <= kMostNamed / static_cast<double>(sharing);
+  const double most = kMostNamed / static_cast<double>(sharing_[device]);
+  if (!points.are_enough() || points.named_share() > most) return false;
+  return device < rig_->cameras.size() || shows_lines(device - rig_->cameras.size());
 }
 
-std::string NamingDoubt::unnamed(std::size_t device, std::size_t sharing) const {
-  if (!lacks_names(device, sharing)) return {};
+std::string NamingDoubt::unnamed(std::size_t device) const {
+  if (!lacks_names(device)) return {};
   return "only " + formatted(100 * devices_[device].named_share(), "%.0f") + " % of the curves " +
          (device < rig_->cameras.size() ? "of camera " : "in the colours of projector ") +
          device_at(*rig_, device).name + " have a name";
@@ -83,21 +94,15 @@ std::vector<std::size_t> NamingDoubt::cameras() const {
   const std::vector<ShownColors> seen = colors_.seen();
   std::vector<std::size_t> cameras;
   for (std::size_t c = 0; c < rig_->cameras.size(); ++c)
-    if (lacks_names(c, 1) || seen[c].deny()) cameras.push_back(c);
+    if (lacks_names(c) || seen[c].deny()) cameras.push_back(c);
   return cameras;
 }
 
 std::string NamingDoubt::of_projectors() const {
-  // What has no name in a projector's colours may be of any projector that has them.
-  std::vector<std::size_t> sharing(rig_->projectors.size(), 1);
-  for (const ColorFamily& family : color_families(*rig_)) {
-    const std::vector<std::size_t> projectors = projectors_of(family);
-    for (const std::size_t p : projectors) sharing[p] = std::max(sharing[p], projectors.size());
-  }
   std::string text;
-  for (std::size_t p = 0; p < sharing.size(); ++p) {
-    const std::string lack = unnamed(rig_->cameras.size() + p, sharing[p]);
-    if (!lack.empty() && shows_lines(p)) add_name(text, lack, "; ");
+  for (std::size_t d = rig_->cameras.size(); d < devices_.size(); ++d) {
+    const std::string lack = unnamed(d);
+    if (!lack.empty()) add_name(text, lack, "; ");
   }
   const std::string projectors = denied();
   if (!projectors.empty())
@@ -109,7 +114,7 @@ std::string NamingDoubt::of_projectors() const {
 std::string NamingDoubt::text() const {
   std::string text;
   for (std::size_t c = 0; c < rig_->cameras.size(); ++c) {
-    const std::string lack = unnamed(c, 1);
+    const std::string lack = unnamed(c);
     if (!lack.empty()) add_name(text, lack, "; ");
   }
   const std::string projectors = of_projectors();

@@ -35,6 +35,10 @@ class NamingDoubt {
   [[nodiscard]] std::string text() const;
   /// Cameras most of whose curves have no name, or that colours deny.
   [[nodiscard]] std::vector<std::size_t> cameras() const;
+  /// Whether most curves of a camera, or most of what is drawn in a projector's colours, have no
+  /// name: of what may be of several projectors, a share as large. False for one that shows
+  /// nothing.
+  [[nodiscard]] bool lacks_names(std::size_t device) const;
   /// Of a camera, or in the colours of a projector.
   [[nodiscard]] const TellingPoints& telling(std::size_t device) const { return devices_[device]; }
 
@@ -42,11 +46,12 @@ class NamingDoubt {
   /// False where hardly anything is drawn in a projector's colours that may be its own: it shows
   /// nothing, wherever it stands.
   [[nodiscard]] bool shows_lines(std::size_t projector) const;
-  [[nodiscard]] bool lacks_names(std::size_t device, std::size_t sharing) const;
-  [[nodiscard]] std::string unnamed(std::size_t device, std::size_t sharing) const;
+  [[nodiscard]] std::string unnamed(std::size_t device) const;
 
   const Rig* rig_;
   std::vector<TellingPoints> devices_;  ///< cameras, then projectors: in the colours of each
+  /// How many may have drawn what has no name: those with a projector's colours; of cameras, one.
+  std::vector<std::size_t> sharing_;
   ShownColorCount colors_;
 };
 

@@ -2,61 +2,19 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <nlohmann/json.hpp>
-#include <utility>
 
 #include "pencilscan/core/formatted.h"
 #include "pencilscan/core/name_list.h"
 #include "pencilscan/pipeline/disagreement_warnings.h"
-#include "pencilscan/pipeline/line_naming.h"
+#include "pencilscan/pipeline/frame.h"
 #include "pencilscan/pipeline/lost_cameras.h"
 #include "pencilscan/pipeline/lost_projectors.h"
-#include "pencilscan/pipeline/naming_doubt.h"
 
 namespace pencilscan {
 namespace {
 
 using nlohmann::ordered_json;
-
-/// Labels of frames, and what their crossings and names say.
-struct NamedCrossings {
-  std::vector<CrossingTrack> tracks;
-  double labelled_share = 0;
-  NamingDoubt doubt;
-};
-
-std::vector<Labeling> labels_of(const Rig& rig, std::span<const FrameCurves> frames) {
-  std::vector<Labeling> labelings;
-  for (const FrameCurves& frame : frames) {
-    const PointOptions options;
-    const SolutionMethod& method = solution_method(options.method);
-    labelings.push_back(name_lines(rig, frame.families, frame.graphs,
-                                   method.solve(rig, frame.families, frame.graphs, options.method),
-                                   options)
-                            .labeling);
-  }
-  return labelings;
-}
-
-NamedCrossings named_crossings(const Rig& rig, std::span<const FrameCurves> frames,
-                               std::span<const Labeling> labelings) {
-  NamedCrossings result{crossing_tracks(rig, frames, labelings), 0,
-                        naming_doubt(rig, frames, labelings)};
-  std::size_t points = 0;
-  std::size_t labelled = 0;
-  for (std::size_t f = 0; f < frames.size(); ++f) {
-    labelled += labelled_points(labelings[f]);
-    for (const GridGraph& graph : frames[f].graphs) points += curve_points(graph);
-  }
-  if (points > 0)
-    result.labelled_share = static_cast<double>(labelled) / static_cast<double>(points);
-  return result;
-}
-
-std::string full_name(const DeviceFit& device) {
-  return (device.is_projector ? "projector " : "camera ") + device.name;
-}
 
 RigVerdict verdict_of(const RigFit& fit, std::size_t moved) {
   if (!are_enough(fit.before)) return RigVerdict::kUnknown;
@@ -116,68 +74,6 @@ std::string verdict_text(const RigFit& fit) {
   return {};
 }
 
-bool are_alike(std::span<const DeviceMove> a, std::span<const DeviceMove> b, double shift_px) {
-  return std::is_permutation(
-      a.begin(), a.end(), b.begin(), b.end(), [&](const DeviceMove& x, const DeviceMove& y) {
-        return x.device == y.device && std::abs(x.shift_px - y.shift_px) < shift_px;
-      });
-}
-
-/// Names of lines, and the devices that have to be put back for their crossings to meet.
-struct Explanation {
-  std::vector<Labeling> labelings;
-  NamedCrossings named;
-  MovedDevices found;
-  Rig put_back;
-  std::vector<CrossingDisagreement> left;  ///< per device, with the rig put back
-  std::string contradicted;  ///< a camera that measures what the others do not; empty: none
-  std::string misplaced;     ///< misplaced_text() of a projector; empty: none
-
-  [[nodiscard]] bool is_doubtful() const {
-    return !contradicted.empty() || !misplaced.empty() || !named.doubt.text().empty();
-  }
-};
-
-Explanation explanation_of(const Rig& rig, std::span<const FrameCurves> frames,
-                           std::vector<Labeling> labelings, const MovedDevicesOptions& options) {
-  NamedCrossings named = named_crossings(rig, frames, labelings);
-  MovedDevices found = find_moved_devices(rig, named.tracks, options);
-  Rig put_back = corrected_rig(rig, correction_of(found.moved, device_count(rig)));
-  auto left = device_disagreements(put_back, named.tracks);
-  return {std::move(labelings),
-          std::move(named),
-          std::move(found),
-          std::move(put_back),
-          std::move(left),
-          {},
-          {}};
-}
-
-/// Looks what moved by the first names, then names lines with that put back, and so on, as long as
-/// more lines have names and no more devices are accused: names that a device has from a wrong
-/// place draw it to where they are right, and others with it.
-Explanation explain(const Rig& rig, std::span<const FrameCurves> frames,
-                    std::vector<Labeling> first_labels, const MovedDevicesOptions& options) {
-  constexpr int kMostRounds = 4;
-  const auto explanation = [&](std::vector<Labeling> labelings) {
-    Explanation result = explanation_of(rig, frames, std::move(labelings), options);
-    result.contradicted = contradicted_camera(result.put_back, frames, result.labelings);
-    return result;
-  };
-  Explanation best = explanation(std::move(first_labels));
-  for (int round = 1; round < kMostRounds && !best.found.moved.empty(); ++round) {
-    Explanation next = explanation(labels_of(best.put_back, frames));
-    const bool stays = are_alike(next.found.moved, best.found.moved, options.smallest_px);
-    if (next.named.labelled_share < best.named.labelled_share ||
-        next.found.moved.size() > best.found.moved.size() ||
-        (next.is_doubtful() && !best.is_doubtful()))
-      break;
-    best = std::move(next);
-    if (stays) break;
-  }
-  return best;
-}
-
 double thousandth(double value) { return std::isfinite(value) ? std::round(1e3 * value) / 1e3 : 0; }
 
 ordered_json disagreement_json(const CrossingDisagreement& d) {
@@ -204,34 +100,17 @@ const char* to_string(RigVerdict verdict) {
   return "";
 }
 
-RigFit check_rig_on_frames(const Rig& stated, std::span<const FrameCurves> frames,
-                           const MovedDevicesOptions& options) {
+std::string full_name(const DeviceFit& device) {
+  return (device.is_projector ? "projector " : "camera ") + device.name;
+}
+
+RigFit fit_of(const Rig& stated, const Rig& rig, const Explanation& explained) {
   const double unit = footprint(stated);
-  const Rig rig = with_registered_patterns(scaled(stated, 1 / unit));
-  Explanation explained = explain(rig, frames, labels_of(rig, frames), options);
-  if (!explained.is_doubtful()) {
-    const auto found = misplaced_projector(explained.put_back, frames, explained.labelings);
-    if (found) explained.misplaced = misplaced_text(rig, *found);
-  }
-  if (explained.is_doubtful() || device_that_is_off(explained.left)) {
-    // All frames together, colours, and where lines cross may tell where a device stands. A refined
-    // rig has no camera that the others contradict and no projector whose lines they cross
-    // elsewhere, or it is refused.
-    RigRefinementOptions refinement;
-    refinement.refine.max_remaining = std::numeric_limits<double>::infinity();
-    RigRefinement refined = refine_rig_on_frames(rig, frames, refinement);
-    if (refined.report.refined) {
-      MovedDevicesOptions from_found = options;
-      from_found.start = std::move(refined.found);
-      Explanation again = explanation_of(rig, frames, std::move(refined.labelings), from_found);
-      if (!again.is_doubtful()) explained = std::move(again);
-    }
-  }
   const NamedCrossings& named = explained.named;
   const MovedDevices& found = explained.found;
 
   RigFit fit;
-  fit.frames = frames.size();
+  fit.frames = explained.labelings.size();
   fit.labelled_share = named.labelled_share;
   fit.before = crossing_disagreement(rig, named.tracks);
   fit.after = crossing_disagreement(explained.put_back, named.tracks);
@@ -265,6 +144,14 @@ RigFit check_rig_on_frames(const Rig& stated, std::span<const FrameCurves> frame
   fit.verdict = verdict_of(fit, found.moved.size());
   fit.text = verdict_text(fit);
   return fit;
+}
+
+RigFit check_rig_on_frames(const Rig& stated, std::span<const FrameCurves> frames,
+                           const MovedDevicesOptions& options) {
+  const Rig rig = in_footprints(stated);
+  return fit_of(
+      stated, rig,
+      explain(rig, frames, explanation_of(rig, frames, labels_of(rig, frames), options), options));
 }
 
 ordered_json rig_fit_json(const RigFit& fit) {

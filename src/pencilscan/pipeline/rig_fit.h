@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "pencilscan/pipeline/rig_explanation.h"
 #include "pencilscan/pipeline/rig_refinement.h"
 #include "pencilscan/refinement/moved_devices.h"
 
@@ -18,6 +19,7 @@ enum class RigVerdict {
   kUnexplained,  ///< crossings miss each other, and no device put back helps; or names are wrong
   kUnknown,      ///< too few crossings, of the rig or of a device
 };
+
 [[nodiscard]] const char* to_string(RigVerdict verdict);
 
 struct DeviceFit {
@@ -32,6 +34,9 @@ struct DeviceFit {
   double translation_mm = 0;  ///< the same
 };
 
+/// "camera cam1"
+[[nodiscard]] std::string full_name(const DeviceFit& device);
+
 struct RigFit {
   RigVerdict verdict = RigVerdict::kUnknown;
   std::string text;  ///< in plain words
@@ -45,6 +50,9 @@ struct RigFit {
   std::string doubt;
   Rig put_back;  ///< the rig with what moved put back
 };
+
+/// What is said of a rig (in footprints: in_footprints(stated)) whose frames are explained.
+[[nodiscard]] RigFit fit_of(const Rig& stated, const Rig& rig, const Explanation& explained);
 
 /// Looks at the crossings of labelled lines of some frames (joint labels, made with corrected
 /// devices where the rig is off: line_naming.h) and finds the fewest devices that moved

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <numeric>
 #include <vector>
 
 #include "pencilscan/refinement/crossing_tracks.h"
@@ -97,6 +98,53 @@ TEST(MovedDevices, TooFewCrossingsAccuseNobody) {
   const MovedDevices found = find_moved_devices(stated, tracks);
   EXPECT_THAT(found.moved, IsEmpty());
   EXPECT_LE(found.alone[0].tracks, 20U);
+}
+
+std::vector<std::size_t> all_devices(const Rig& rig) {
+  std::vector<std::size_t> devices(device_count(rig));
+  std::iota(devices.begin(), devices.end(), 0);
+  return devices;
+}
+
+/// Crossings of six frames; from frame `moved_at` on, `device` stands elsewhere by half a pixel
+/// than the rig has it.
+std::vector<std::vector<CrossingTrack>> film(std::size_t device, std::size_t moved_at) {
+  std::vector<std::vector<CrossingTrack>> frames;
+  for (std::size_t f = 0; f < 6; ++f) {
+    RingScene scene;
+    if (f >= moved_at) scene.rig = stated_rig(scene, device, 0.5, device + 1);
+    frames.push_back(scene.tracks(3, 0.1, f + 1));
+  }
+  return frames;
+}
+
+TEST(MoveBetweenFrames, ARigThatStandsStillHasNone) {
+  const RingScene scene;
+  EXPECT_FALSE(find_move_between(scene.rig, film(0, 6), all_devices(scene.rig)));
+  // Nor has one that is off alike in all frames.
+  EXPECT_FALSE(find_move_between(scene.rig, film(0, 0), all_devices(scene.rig)));
+}
+
+TEST(MoveBetweenFrames, TheDeviceAndTheFrameAreFound) {
+  const RingScene scene;
+  for (std::size_t device = 0; device < 8; ++device) {
+    const std::size_t at = 1 + device % 5;
+    const auto move = find_move_between(scene.rig, film(device, at), all_devices(scene.rig));
+    ASSERT_TRUE(move) << device;
+    EXPECT_EQ(move->device, device);
+    EXPECT_EQ(move->frame, at);
+    EXPECT_NEAR(move->shift_px, 0.5, 0.1);
+    EXPECT_LT(move->sigma_px, 0.1);
+  }
+}
+
+TEST(MoveBetweenFrames, OnlyStatedDevicesAndThoseWithEnoughCrossingsAreAccused) {
+  const RingScene scene;
+  auto frames = film(2, 3);
+  const auto move = find_move_between(scene.rig, frames, std::vector<std::size_t>{0, 1});
+  EXPECT_TRUE(!move || move->device != 2);
+  for (auto& tracks : frames) tracks.resize(20);
+  EXPECT_FALSE(find_move_between(scene.rig, frames, all_devices(scene.rig)));
 }
 
 TEST(DeviceDisagreements, ATurnedCameraHasAShiftAndNoOtherHas) {

@@ -1,0 +1,196 @@
+#include "pencilscan/pipeline/rig_periods.h"
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <utility>
+
+#include "pencilscan/core/formatted.h"
+#include "pencilscan/pipeline/frame.h"
+#include "pencilscan/pipeline/line_naming.h"
+#include "pencilscan/pipeline/naming_doubt.h"
+
+namespace pencilscan {
+namespace {
+
+using nlohmann::ordered_json;
+
+/// The verdict where a device moved between frames.
+constexpr const char* kMovedMeanwhile = "moved meanwhile";
+
+/// Finds where one period ends and the next one begins.
+class PeriodFinder {
+ public:
+  PeriodFinder(const Rig& stated, std::span<const FrameCurves> frames,
+               const MovedDevicesOptions& options)
+      : stated_(stated),
+        rig_(in_footprints(stated)),
+        frames_(frames),
+        options_(options),
+        labels_(labels_of(rig_, frames)) {}
+
+  [[nodiscard]] std::vector<RigPeriod> periods() {
+    find_starts(0, frames_.size());
+    starts_.insert(frames_.size());
+    std::vector<Period> found;
+    for (auto start = starts_.begin(); std::next(start) != starts_.end(); ++start) {
+      found.push_back(explained(*start, *std::next(start)));
+      join_last(found);
+    }
+    std::vector<RigPeriod> result;
+    for (Period& period : found) result.push_back(std::move(period.said));
+    return result;
+  }
+
+ private:
+  struct Period {
+    RigPeriod said;
+    Explanation explained;
+  };
+
+  [[nodiscard]] std::span<const Labeling> labels(std::size_t first, std::size_t end) const {
+    return std::span(labels_).subspan(first, end - first);
+  }
+  [[nodiscard]] Explanation first_explanation(std::size_t first, std::size_t end) const {
+    const auto named = labels(first, end);
+    return explanation_of(rig_, frames_.subspan(first, end - first), {named.begin(), named.end()},
+                          options_);
+  }
+  [[nodiscard]] std::vector<NamingDoubt> doubts(std::size_t first,
+                                                std::span<const Labeling> labels) const {
+    std::vector<NamingDoubt> of_frame;
+    for (std::size_t f = 0; f < labels.size(); ++f)
+      of_frame.push_back(naming_doubt(rig_, frames_.subspan(first + f, 1), labels.subspan(f, 1)));
+    return of_frame;
+  }
+  /// The move that the crossings of these labels tell of. What few names a device has that stands
+  /// far off are those of other lines.
+  [[nodiscard]] std::optional<MoveBetweenFrames> move_between(
+      const Rig& rig, std::size_t first, std::span<const Labeling> labels) const {
+    std::vector<std::vector<CrossingTrack>> tracks;
+    for (std::size_t f = 0; f < labels.size(); ++f)
+      tracks.push_back(crossing_tracks(rig, frames_.subspan(first + f, 1), labels.subspan(f, 1)));
+    const std::vector<NamingDoubt> of_frame = doubts(first, labels);
+    std::vector<std::size_t> named;
+    for (std::size_t d = 0; d < device_count(rig_); ++d) {
+      if (std::none_of(of_frame.begin(), of_frame.end(),
+                       [d](const NamingDoubt& doubt) { return doubt.lacks_names(d); }))
+        named.push_back(d);
+    }
+    return find_move_between(rig, tracks, named, options_);
+  }
+  /// The first frame in which a device has lost its names, or has them again.
+  [[nodiscard]] std::optional<std::size_t> names_change(std::size_t first, std::size_t end) const {
+    const std::vector<NamingDoubt> of_frame = doubts(first, labels(first, end));
+    for (std::size_t f = 1; f < of_frame.size(); ++f) {
+      for (std::size_t d = 0; d < device_count(rig_); ++d) {
+        const NamingDoubt& a = of_frame[f - 1];
+        const NamingDoubt& b = of_frame[f];
+        const auto [less, more] =
+            std::minmax({a.telling(d).named_share(), b.telling(d).named_share()});
+        if (a.lacks_names(d) != b.lacks_names(d) && less < more / 2) return first + f;
+      }
+    }
+    return std::nullopt;
+  }
+  void find_starts(std::size_t first, std::size_t end) {
+    starts_.insert(first);
+    if (end - first < 2) return;
+    std::optional<std::size_t> next = names_change(first, end);
+    if (!next) {
+      const Explanation explanation = first_explanation(first, end);
+      if (const auto move = move_between(explanation.put_back, first, labels(first, end)))
+        next = first + move->frame;
+    }
+    if (!next) return;
+    find_starts(first, *next);
+    find_starts(*next, end);
+  }
+  [[nodiscard]] Period explained(std::size_t first, std::size_t end) const {
+    Explanation explanation =
+        explain(rig_, frames_.subspan(first, end - first), first_explanation(first, end), options_);
+    RigFit fit = fit_of(stated_, rig_, explanation);
+    return {{first, end - 1, std::move(fit), std::nullopt}, std::move(explanation)};
+  }
+  /// First names may be wrong in one frame and right in the next: where with the last ones nothing
+  /// moved, two periods are one.
+  void join_last(std::vector<Period>& found) const {
+    if (found.size() < 2) return;
+    Period& a = found[found.size() - 2];
+    Period& b = found.back();
+    const std::size_t first = a.said.first;
+    std::vector<Labeling> named = a.explained.labelings;
+    named.insert(named.end(), b.explained.labelings.begin(), b.explained.labelings.end());
+    b.said.moved_before = move_between(a.explained.put_back, first, named);
+    if (b.said.moved_before || a.said.fit.verdict != b.said.fit.verdict) return;
+    Period joined = explained(first, b.said.last + 1);
+    joined.said.moved_before = a.said.moved_before;
+    if (joined.said.fit.verdict != a.said.fit.verdict) return;
+    found.pop_back();
+    found.back() = std::move(joined);
+  }
+
+  const Rig& stated_;
+  const Rig rig_;
+  const std::span<const FrameCurves> frames_;
+  const MovedDevicesOptions& options_;
+  const std::vector<Labeling> labels_;  ///< the first ones
+  std::set<std::size_t> starts_;
+};
+
+std::string frames_of(const RigPeriod& period, std::span<const std::string> names) {
+  return period.first == period.last
+             ? "frame " + names[period.first]
+             : "frames " + names[period.first] + " to " + names[period.last];
+}
+
+}  // namespace
+
+std::vector<RigPeriod> check_rig_over_frames(const Rig& rig, std::span<const FrameCurves> frames,
+                                             const MovedDevicesOptions& options) {
+  return PeriodFinder(rig, frames, options).periods();
+}
+
+bool fits(std::span<const RigPeriod> periods) {
+  return periods.size() == 1 && periods.front().fit.verdict == RigVerdict::kFits;
+}
+
+std::string describe_periods(std::span<const RigPeriod> periods,
+                             std::span<const std::string> names) {
+  if (periods.size() == 1) return periods.front().fit.text;
+  std::string text;
+  for (const RigPeriod& period : periods) {
+    if (!text.empty()) text += "; ";
+    if (period.moved_before) {
+      text += full_name(period.fit.devices[period.moved_before->device]) + " moved" +
+              formatted(period.moved_before->shift_px, " by %.2f px") + " between frames " +
+              names[period.first - 1] + " and " + names[period.first] + "; ";
+    }
+    text += "in " + frames_of(period, names) + ", " + period.fit.text;
+  }
+  return text;
+}
+
+ordered_json periods_json(std::span<const RigPeriod> periods, std::span<const std::string> names) {
+  ordered_json report = rig_fit_json(periods.back().fit);
+  if (periods.size() == 1) return report;
+  report["verdict"] = kMovedMeanwhile;
+  report["text"] = describe_periods(periods, names);
+  report["periods"] = ordered_json::array();
+  for (const RigPeriod& period : periods) {
+    ordered_json entry = {{"first_frame", names[period.first]},
+                          {"last_frame", names[period.last]},
+                          {"verdict", to_string(period.fit.verdict)},
+                          {"text", period.fit.text}};
+    if (period.moved_before) {
+      entry["moved_before"] = period.fit.devices[period.moved_before->device].name;
+      entry["moved_before_px"] = std::round(1e3 * period.moved_before->shift_px) / 1e3;
+    }
+    report["periods"].push_back(std::move(entry));
+  }
+  return report;
+}
+
+}  // namespace pencilscan
