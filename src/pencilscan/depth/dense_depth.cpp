@@ -1,10 +1,10 @@
 #include "pencilscan/depth/dense_depth.h"
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <opencv2/core.hpp>
 
+#include "pencilscan/depth/background_view.h"
 #include "pencilscan/depth/seeds.h"
 #include "pencilscan/depth/shared_bends.h"
 
@@ -65,108 +65,6 @@ void mark_saturated(const CameraLight& light, int half, DepthMap& map) {
       map.nodes[i].reason = HoleReason::kSaturated;
   }
 }
-
-/// A tangent plane as the start of a window's fit.
-Quadric quadric_of(const TangentView& at, int half) {
-  Quadric q = Quadric::Zero();
-  q[0] = at.w;
-  q.segment<2>(1) = half * at.slope.cast<double>();
-  return q;
-}
-
-/// The background's points at the light's pixels.
-std::vector<MeasuredPoint> seen_by(const CameraLight& light, std::vector<MeasuredPoint> points) {
-  for (MeasuredPoint& p : points) {
-    const auto pixel = light.camera->project(position_of(p));
-    if (!pixel) continue;
-    p.u = static_cast<float>(pixel->x());
-    p.v = static_cast<float>(pixel->y());
-  }
-  return points;
-}
-
-/// Floors and walls in one camera. Their lines continue those of the object one or more lines off;
-/// there a window may fit a surface in the air beside the object as well as the background that it
-/// shows.
-class BackgroundView {
- public:
-  BackgroundView(const CameraLight& light, const Background& background,
-                 const DepthOptions& options)
-      : light_(light),
-        options_(options),
-        floor_(background.space.floor()),
-        space_(background.space.with_floor()) {
-    if (!background.points.empty())
-      seeds_.emplace(*light.camera, background.points.front().camera,
-                     seen_by(light, background.points));
-  }
-
-  /// True when the background explains the window as well as the fit does.
-  [[nodiscard]] bool shows(const Vec2& pixel, const WindowFit& fit, WindowFitter& fitter) const {
-    return shows_floor(pixel, fit, fitter) || shows_named_lines(pixel, fit, fitter);
-  }
-
- private:
-  static constexpr double kSameLine = 0.2;  // lines; a floor off the stated plane, and its relief
-
-  /// True when a fit that starts on the background stays there, and is as good.
-  static bool is_as_good(const Vec2& pixel, const Quadric& start, const WindowFit& fit,
-                         WindowFitter& fitter) {
-    constexpr float kAsWell = 1.1F;  // chi^2 of a window's hundred samples scatters by so much
-    const auto behind = fitter.fit(pixel, start, 5);
-    if (!behind || behind->misfit > kAsWell * fit.misfit || behind->lit.count() < fit.lit.count())
-      return false;
-    // It still is the background, over the whole window.
-    return (behind->q - start).head<3>().cwiseAbs().sum() *
-               static_cast<double>(behind->lines_per_w) <
-           kSameLine;
-  }
-
-  [[nodiscard]] bool shows_named_lines(const Vec2& pixel, const WindowFit& fit,
-                                       WindowFitter& fitter) const {
-    if (!seeds_) return false;
-    for (const Quadric& start : seeds_->planes(pixel, options_.seed_radius_px, fitter.half()))
-      if (is_as_good(pixel, start, fit, fitter)) return true;
-    return false;
-  }
-
-  [[nodiscard]] bool shows_floor(const Vec2& pixel, const WindowFit& fit,
-                                 WindowFitter& fitter) const {
-    if (!floor_) return false;
-    const Ray ray = light_.camera->ray(pixel);
-    const double descent = -ray.direction.dot(floor_->normal);
-    const double height = floor_->height(ray.origin);
-    if (!(descent > 0) || !(height > 0)) return false;
-    const Vec3 point = ray.origin + height / descent * ray.direction;
-    if (!space_.holds(point)) return false;
-    const TangentView at(*light_.camera, point, floor_->normal);
-    const Vec2 m = light_.camera->normalized_from_pixel(pixel);
-    const Eigen::Matrix2d jacobian = light_.camera->pixel_slope(m).inverse();
-    for (std::size_t k = 0; k < light_.patterns.size(); ++k) {
-      if (!fit.lit.test(k)) continue;
-      const auto fitted = line(k, m, jacobian, fit.q[0]);
-      const auto on_floor = line(k, m, jacobian, at.w);
-      if (!fitted || !on_floor) return false;
-      const double apart = *fitted - *on_floor;
-      if (std::abs(apart - std::round(apart)) > kSameLine) return false;
-    }
-    return is_as_good(pixel, quadric_of(at, fitter.half()), fit, fitter);
-  }
-
-  [[nodiscard]] std::optional<double> line(std::size_t pattern, const Vec2& m,
-                                           const Eigen::Matrix2d& jacobian, double w) const {
-    bool ok = false;
-    const WindowLines lines = light_.patterns[pattern].lines(m, jacobian, w, ok);
-    if (!ok) return std::nullopt;
-    return static_cast<double>(lines.line(0, 0, static_cast<float>(w)));
-  }
-
-  const CameraLight& light_;
-  const DepthOptions& options_;
-  std::optional<Floor> floor_;
-  ObjectSpace space_;
-  std::optional<CurveSeeds> seeds_;
-};
 
 constexpr std::size_t kPilots = 100;
 constexpr double kFacing = 0.5;  // cosine; flatter, a plane from other cameras is off in its slope
@@ -256,7 +154,7 @@ template <class Starts, class Keep>
 void fit_nodes(const CameraLight& light, const Background& background, const DepthOptions& options,
                DepthMap& map, FittedWindows& fitted, Starts starts_of, Keep keep) {
   WindowFitter fitter(light, options.half);
-  const BackgroundView behind(light, background, options);
+  const BackgroundView behind(light, background, options.seed_radius_px);
   for (std::size_t i = 0; i < map.nodes.size(); ++i) {
     if (map.nodes[i].measured()) continue;
     const Vec2 pixel = map.pixel(i);
@@ -311,7 +209,7 @@ void fit_at_surface(const CameraLight& light, const RayScene& surface, const Bac
 void grow(const CameraLight& light, const Background& background, const DepthOptions& options,
           DepthMap& map, FittedWindows& fitted) {
   WindowFitter fitter(light, options.half);
-  const BackgroundView behind(light, background, options);
+  const BackgroundView behind(light, background, options.seed_radius_px);
   const ObjectSpace& space = background.space;
   std::vector<std::size_t> front;
   for (std::size_t i = 0; i < map.nodes.size(); ++i)

@@ -3,12 +3,12 @@
 #include <span>
 #include <vector>
 
+#include "pencilscan/depth/background_view.h"
 #include "pencilscan/depth/depth_map.h"
 #include "pencilscan/depth/pilot_light.h"
 #include "pencilscan/depth/window_fit.h"
 #include "pencilscan/geometry/ray_scene.h"
 #include "pencilscan/labeling/measured_point.h"
-#include "pencilscan/rig/object_space.h"
 #include "pencilscan/view/color_family.h"
 
 namespace pencilscan {
@@ -25,13 +25,6 @@ struct DepthOptions {
   double min_cosine = 0.2;        ///< of the incidence to the camera, in [0, 1]
   double max_move = 2;            ///< footprints; of a node started from the closed surface
   double max_move_lines = 0.16;   ///< line spacings, if that is more
-};
-
-/// What one camera may see beside the object: where the object cannot be, and points of it that
-/// have named lines.
-struct Background {
-  ObjectSpace space;
-  std::vector<MeasuredPoint> points;  ///< of this camera
 };
 
 /// The options as they are for one camera's pictures: windows behind a mosaic are wider, and so are
