@@ -36,7 +36,6 @@ PickedFrames picked_frames(const Rig& rig, const FrameSource& frames, std::size_
     picked.curves.push_back({std::move(detected.families), std::move(detected.graphs)});
     picked.names.push_back(frames.name(frame));
   }
-  progress("crossings", 0);
   return picked;
 }
 
@@ -77,7 +76,8 @@ void run_rig_fit(const CommonOptions& common, const std::string& rig_path,
   require_patterns(rig, rig_path, "there is nothing to see of this projector");
   const FrameSource frames = FrameSource::open(rig, options.frames);
   const PickedFrames picked = picked_frames(rig, frames, options.frame_count);
-  const std::vector<RigPeriod> periods = check_rig_over_frames(rig, picked.curves);
+  const std::vector<RigPeriod> periods =
+      check_rig_over_frames(rig, picked.curves, {}, stderr_progress());
   for (const RigPeriod& period : periods) {
     if (periods.size() > 1) {
       std::printf("frames %s to %s\n", picked.names[period.first].c_str(),

@@ -24,18 +24,24 @@ constexpr const char* kMovedMeanwhile = "moved meanwhile";
 class PeriodFinder {
  public:
   PeriodFinder(const Rig& stated, std::span<const FrameCurves> frames,
-               const MovedDevicesOptions& options)
+               const MovedDevicesOptions& options, const Progress& progress)
       : stated_(stated),
         rig_(in_footprints(stated)),
         frames_(frames),
         options_(options),
-        labels_(labels_of(rig_, frames)) {}
+        progress_(progress) {
+    for (std::size_t f = 0; f < frames.size(); ++f) {
+      say("names of lines", f);
+      labels_.push_back(std::move(labels_of(rig_, frames.subspan(f, 1)).front()));
+    }
+  }
 
   [[nodiscard]] std::vector<RigPeriod> periods() {
     find_starts(0, frames_.size());
     starts_.insert(frames_.size());
     std::vector<Period> found;
     for (auto start = starts_.begin(); std::next(start) != starts_.end(); ++start) {
+      say("what moved", *start);
       found.push_back(explained(*start, *std::next(start)));
       join_last(found);
     }
@@ -50,6 +56,10 @@ class PeriodFinder {
     Explanation explained;
   };
 
+  void say(const char* what, std::size_t frame) const {
+    if (progress_)
+      progress_(what, static_cast<double>(frame) / static_cast<double>(frames_.size()));
+  }
   [[nodiscard]] std::span<const Labeling> labels(std::size_t first, std::size_t end) const {
     return std::span(labels_).subspan(first, end - first);
   }
@@ -136,7 +146,8 @@ class PeriodFinder {
   const Rig rig_;
   const std::span<const FrameCurves> frames_;
   const MovedDevicesOptions& options_;
-  const std::vector<Labeling> labels_;  ///< the first ones
+  const Progress& progress_;
+  std::vector<Labeling> labels_;  ///< the first ones
   std::set<std::size_t> starts_;
 };
 
@@ -149,8 +160,9 @@ std::string frames_of(const RigPeriod& period, std::span<const std::string> name
 }  // namespace
 
 std::vector<RigPeriod> check_rig_over_frames(const Rig& rig, std::span<const FrameCurves> frames,
-                                             const MovedDevicesOptions& options) {
-  return PeriodFinder(rig, frames, options).periods();
+                                             const MovedDevicesOptions& options,
+                                             const Progress& progress) {
+  return PeriodFinder(rig, frames, options, progress).periods();
 }
 
 bool fits(std::span<const RigPeriod> periods) {

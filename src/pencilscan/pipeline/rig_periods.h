@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "pencilscan/core/progress.h"
 #include "pencilscan/pipeline/rig_fit.h"
 
 namespace pencilscan {
@@ -26,7 +27,8 @@ struct RigPeriod {
 /// nothing.
 [[nodiscard]] std::vector<RigPeriod> check_rig_over_frames(const Rig& rig,
                                                            std::span<const FrameCurves> frames,
-                                                           const MovedDevicesOptions& options = {});
+                                                           const MovedDevicesOptions& options = {},
+                                                           const Progress& progress = {});
 
 /// Whether the rig fits all frames.
 [[nodiscard]] bool fits(std::span<const RigPeriod> periods);
