@@ -17,7 +17,7 @@ SequenceEvent event_from(std::span<const FrameRow> rows, const FoundChange& foun
                          const std::string& device) {
   const Change& change = found.change;
   return {change.at,    change.end.value_or(rows.size()) - 1,
-          !change.end,  found.series->kind,
+          !change.end,  found.figure->kind,
           device,       change.before,
           change.after, ""};
 }
@@ -42,7 +42,7 @@ std::string named_with(const std::vector<FoundChange>& together, const SequenceD
   }
   if (most == nullptr) return "";
   return "; with it the share of curves that has a line, in " + std::to_string(count) +
-         " of them, most in " + bare_name(devices, most->series->device) + ": " +
+         " of them, most in " + bare_name(devices, most->figure->device) + ": " +
          from_to("labelled", *most->named);
 }
 
@@ -59,7 +59,7 @@ double size_of(const FoundChange& found) {
 /// Where noise hides how much they miss, the change is noticed some frames late: medians of many
 /// frames on both sides, so that these are outvoted.
 bool is_steady(std::span<const FrameRow> rows, const FoundChange& found) {
-  const std::size_t camera = found.series->device;
+  const std::size_t camera = found.figure->device;
   if (camera >= rows[0].cameras.size()) return false;
   const auto change = [&](double CameraRow::*shift) {
     const auto [before, within] = long_before_and_within(
@@ -74,12 +74,12 @@ bool is_steady(std::span<const FrameRow> rows, const FoundChange& found) {
 SequenceEvent event_of(std::span<const FrameRow> rows, const SequenceDevices& devices,
                        const FoundChange& found) {
   const Change& change = found.change;
-  const std::string& kind = found.series->kind;
+  const std::string& kind = found.figure->kind;
   const bool up = change.after > change.before;
   const bool lines_too = kind == "level" && up && lines_got_light(rows, devices, change.at);
-  SequenceEvent event = event_from(rows, found, bare_name(devices, found.series->device));
+  SequenceEvent event = event_from(rows, found, bare_name(devices, found.figure->device));
   event.text =
-      name_of(devices, found.series->device) + ": " + quantity(kind) + from_to(kind, change);
+      name_of(devices, found.figure->device) + ": " + quantity(kind) + from_to(kind, change);
   const std::string cause = usual_cause(kind, up, false, lines_too);
   if (!cause.empty()) event.text += " (" + cause + ")";
   if (found.named) event.text += "; " + quantity("labelled") + from_to("labelled", *found.named);
@@ -89,7 +89,7 @@ SequenceEvent event_of(std::span<const FrameRow> rows, const SequenceDevices& de
 SequenceEvent event_of_all(std::span<const FrameRow> rows, const SequenceDevices& devices,
                            const std::vector<FoundChange>& together) {
   FoundChange middle = together[together.size() / 2];
-  const std::string& kind = middle.series->kind;
+  const std::string& kind = middle.figure->kind;
   const std::size_t first = together.front().change.at;
   const bool up = rises(middle);
   const bool lines_too = kind == "level" && up && lines_got_light(rows, devices, first);
@@ -115,11 +115,11 @@ SequenceEvent event_of_crossings(std::span<const FrameRow> rows, const SequenceD
   std::size_t first = together.front().change.at;
   for (const FoundChange& f : together) {
     first = std::min(first, f.change.at);
-    if (f.series->device >= devices.cameras.size()) {
+    if (f.figure->device >= devices.cameras.size()) {
       projectors.push_back(&f);
       continue;
     }
-    cameras.insert(f.series->device);
+    cameras.insert(f.figure->device);
     // What crossings miss is told where it is known.
     if (of_camera == nullptr || (is_shift(*of_camera) && !is_shift(f))) of_camera = &f;
   }
@@ -138,11 +138,11 @@ SequenceEvent event_of_crossings(std::span<const FrameRow> rows, const SequenceD
   event.kind = "crossings";
   const bool is_back = std::all_of(together.begin(), together.end(), agrees_again);
   if (one_camera || one_projector) {
-    event.device = bare_name(devices, most.series->device);
-    event.text = name_of(devices, most.series->device) + ' ';
+    event.device = bare_name(devices, most.figure->device);
+    event.text = name_of(devices, most.figure->device) + ' ';
     if (std::none_of(together.begin(), together.end(), is_shift) && is_steady(rows, most)) {
       event.text += "stands where it stood, its crossing lines miss each other by " +
-                    from_to(most.series->kind, most.change) +
+                    from_to(most.figure->kind, most.change) +
                     " (px; turned about its axis, focus, or motion within the exposure); rig check "
                     "--frames says more";
       return event;
@@ -154,7 +154,7 @@ SequenceEvent event_of_crossings(std::span<const FrameRow> rows, const SequenceD
   }
   event.text += is_shift(most) ? ": crossing lines meet when its picture is shifted by "
                                : ": crossing lines miss each other by ";
-  event.text += from_to(most.series->kind, most.change) + " (px)";
+  event.text += from_to(most.figure->kind, most.change) + " (px)";
   if (!is_back)
     event.text += "; rig check --frames says more, --refine-rig corrects the frames from here";
   return event;

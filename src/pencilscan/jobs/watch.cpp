@@ -13,7 +13,7 @@ namespace pencilscan {
 namespace {
 
 bool of_crossings(const FoundChange& found) {
-  return is_shift(found) || found.series->kind == "crossings";
+  return is_shift(found) || found.figure->kind == "crossings";
 }
 
 constexpr std::size_t kFramesApart = 5;  ///< of changes that have one cause
@@ -33,17 +33,17 @@ void drop_explained(std::vector<FoundChange>& found) {
     return projector.change.end && is_at(*projector.change.end) && rises(f) != rises(projector);
   };
   const auto explains = [&](const FoundChange& f, const FoundChange& cause) {
-    if (f.series->kind == "level" || f.series->kind == "labelled")
-      return cause.series->kind == "projector" && goes_with_projector(f, cause);
-    if (f.series->kind == "height" && !rises(f))
-      return cause.series->kind == "width" && rises(cause) &&
-             cause.series->device == f.series->device &&
+    if (f.figure->kind == "level" || f.figure->kind == "labelled")
+      return cause.figure->kind == "projector" && goes_with_projector(f, cause);
+    if (f.figure->kind == "height" && !rises(f))
+      return cause.figure->kind == "width" && rises(cause) &&
+             cause.figure->device == f.figure->device &&
              cause.change.at <= f.change.at + kFramesApart &&
              (!cause.change.end || f.change.at < *cause.change.end);
     const bool is_within = cause.change.at + kFramesApart < f.change.at &&
                            (!cause.change.end || f.change.at < *cause.change.end);
-    return is_shift(f) && cause.series->kind == "crossings" && rises(cause) && is_within &&
-           cause.series->device == f.series->device;
+    return is_shift(f) && cause.figure->kind == "crossings" && rises(cause) && is_within &&
+           cause.figure->device == f.figure->device;
   };
   std::erase_if(found, [&](const FoundChange& f) {
     return std::any_of(all.begin(), all.end(),
@@ -59,15 +59,15 @@ void join_with_lamps(std::vector<FoundChange>& found) {
   const auto goes_with = [&](const FoundChange& f, const FoundChange& lamp) {
     const bool outlasts =
         lamp.change.end && (!f.change.end || *f.change.end > *lamp.change.end + kFramesApart);
-    return lamp.series->kind == "level" && f.series->device == lamp.series->device &&
+    return lamp.figure->kind == "level" && f.figure->device == lamp.figure->device &&
            rises(f) != rises(lamp) && apart(f.change.at, lamp.change.at) <= kFramesApart &&
            !outlasts;
   };
   std::vector<FoundChange> rest;
   for (const FoundChange& f : found)
-    if (f.series->kind != "labelled") rest.push_back(f);
+    if (f.figure->kind != "labelled") rest.push_back(f);
   for (const FoundChange& f : found) {
-    if (f.series->kind != "labelled") continue;
+    if (f.figure->kind != "labelled") continue;
     const auto lamp = std::find_if(rest.begin(), rest.end(),
                                    [&](const FoundChange& other) { return goes_with(f, other); });
     if (lamp == rest.end()) {
@@ -100,13 +100,13 @@ void drop_said(std::vector<SequenceEvent>& events) {
 std::vector<FoundChange> take_together(std::vector<FoundChange>& found) {
   const FoundChange first = found.front();
   const auto goes_with = [&](const FoundChange& f) {
-    const bool is_kind = f.series->kind == first.series->kind && rises(f) == rises(first);
+    const bool is_kind = f.figure->kind == first.figure->kind && rises(f) == rises(first);
     return is_kind || (of_crossings(f) && of_crossings(first) && (is_shift(f) || is_shift(first)));
   };
   std::size_t end = first.change.at + kFramesApart + 1;
   std::set<const WatchedFigure*> changed;
   for (const FoundChange& f : found) {
-    if (goes_with(f) && !changed.insert(f.series).second) end = std::min(end, f.change.at);
+    if (goes_with(f) && !changed.insert(f.figure).second) end = std::min(end, f.change.at);
   }
   std::vector<FoundChange> together;
   std::vector<FoundChange> rest;
@@ -140,8 +140,8 @@ WatchReport watch_sequence(std::span<const FrameRow> rows, const SequenceDevices
                        (rises(first) || std::any_of(together.begin(), together.end(), is_shift));
     if (moved) {
       report.events.push_back(event_of_crossings(rows, devices, together));
-    } else if (first.series->kind != "projector" && together.size() > 1 &&
-               2 * together.size() > (first.series->kind == "light" ? devices.projectors.size()
+    } else if (first.figure->kind != "projector" && together.size() > 1 &&
+               2 * together.size() > (first.figure->kind == "light" ? devices.projectors.size()
                                                                     : devices.cameras.size())) {
       report.events.push_back(event_of_all(rows, devices, together));
     } else {

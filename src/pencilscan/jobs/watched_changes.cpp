@@ -36,28 +36,28 @@ double median_of_done(Row first, Row last, std::size_t count, const Reading& rea
 
 /// Whether what tells of a change at row `at` bears it out: from the frames before to so many from
 /// there on.
-bool is_confirmed(std::span<const FrameRow> rows, const WatchedFigure& series, std::size_t at,
+bool is_confirmed(std::span<const FrameRow> rows, const WatchedFigure& figure, std::size_t at,
                   std::size_t frames_after) {
-  if (!series.beside && !series.beyond) return true;
-  const auto [own_before, own_after] = before_and_after(rows, at, frames_after, series.value);
-  if (series.beyond) {
-    const auto [before, after] = before_and_after(rows, at, frames_after, series.beyond);
+  if (!figure.beside && !figure.beyond) return true;
+  const auto [own_before, own_after] = before_and_after(rows, at, frames_after, figure.value);
+  if (figure.beyond) {
+    const auto [before, after] = before_and_after(rows, at, frames_after, figure.beyond);
     const double beyond = own_after > own_before ? after : before;
-    return !std::isfinite(beyond) || beyond > series.smallest;
+    return !std::isfinite(beyond) || beyond > figure.smallest;
   }
   const auto [before, after] = before_and_after(
-      rows, at, frames_after, [&](const FrameRow& row) { return finite_log(series.beside(row)); });
+      rows, at, frames_after, [&](const FrameRow& row) { return finite_log(figure.beside(row)); });
   if (!std::isfinite(before) || !std::isfinite(after)) return true;
-  return (after > before) == (own_after > own_before) && std::abs(after - before) > series.smallest;
+  return (after > before) == (own_after > own_before) && std::abs(after - before) > figure.smallest;
 }
 
 /// Changes of logarithms, or of numbers to which one was added, as those of the figure itself.
-Change of_figure(const WatchedFigure& series, Change change) {
-  if (series.is_ratio) {
+Change of_figure(const WatchedFigure& figure, Change change) {
+  if (figure.is_ratio) {
     change.before = std::exp(change.before);
     change.after = std::exp(change.after);
   }
-  if (series.kind == "projector") {
+  if (figure.kind == "projector") {
     change.before -= 1;
     change.after -= 1;
   }
@@ -65,23 +65,23 @@ Change of_figure(const WatchedFigure& series, Change change) {
 }
 
 /// The figure of one frame, as from_to() has it.
-std::string odd_figure(std::span<const FrameRow> rows, const WatchedFigure& series,
+std::string odd_figure(std::span<const FrameRow> rows, const WatchedFigure& figure,
                        std::size_t at) {
-  const auto [before, after] = before_and_after(rows, at, 1, series.value);
-  if (is_of_light(series.kind)) return in_words(after / before) + " of that before";
+  const auto [before, after] = before_and_after(rows, at, 1, figure.value);
+  if (is_of_light(figure.kind)) return in_words(after / before) + " of that before";
   return in_words(
-      of_figure(series, {at, {}, 0, series.is_ratio ? std::log(after) : after, 0}).after);
+      of_figure(figure, {at, {}, 0, figure.is_ratio ? std::log(after) : after, 0}).after);
 }
 
 }  // namespace
 
 bool in_order(const FoundChange& a, const FoundChange& b) {
-  return std::tie(a.change.at, a.series->kind) < std::tie(b.change.at, b.series->kind);
+  return std::tie(a.change.at, a.figure->kind) < std::tie(b.change.at, b.figure->kind);
 }
 
 bool rises(const FoundChange& found) { return found.change.after > found.change.before; }
 
-bool is_shift(const FoundChange& found) { return found.series->kind == kShift; }
+bool is_shift(const FoundChange& found) { return found.figure->kind == kShift; }
 
 const std::string& bare_name(const SequenceDevices& devices, std::size_t device) {
   return device < devices.cameras.size() ? devices.cameras[device]
@@ -171,24 +171,24 @@ std::vector<FoundChange> find_watched_changes(std::span<const FrameRow> rows,
                                               const std::vector<WatchedFigure>& all,
                                               std::vector<OddFrame>& odd) {
   std::vector<FoundChange> found;
-  for (const WatchedFigure& series : all) {
+  for (const WatchedFigure& figure : all) {
     std::vector<double> values;
     for (const FrameRow& row : rows) {
       const double value =
-          row.status.state == FrameState::kDone ? series.value(row) : kUnknownFigure;
-      values.push_back(series.is_ratio ? finite_log(value) : value);
+          row.status.state == FrameState::kDone ? figure.value(row) : kUnknownFigure;
+      values.push_back(figure.is_ratio ? finite_log(value) : value);
     }
-    ChangeOptions options{series.smallest, all.size() * rows.size()};
-    options.follows = series.follows;
+    ChangeOptions options{figure.smallest, all.size() * rows.size()};
+    options.follows = figure.follows;
     const ChangeReport changes = find_changes(values, options);
     for (const Change& change : changes.changes) {
-      if (!is_confirmed(rows, series, change.at, kFramesOfChange)) continue;
-      found.push_back({&series, of_figure(series, change)});
+      if (!is_confirmed(rows, figure, change.at, kFramesOfChange)) continue;
+      found.push_back({&figure, of_figure(figure, change)});
     }
     const auto say_odd = [&](std::size_t at, const char* where) {
-      if (!is_confirmed(rows, series, at, 1)) return;
-      odd.push_back({at, name_of(devices, series.device) + ": " + quantity(series.kind) +
-                             odd_figure(rows, series, at) + where});
+      if (!is_confirmed(rows, figure, at, 1)) return;
+      odd.push_back({at, name_of(devices, figure.device) + ": " + quantity(figure.kind) +
+                             odd_figure(rows, figure, at) + where});
     };
     for (const std::size_t at : changes.outliers) say_odd(at, " in this frame alone");
     for (const std::size_t at : changes.at_end) say_odd(at, " at the end");

@@ -28,7 +28,7 @@ struct WatchedFigure {
 
 /// A change of a watched figure.
 struct FoundChange {
-  const WatchedFigure* series = nullptr;
+  const WatchedFigure* figure = nullptr;
   Change change;                     ///< of the figure itself
   std::optional<Change> named = {};  ///< of a lamp's light: of the camera's named share with it
 };
