@@ -74,8 +74,6 @@ std::string verdict_text(const RigFit& fit) {
   return {};
 }
 
-double thousandth(double value) { return std::isfinite(value) ? std::round(1e3 * value) / 1e3 : 0; }
-
 ordered_json disagreement_json(const CrossingDisagreement& d) {
   return {{"crossings", d.crossings},
           {"median_px", thousandth(d.median_px)},
@@ -83,6 +81,8 @@ ordered_json disagreement_json(const CrossingDisagreement& d) {
 }
 
 }  // namespace
+
+double thousandth(double value) { return std::isfinite(value) ? std::round(1e3 * value) / 1e3 : 0; }
 
 const char* to_string(RigVerdict verdict) {
   switch (verdict) {

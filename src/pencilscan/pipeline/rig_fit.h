@@ -60,6 +60,9 @@ struct RigFit {
 [[nodiscard]] RigFit check_rig_on_frames(const Rig& rig, std::span<const FrameCurves> frames,
                                          const MovedDevicesOptions& options = {});
 
+/// A figure of a report, px or mm, in thousandths; 0 where it is not known.
+[[nodiscard]] double thousandth(double value);
+
 [[nodiscard]] nlohmann::ordered_json rig_fit_json(const RigFit& fit);
 
 }  // namespace pencilscan

@@ -1,10 +1,7 @@
 #include "pencilscan/pipeline/rig_periods.h"
 
 #include <algorithm>
-#include <cmath>
-#include <iterator>
 #include <nlohmann/json.hpp>
-#include <set>
 #include <utility>
 
 #include "pencilscan/core/formatted.h"
@@ -37,16 +34,9 @@ class PeriodFinder {
   }
 
   [[nodiscard]] std::vector<RigPeriod> periods() {
-    find_starts(0, frames_.size());
-    starts_.insert(frames_.size());
-    std::vector<Period> found;
-    for (auto start = starts_.begin(); std::next(start) != starts_.end(); ++start) {
-      say("what moved", *start);
-      found.push_back(explained(*start, *std::next(start)));
-      join_last(found);
-    }
+    find(0, frames_.size());
     std::vector<RigPeriod> result;
-    for (Period& period : found) result.push_back(std::move(period.said));
+    for (Period& period : found_) result.push_back(std::move(period.said));
     return result;
   }
 
@@ -105,41 +95,43 @@ class PeriodFinder {
     }
     return std::nullopt;
   }
-  void find_starts(std::size_t first, std::size_t end) {
-    starts_.insert(first);
-    if (end - first < 2) return;
-    std::optional<std::size_t> next = names_change(first, end);
-    if (!next) {
-      const Explanation explanation = first_explanation(first, end);
-      if (const auto move = move_between(explanation.put_back, first, labels(first, end)))
-        next = first + move->frame;
-    }
-    if (!next) return;
-    find_starts(first, *next);
-    find_starts(*next, end);
+  /// Adds the periods of these frames.
+  void find(std::size_t first, std::size_t end) {
+    if (const auto at = names_change(first, end)) return find_both(first, *at, end);
+    Explanation explanation = first_explanation(first, end);
+    const auto move = move_between(explanation.put_back, first, labels(first, end));
+    if (move) return find_both(first, first + move->frame, end);
+    say("what moved", first);
+    found_.push_back(explained(first, end, std::move(explanation)));
+    join_last();
   }
-  [[nodiscard]] Period explained(std::size_t first, std::size_t end) const {
+  void find_both(std::size_t first, std::size_t at, std::size_t end) {
+    find(first, at);
+    find(at, end);
+  }
+  [[nodiscard]] Period explained(std::size_t first, std::size_t end, Explanation begin) const {
     Explanation explanation =
-        explain(rig_, frames_.subspan(first, end - first), first_explanation(first, end), options_);
+        explain(rig_, frames_.subspan(first, end - first), std::move(begin), options_);
     RigFit fit = fit_of(stated_, rig_, explanation);
     return {{first, end - 1, std::move(fit), std::nullopt}, std::move(explanation)};
   }
   /// First names may be wrong in one frame and right in the next: where with the last ones nothing
   /// moved, two periods are one.
-  void join_last(std::vector<Period>& found) const {
-    if (found.size() < 2) return;
-    Period& a = found[found.size() - 2];
-    Period& b = found.back();
+  void join_last() {
+    if (found_.size() < 2) return;
+    Period& a = found_[found_.size() - 2];
+    Period& b = found_.back();
     const std::size_t first = a.said.first;
+    const std::size_t end = b.said.last + 1;
     std::vector<Labeling> named = a.explained.labelings;
     named.insert(named.end(), b.explained.labelings.begin(), b.explained.labelings.end());
     b.said.moved_before = move_between(a.explained.put_back, first, named);
     if (b.said.moved_before || a.said.fit.verdict != b.said.fit.verdict) return;
-    Period joined = explained(first, b.said.last + 1);
+    Period joined = explained(first, end, first_explanation(first, end));
     joined.said.moved_before = a.said.moved_before;
     if (joined.said.fit.verdict != a.said.fit.verdict) return;
-    found.pop_back();
-    found.back() = std::move(joined);
+    found_.pop_back();
+    found_.back() = std::move(joined);
   }
 
   const Rig& stated_;
@@ -148,7 +140,7 @@ class PeriodFinder {
   const MovedDevicesOptions& options_;
   const Progress& progress_;
   std::vector<Labeling> labels_;  ///< the first ones
-  std::set<std::size_t> starts_;
+  std::vector<Period> found_;
 };
 
 std::string frames_of(const RigPeriod& period, std::span<const std::string> names) {
@@ -198,7 +190,7 @@ ordered_json periods_json(std::span<const RigPeriod> periods, std::span<const st
                           {"text", period.fit.text}};
     if (period.moved_before) {
       entry["moved_before"] = period.fit.devices[period.moved_before->device].name;
-      entry["moved_before_px"] = std::round(1e3 * period.moved_before->shift_px) / 1e3;
+      entry["moved_before_px"] = thousandth(period.moved_before->shift_px);
     }
     report["periods"].push_back(std::move(entry));
   }

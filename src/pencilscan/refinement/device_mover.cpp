@@ -91,7 +91,7 @@ DeviceMover::Place DeviceMover::place_in(std::size_t device, std::size_t group) 
   std::erase_if(own, [&](std::size_t t) { return groups_[t] != group; });
   if (own.size() < static_cast<std::size_t>(options_.refine.min_tracks)) return {};
   const Best best = best_of(own, device);
-  return {best.correction, best.normal.matrix};
+  return {vector_of(best.correction), best.normal.matrix};
 }
 
 DeviceMover::Best DeviceMover::best_of(const std::vector<std::size_t>& own,

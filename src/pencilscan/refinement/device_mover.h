@@ -52,10 +52,10 @@ class DeviceMover {
   /// groups.
   [[nodiscard]] DeviceMove alone(std::size_t device) const;
 
-  /// The same from one group. information: inverse covariance of (rotation_px, translation_mm) at
-  /// the best place; zero where the group has too few crossings of the device.
+  /// The same from one group: (rotation_px, translation_mm) of the best place, and its inverse
+  /// covariance; zero where the group has too few crossings of the device.
   struct Place {
-    PoseCorrection correction;
+    Vec6 motion = Vec6::Zero();
     Mat6 information = Mat6::Zero();
   };
   [[nodiscard]] Place place_in(std::size_t device, std::size_t group) const;

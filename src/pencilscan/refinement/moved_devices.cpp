@@ -23,11 +23,10 @@ struct CommonPlace {
   double squares = 0;
 
   void add(const DeviceMover::Place& place) {
-    Vec6 x;
-    x << place.correction.rotation_px, place.correction.translation_mm;
+    const Vec6 own = place.information * place.motion;
     information += place.information;
-    weighted += place.information * x;
-    squares += x.dot(place.information * x);
+    weighted += own;
+    squares += place.motion.dot(own);
   }
   [[nodiscard]] bool is_known() const { return !information.isZero(0); }
   [[nodiscard]] Vec6 best() const { return solve_symmetric(information, weighted); }
