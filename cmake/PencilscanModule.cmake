@@ -1,8 +1,7 @@
 # pencilscan_module(<name> SOURCES ... [TESTS ...] [DEPENDS modules...] [LIBRARIES targets...] [PRIVATE_LIBRARIES targets...] [NO_PCH] [LONG_TESTS] [SHARED_SCENES suites...] [AGAINST_CLOCK])
 # One module = one static library pencilscan_<name> (alias pencilscan::<name>) and, with tests on,
 # one GoogleTest program <name>_test made of the *_test.cpp files beside the sources. CTest runs it as
-# one test, <name>: to start it takes longer (0.2 s, for the 150 libraries behind OpenCV's codecs) than
-# most tests in it. With LONG_TESTS or AGAINST_CLOCK every test is one of CTest's, <name>.<suite>.<test>,
+# one test, <name>: to start it takes longer than most tests in it. With LONG_TESTS or AGAINST_CLOCK every test is one of CTest's, <name>.<suite>.<test>,
 # so that cores share them, or one alone can be tried again. A suite whose tests share a scene
 # (SetUpTestSuite) is one test, <name>.<suite>: one program makes the scene once. Sanitizers leave out
 # single tests (script/test): with them it is as many as it has tests.

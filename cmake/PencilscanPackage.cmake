@@ -50,7 +50,10 @@ pencilscan_package(program pencilscan science "Entire shapes from one frame of c
 shows parallel lines, and every camera takes one picture. This program
 plans and calibrates such rigs, simulates frames, reconstructs the entire
 shape from each frame, and measures the result.")
+# What is loaded when it is first needed is not among what dpkg-shlibdeps sees: libopencv_x.so.1 is of libopencv-x1.
+string(REGEX REPLACE "^lib(.*)_(.*)\\.so\\.(.*)$" "lib\\1-\\2\\3" codecs ${PENCILSCAN_IMGCODECS})
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_SHLIBDEPS ON)
+set(CPACK_DEBIAN_PROGRAM_PACKAGE_DEPENDS ${codecs})
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_SUGGESTS "pencilscan-doc, povray")
 
 pencilscan_package(development libpencilscan-dev libdevel "Entire shapes from one frame (C++ development files)"
@@ -69,7 +72,7 @@ calibration, reconstruction, evaluation.")
 set(CPACK_DEBIAN_PYTHON_PACKAGE_SHLIBDEPS ON)
 math(EXPR next_python "${Python_VERSION_MINOR} + 1")
 set(CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS
-  "python3 (>= 3.${Python_VERSION_MINOR}), python3 (<< 3.${next_python}), python3-numpy")
+  "python3 (>= 3.${Python_VERSION_MINOR}), python3 (<< 3.${next_python}), python3-numpy, ${codecs}")
 set(CPACK_DEBIAN_PYTHON_PACKAGE_SUGGESTS pencilscan-doc)
 set(CPACK_DEBIAN_PYTHON_PACKAGE_CONTROL_EXTRA ${PROJECT_SOURCE_DIR}/cmake/debian/prerm)
 

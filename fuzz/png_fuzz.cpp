@@ -2,10 +2,9 @@
 // our decoder has an answer, it is OpenCV's.
 
 #include <opencv2/imgcodecs.hpp>
-#include <opencv2/imgproc.hpp>
-#include <vector>
 
 #include "fuzz.h"
+#include "pencilscan/io/codec.h"
 #include "pencilscan/io/png.h"
 #include "pencilscan/io/png_fixture.h"
 
@@ -17,9 +16,7 @@ void compare(const std::string& file) {
   static_cast<void>(sound_png_shape(file));
   const auto ours = plain_png(file);
   if (!ours) return;
-  const std::vector<char> bytes(file.begin(), file.end());
-  cv::Mat theirs = cv::imdecode(bytes, cv::IMREAD_ANYDEPTH | cv::IMREAD_ANYCOLOR);
-  if (theirs.channels() == 3) cv::cvtColor(theirs, theirs, cv::COLOR_BGR2RGB);
+  const cv::Mat theirs = decoded_picture(file, cv::IMREAD_ANYDEPTH | cv::IMREAD_ANYCOLOR);
   if (theirs.type() != ours->type() || theirs.size() != ours->size() ||
       cv::norm(theirs, *ours, cv::NORM_INF) > 0)
     std::abort();

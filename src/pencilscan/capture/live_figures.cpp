@@ -8,6 +8,7 @@
 #include "pencilscan/capture/camera_picture.h"
 #include "pencilscan/core/formatted.h"
 #include "pencilscan/core/median.h"
+#include "pencilscan/io/codec.h"
 
 namespace pencilscan {
 namespace {
@@ -149,15 +150,7 @@ cv::Mat preview_of(const CameraFrame& frame, int width) {
 
 std::string preview_jpeg(const CameraFrame& frame, int width) {
   constexpr int kQuality = 85;
-  const cv::Mat picture = preview_of(frame, width);  // may be the frame's own
-  cv::Mat stored = picture;
-  if (picture.channels() == 3) {
-    stored = cv::Mat();
-    cv::cvtColor(picture, stored, cv::COLOR_RGB2BGR);
-  }
-  std::vector<std::uint8_t> bytes;
-  cv::imencode(".jpg", stored, bytes, {cv::IMWRITE_JPEG_QUALITY, kQuality});
-  return {bytes.begin(), bytes.end()};
+  return encoded_picture(preview_of(frame, width), ".jpg", {cv::IMWRITE_JPEG_QUALITY, kQuality});
 }
 
 }  // namespace pencilscan

@@ -13,6 +13,7 @@
 #include "pencilscan/core/check.h"
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/lower_case.h"
+#include "pencilscan/io/codec.h"
 #include "pencilscan/io/file.h"
 #include "pencilscan/io/found_files.h"
 #include "pencilscan/io/png.h"
@@ -54,43 +55,25 @@ void check_whole(const std::filesystem::path& path, std::string_view bytes) {
   }
 }
 
-/// Decoded by OpenCV as stored, in RGB order: without rotation by EXIF, alpha dropped, palette
-/// expanded.
+/// As stored, in RGB order: without rotation by EXIF, alpha dropped, palette expanded.
 cv::Mat decode(const std::filesystem::path& path, const std::string& bytes) {
-  const cv::Mat encoded(1, static_cast<int>(bytes.size()), CV_8UC1,
-                        const_cast<char*>(bytes.data()));  // NOLINT: imdecode only reads
-  cv::Mat image;
-  try {
-    image = cv::imdecode(encoded,
-                         cv::IMREAD_ANYDEPTH | cv::IMREAD_ANYCOLOR | cv::IMREAD_IGNORE_ORIENTATION);
-  } catch (const cv::Exception&) {
-    image.release();
-  }
+  cv::Mat image = decoded_picture(
+      bytes, cv::IMREAD_ANYDEPTH | cv::IMREAD_ANYCOLOR | cv::IMREAD_IGNORE_ORIENTATION);
   if (image.empty()) throw InputError(path.string(), "", "", "cannot be decoded as an image");
   if (image.depth() != CV_8U && image.depth() != CV_16U && image.depth() != CV_32F)
     throw InputError(path.string(), "", "", "must have 8 or 16 bit per channel");
-  if (image.channels() == 4) {
-    cv::cvtColor(image, image, cv::COLOR_BGRA2RGB);
-  } else if (image.channels() == 3) {
-    cv::cvtColor(image, image, cv::COLOR_BGR2RGB);
-  } else if (image.channels() != 1) {
+  if (image.channels() == 4) cv::cvtColor(image, image, cv::COLOR_RGBA2RGB);
+  if (image.channels() != 1 && image.channels() != 3)
     throw InputError(path.string(), "", "", "must be grey or colour");
-  }
   return image;
 }
 
-/// RGB to OpenCV's BGR for encoding; one-channel images as they are.
+/// In integers, but for floating-point TIFF.
 cv::Mat encodable(const cv::Mat& image, const std::string& ending, int bit_depth) {
+  if (image.depth() != CV_32F || ending == ".tiff") return image;
   cv::Mat integers;
-  if (image.depth() == CV_32F && ending != ".tiff") {
-    const double top = bit_depth == 16 ? 65535 : 255;
-    image.convertTo(integers, bit_depth == 16 ? CV_16U : CV_8U, top);
-  }
-  const cv::Mat& values = integers.empty() ? image : integers;
-  if (values.channels() != 3) return values;
-  cv::Mat bgr;  // of its own: the caller keeps his image
-  cv::cvtColor(values, bgr, cv::COLOR_RGB2BGR);
-  return bgr;
+  image.convertTo(integers, bit_depth == 16 ? CV_16U : CV_8U, bit_depth == 16 ? 65535 : 255);
+  return integers;
 }
 
 std::string lower_ending(const std::filesystem::path& path) {
@@ -183,17 +166,14 @@ namespace {
 
 void write_encoded(const std::filesystem::path& path, const std::string& ending,
                    const cv::Mat& image, const std::vector<int>& parameters) {
-  std::vector<unsigned char> bytes;
-  bool encoded = false;
+  std::string bytes;
   try {
-    encoded = cv::imencode(ending, image, bytes, parameters);
-  } catch (const cv::Exception& error) {
-    throw StageError(path.string() + ": cannot be encoded: " + error.err);
+    bytes = encoded_picture(image, ending, parameters);
+  } catch (const StageError& error) {
+    throw StageError(path.string() + ": " + error.what());
   }
-  if (!encoded) throw StageError(path.string() + ": cannot be encoded");
   write_atomically(path, [&](std::ostream& stream) {
-    stream.write(reinterpret_cast<const char*>(bytes.data()),
-                 static_cast<std::streamsize>(bytes.size()));
+    stream.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
   });
 }
 

@@ -10,6 +10,7 @@
 #include "pencilscan/io/file.h"
 #include "pencilscan/io/io_fixture.h"
 #include "pencilscan/io/linear_light.h"
+#include "pencilscan/io/little_endian.h"
 #include "pencilscan/io/mosaic.h"
 #include "pencilscan/io/mosaic_light.h"
 
@@ -101,6 +102,45 @@ TEST_F(Io, WhatIsNoImageIsRejected) {
   EXPECT_THAT(error_of([&] { return read_image(put("a.png", "hello")); }),
               ::testing::HasSubstr("must be a PNG, TIFF, JPEG or BMP image"));
   EXPECT_THAT(error_of([&] { return read_image(folder_); }), ::testing::HasSubstr("folder"));
+}
+
+/// A TIFF of one RGB pixel in signed integers of 16 bits.
+std::string signed_tiff() {
+  struct Entry {
+    std::uint16_t tag, type;  // type 3: 16 bits, 4: 32 bits
+    std::uint32_t count, value;
+  };
+  constexpr std::uint32_t kEnd = 8 + 2 + 10 * 12 + 4;          // of header and entries
+  const std::vector<Entry> entries = {{256, 4, 1, 1},          // width
+                                      {257, 4, 1, 1},          // height
+                                      {258, 3, 3, kEnd},       // bits per sample
+                                      {259, 3, 1, 1},          // not compressed
+                                      {262, 3, 1, 2},          // RGB
+                                      {273, 4, 1, kEnd + 12},  // where the pixels are
+                                      {277, 3, 1, 3},          // samples per pixel
+                                      {278, 4, 1, 1},          // rows per strip
+                                      {279, 4, 1, 6},          // bytes of the strip
+                                      {339, 3, 3, kEnd + 6}};  // sample format
+  std::string bytes = "II";
+  append_little_endian<std::uint16_t>(bytes, 42);
+  append_little_endian<std::uint32_t>(bytes, 8);
+  append_little_endian(bytes, static_cast<std::uint16_t>(entries.size()));
+  for (const Entry& entry : entries) {
+    append_little_endian(bytes, entry.tag);
+    append_little_endian(bytes, entry.type);
+    append_little_endian(bytes, entry.count);
+    append_little_endian(bytes, entry.value);
+  }
+  append_little_endian<std::uint32_t>(bytes, 0);
+  for (const int value : {16, 16, 16, 2, 2, 2, 100, 200, 300})
+    append_little_endian(bytes, static_cast<std::uint16_t>(value));
+  return bytes;
+}
+
+TEST_F(Io, SignedPixelsAreRefusedByName) {
+  write_text(folder_ / "a.tiff", signed_tiff());
+  EXPECT_THAT(error_of([&] { return read_image(folder_ / "a.tiff"); }),
+              ::testing::HasSubstr("a.tiff: must have 8 or 16 bit per channel"));
 }
 
 TEST_F(Io, FindImageTriesAllEndings) {

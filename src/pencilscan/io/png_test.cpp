@@ -3,10 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <opencv2/imgcodecs.hpp>
-#include <opencv2/imgproc.hpp>
 #include <string>
 
 #include "pencilscan/core/random.h"
+#include "pencilscan/io/codec.h"
 #include "pencilscan/io/png_fixture.h"
 
 namespace pencilscan {
@@ -32,10 +32,7 @@ std::string chance_rows(const PngHeader& header) {
 }
 
 cv::Mat by_opencv(const std::string& file) {
-  const std::vector<char> bytes(file.begin(), file.end());
-  cv::Mat image = cv::imdecode(bytes, cv::IMREAD_ANYDEPTH | cv::IMREAD_ANYCOLOR);
-  if (image.channels() == 3) cv::cvtColor(image, image, cv::COLOR_BGR2RGB);
-  return image;
+  return decoded_picture(file, cv::IMREAD_ANYDEPTH | cv::IMREAD_ANYCOLOR);
 }
 
 TEST(PlainPng, OfAnyFilterIsWhatOpenCvReads) {

@@ -10,6 +10,7 @@
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/evenly_picked.h"
 #include "pencilscan/core/parallel.h"
+#include "pencilscan/io/codec.h"
 #include "pencilscan/io/file.h"
 #include "pencilscan/io/image.h"
 #include "pencilscan/page/block.h"
@@ -73,13 +74,10 @@ Shown still(const fs::path& file, std::string bytes, int width, int quality) {
   const double scale = std::min(1.0, static_cast<double>(width) / image.cols);
   cv::resize(image, small, {}, scale, scale, cv::INTER_AREA);
   small.convertTo(small, CV_8UC3, 255);
-  cv::cvtColor(small, small, cv::COLOR_RGB2BGR);
-  std::vector<unsigned char> encoded;
-  if (!cv::imencode(".webp", small, encoded, {cv::IMWRITE_WEBP_QUALITY, quality}))
-    throw StageError("a picture of the page cannot be encoded as WebP");
+  std::string encoded = encoded_picture(small, ".webp", {cv::IMWRITE_WEBP_QUALITY, quality});
   if (encoded.size() < shown.bytes.size()) {
     shown.type = "image/webp";
-    shown.bytes.assign(encoded.begin(), encoded.end());
+    shown.bytes = std::move(encoded);
   }
   return shown;
 }

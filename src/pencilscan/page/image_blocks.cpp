@@ -8,6 +8,8 @@
 
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/parallel.h"
+#include "pencilscan/io/codec.h"
+#include "pencilscan/io/file.h"
 #include "pencilscan/io/image.h"
 #include "pencilscan/report/overlay.h"
 #include "pencilscan/report/shaded_view.h"
@@ -17,17 +19,6 @@ namespace pencilscan {
 namespace {
 
 constexpr int kStride = 4;  ///< of depth and hole maps on the page, px: as DepthOptions::stride
-
-/// `image` is RGB or grey, 8 bit.
-EncodedImage encode(const cv::Mat& image, const std::string& ending, const std::string& type,
-                    const std::vector<int>& parameters) {
-  cv::Mat bgr;
-  if (image.channels() == 3) cv::cvtColor(image, bgr, cv::COLOR_RGB2BGR);
-  std::vector<unsigned char> bytes;
-  if (!cv::imencode(ending, bgr.empty() ? image : bgr, bytes, parameters))
-    throw StageError("a picture of the page cannot be encoded as " + type);
-  return {type, std::string(bytes.begin(), bytes.end())};
-}
 
 cv::Mat limited(const cv::Mat& image, int max_width) {
   if (image.cols <= max_width) return image;
@@ -57,8 +48,8 @@ std::optional<EncodedImage> camera_image(const ResultEntry& entry, const Camera&
   }
   if (!file) return std::nullopt;
   const cv::Mat image = shown_image(*file, camera, linear);
-  return encode(limited(image, max_width), ".webp", "image/webp",
-                {cv::IMWRITE_WEBP_QUALITY, quality});
+  return EncodedImage{"image/webp", encoded_picture(limited(image, max_width), ".webp",
+                                                    {cv::IMWRITE_WEBP_QUALITY, quality})};
 }
 
 std::optional<EncodedImage> hole_image(const ResultEntry& entry, const Camera& camera) {
@@ -76,7 +67,8 @@ std::optional<EncodedImage> hole_image(const ResultEntry& entry, const Camera& c
     for (int column = 0; column < nodes.cols; ++column)
       nodes.at<cv::Vec3b>(row, column) = image.at<cv::Vec3b>(kStride * row, kStride * column);
   }
-  return encode(nodes, ".png", "image/png", {cv::IMWRITE_PNG_COMPRESSION, 9});
+  return EncodedImage{"image/png",
+                      encoded_picture(nodes, ".png", {cv::IMWRITE_PNG_COMPRESSION, 9})};
 }
 
 std::optional<Block> depth_block(const ResultEntry& entry, const Camera& camera,
@@ -90,7 +82,7 @@ std::optional<Block> depth_block(const ResultEntry& entry, const Camera& camera,
   std::error_code ignored;
   const bool stored = std::filesystem::is_regular_file(file, ignored);
   if (stored) {
-    const cv::Mat image = cv::imread(file.string(), cv::IMREAD_UNCHANGED);
+    const cv::Mat image = decoded_picture(read_file(file), cv::IMREAD_UNCHANGED);
     if (image.type() != CV_32F || image.cols != camera.width || image.rows != camera.height)
       throw InputError(file.string(), "", "", "must be a float image of its camera's size");
     for (std::size_t i = 0; i < depth.size(); ++i) {
@@ -124,7 +116,7 @@ EncodedImage mesh_thumbnail(const TriangleMesh& mesh, int width, int height) {
   options.supersampling = 2;
   const cv::Mat picture =
       MeshPainter(mesh, 0).draw(make_view(around, Vec3(1, -0.4, 0.35), width, height), options);
-  return encode(picture, ".jpg", "image/jpeg", {cv::IMWRITE_JPEG_QUALITY, 78});
+  return {"image/jpeg", encoded_picture(picture, ".jpg", {cv::IMWRITE_JPEG_QUALITY, 78})};
 }
 
 }  // namespace pencilscan
