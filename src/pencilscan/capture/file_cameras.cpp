@@ -21,8 +21,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr auto kLook = std::chrono::milliseconds(20);  ///< between looks into a folder
-constexpr Seconds kLongestShot{30};                    ///< a program may take for a picture
+constexpr std::int64_t kLookNs = 20'000'000;  ///< between looks into a folder
+constexpr Seconds kLongestShot{30};           ///< a program may take for a picture
 
 bool is_picture(const fs::path& path) {
   const std::string ending = lower_case(path.extension().string());
@@ -70,6 +70,7 @@ class FolderCamera final : public CameraDevice {
     known_.clear();
     for (const auto& [path, size] : pictures()) known_.insert(path);
     sizes_.clear();
+    unreadable_ns_.clear();
     number_ = 0;
     running_ = true;
   }
@@ -81,10 +82,13 @@ class FolderCamera final : public CameraDevice {
   std::optional<CameraFrame> next(Seconds patience) override {
     const std::int64_t until = host_now_ns() + static_cast<std::int64_t>(1e9 * patience.count());
     while (running_) {
-      if (auto frame = look()) return frame;
-      if (host_now_ns() >= until) return std::nullopt;
-      std::this_thread::sleep_for(std::min<std::chrono::nanoseconds>(
-          kLook, std::chrono::nanoseconds(until - host_now_ns())));
+      const std::int64_t now = host_now_ns();
+      if (now >= next_look_ns_) {
+        if (auto frame = look()) return frame;
+        next_look_ns_ = now + kLookNs;
+      }
+      if (now >= until) return std::nullopt;
+      std::this_thread::sleep_for(std::chrono::nanoseconds(std::min(until, next_look_ns_) - now));
     }
     return std::nullopt;
   }
@@ -121,9 +125,13 @@ class FolderCamera final : public CameraDevice {
     if (!settled) return std::nullopt;
     CameraFrame frame = frame_of_file(*oldest, settings_);
     // One that is still being written is looked at again, for a while.
-    if (frame.status == PictureStatus::kUnreadable && ++tries_ * kLook < kLongestShot)
-      return std::nullopt;
-    tries_ = 0;
+    if (frame.status == PictureStatus::kUnreadable) {
+      const std::int64_t now_ns = host_now_ns();
+      const auto since_ns = unreadable_ns_.try_emplace(*oldest, now_ns).first->second;
+      if (Seconds(1e-9 * static_cast<double>(now_ns - since_ns)) < kLongestShot)
+        return std::nullopt;
+    }
+    unreadable_ns_.erase(*oldest);
     known_.insert(*oldest);
     sizes_.erase(*oldest);
     struct stat status {};
@@ -139,7 +147,8 @@ class FolderCamera final : public CameraDevice {
   CameraSettings settings_;
   std::set<fs::path> known_;
   std::map<fs::path, std::uintmax_t> sizes_;
-  int tries_ = 0;
+  std::map<fs::path, std::int64_t> unreadable_ns_;  ///< since when
+  std::int64_t next_look_ns_ = 0;
   std::int64_t number_ = 0;
   std::size_t requests_ = 0;
   bool running_ = false;

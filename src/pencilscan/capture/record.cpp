@@ -45,6 +45,10 @@ class Session {
  private:
   static GatheringOptions gathering_of(const CameraGroup& cameras, const RecordOptions& options);
   void collect();
+  /// Every camera has sent something since the last pulse.
+  [[nodiscard]] bool all_answered() const {
+    return std::all_of(answered_.begin(), answered_.end(), [](char a) { return a != 0; });
+  }
   [[nodiscard]] bool pulse_is_due() const;
   void pulse();
   void take_in(std::vector<GatheredFrame> frames);
@@ -97,8 +101,7 @@ bool Session::pulse_is_due() const {
   if (options_.still_s <= 0 || pulses_ == 0)
     return since_start_.seconds() * options_.rate_hz >= static_cast<double>(pulses_);
   const double waited = since_pulse_.seconds();
-  const bool all = std::all_of(answered_.begin(), answered_.end(), [](char a) { return a != 0; });
-  return (all && waited * options_.rate_hz >= 1) || waited >= options_.still_s;
+  return (all_answered() && waited * options_.rate_hz >= 1) || waited >= options_.still_s;
 }
 
 void Session::pulse() {
@@ -217,7 +220,9 @@ RecordReport Session::run(const RecordWatch& watch) {
   // What began in time may still be on its way.
   end_ns_ = host_now_ns();
   const Stopwatch rest;
-  while (!enough() && rest.seconds() < GatheringOptions{}.patience_s) turn();
+  const double patience = gathering_of(cameras_.group(), options_).patience_s;
+  const bool still = options_.software_trigger && options_.still_s > 0;
+  while (!enough() && rest.seconds() < patience && !(still && all_answered())) turn();
   take_in(gathering_.take(INT64_MAX / 2));
   note_faults();
   writer_.finish();

@@ -21,6 +21,7 @@
 #include "pencilscan/core/formatted.h"
 #include "pencilscan/core/host_clock.h"
 #include "pencilscan/core/name_list.h"
+#include "pencilscan/io/codec.h"
 
 namespace pencilscan {
 
@@ -246,6 +247,8 @@ CameraSettings VideoCamera::configure(const CameraSettings& settings) {
 
 void VideoCamera::start() {
   if (running_) return;
+  // Before pictures come: the buffers hold those of a quarter of a second.
+  if (format_.pixelformat == V4L2_PIX_FMT_MJPEG) load_codecs();
   v4l2_requestbuffers request{};
   request.count = kBuffers;
   request.type = kStream;
@@ -290,11 +293,9 @@ cv::Mat VideoCamera::picture_of(const v4l2_buffer& buffer) const {
   const int width = static_cast<int>(format_.width);
   const int height = static_cast<int>(format_.height);
   if (format_.pixelformat == V4L2_PIX_FMT_MJPEG) {
-    const cv::Mat bytes(1, static_cast<int>(used), CV_8UC1, mapped.memory);
-    cv::Mat picture = cv::imdecode(bytes, cv::IMREAD_COLOR);
-    if (picture.cols != width || picture.rows != height) return {};
-    cv::cvtColor(picture, picture, cv::COLOR_BGR2RGB);
-    return picture;
+    cv::Mat picture =
+        decoded_picture({static_cast<const char*>(mapped.memory), used}, cv::IMREAD_COLOR);
+    return picture.cols == width && picture.rows == height ? picture : cv::Mat();
   }
   if (format_.pixelformat == V4L2_PIX_FMT_YUYV) {
     const std::size_t stride = format_.bytesperline > 0 ? format_.bytesperline : 2U * format_.width;
@@ -317,9 +318,13 @@ std::optional<CameraFrame> VideoCamera::next(Seconds patience) {
   buffer.type = kStream;
   buffer.memory = V4L2_MEMORY_MMAP;
   if (!control(VIDIOC_DQBUF, buffer)) {
-    if (errno == ENODEV) trouble_ = "the camera was unplugged";
+    if (errno == ENODEV)
+      trouble_ = "the camera was unplugged";
+    else if (errno != EAGAIN)
+      trouble_ = std::string("it gives no picture: ") + std::strerror(errno);
     return std::nullopt;
   }
+  trouble_.clear();
   CameraFrame frame;
   frame.arrival_ns = host_now_ns();
   frame.number = buffer.sequence;

@@ -45,6 +45,7 @@ class FakeDriver {
   std::uint32_t sequence = 0;
   bool streaming = false;
   bool unplugged = false;
+  bool broken = false;
   bool closed = false;
 
  private:
@@ -115,6 +116,7 @@ class FakeDriver {
         queued.clear();
         return 0;
       case VIDIOC_DQBUF: {
+        if (broken) return fail(EIO);
         auto& buffer = as<v4l2_buffer>(argument);
         buffer.index = queued.front();
         queued.erase(queued.begin());
@@ -194,6 +196,19 @@ TEST(VideoCamera, NamesDamagedPicturesAndAPulledPlug) {
   VideoKernel kernel = driver.kernel();
   driver.unplugged = true;
   EXPECT_FALSE(camera->next(Seconds(0)));
+}
+
+TEST(VideoCamera, SaysThatItGivesNoPictureUntilItDoesAgain) {
+  FakeDriver driver;
+  const auto camera = open_v4l2_camera("/dev/video7", driver.kernel());
+  camera->configure(of_size(64, 48));
+  camera->start();
+  driver.broken = true;
+  EXPECT_FALSE(camera->next(Seconds(0)));
+  EXPECT_THAT(camera->trouble(), ::testing::HasSubstr("no picture"));
+  driver.broken = false;
+  EXPECT_TRUE(camera->next(Seconds(0)));
+  EXPECT_EQ(camera->trouble(), "");
 }
 
 }  // namespace

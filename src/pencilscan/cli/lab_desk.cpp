@@ -23,6 +23,7 @@
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/formatted.h"
 #include "pencilscan/core/name_list.h"
+#include "pencilscan/core/stopwatch.h"
 #include "pencilscan/io/file.h"
 #include "pencilscan/report/labelled_share.h"
 
@@ -33,7 +34,8 @@ namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 using Values = std::map<std::string, std::string>;
 
-constexpr auto kPulse = std::chrono::milliseconds(250);  ///< between previews that we trigger
+constexpr auto kPulse = std::chrono::milliseconds(250);     ///< between previews that we trigger
+constexpr auto kLookEvery = std::chrono::milliseconds(10);  ///< for whether they have come
 /// One picture that is told to be taken may take its time.
 constexpr double kCalmRateHz = 1;
 
@@ -76,7 +78,10 @@ class Desk final : public LabDesk {
   [[nodiscard]] std::string next_step() const;
   /// The calibrated rig: of this desk, or the given one; empty: there is none yet.
   [[nodiscard]] fs::path calibrated_rig() const;
+  /// What work_.begin() says; previews wait until the work is done.
+  [[nodiscard]] std::string begin(const std::string& what, std::function<void()> work);
   void pulse();
+  void take_previews();
   void show(const ProjectorPicture& picture, const std::string& projector);
   std::string set_camera(const Values& values);
   void flash();
@@ -102,6 +107,7 @@ class Desk final : public LabDesk {
   Json calibration_;
   Json frame_;
 
+  std::mutex cameras_in_use_;  ///< by work or by previews
   LabWork work_;
   std::atomic<bool> ending_ = false;
   std::thread pulse_;
@@ -127,12 +133,44 @@ Desk::~Desk() {
   if (pulse_.joinable()) pulse_.join();
 }
 
+std::string Desk::begin(const std::string& what, std::function<void()> work) {
+  return work_.begin(what, [this, work = std::move(work)] {
+    const std::lock_guard in_use(cameras_in_use_);
+    work();
+  });
+}
+
 /// Cameras that take a picture only when they are told to: a few a second, while nothing else tells
 /// them.
 void Desk::pulse() {
   while (!ending_) {
-    if (!work_.running()) cameras_->group().trigger();
+    if (!work_.running()) take_previews();
     std::this_thread::sleep_for(kPulse);
+  }
+}
+
+/// A picture of each camera, and waits for them: those of slow cameras would pile up, and come
+/// when something else is shown.
+void Desk::take_previews() {
+  const std::lock_guard in_use(cameras_in_use_);
+  const auto pictures = [this](std::size_t camera) {
+    const LiveCameras::Count count = cameras_->count(camera);
+    return count.whole + count.incomplete;
+  };
+  std::vector<std::size_t> before;
+  for (std::size_t c = 0; c < rig_.cameras.size(); ++c) before.push_back(pictures(c));
+  const auto is_awaited = [&](std::size_t camera) {
+    if (pictures(camera) > before[camera]) return false;
+    const std::vector<Fault> faults = cameras_->group().faults();
+    return std::none_of(faults.begin(), faults.end(), [&](const Fault& fault) {
+      return fault.device == rig_.cameras[camera].name;
+    });
+  };
+  const Stopwatch waited;
+  cameras_->group().trigger();
+  for (std::size_t c = 0; c < before.size(); ++c) {
+    while (!ending_ && waited.seconds() < options_.lab.patience_s && is_awaited(c))
+      std::this_thread::sleep_for(kLookEvery);
   }
 }
 
@@ -203,15 +241,14 @@ std::string Desk::act(const std::string& action, const Values& values) {
         projector.empty() || std::any_of(rig_.projectors.begin(), rig_.projectors.end(),
                                          [&](const Projector& p) { return p.name == projector; });
     if (!picture || !known) return "no such picture or projector";
-    return work_.begin("showing",
-                       [this, picture = *picture, projector] { show(picture, projector); });
+    return begin("showing", [this, picture = *picture, projector] { show(picture, projector); });
   }
-  if (action == "test") return work_.begin("flashing", [this] { flash(); });
-  if (action == "capture") return work_.begin("capturing", [this] { capture(); });
-  if (action == "calibrate") return work_.begin("calibrating", [this] { calibrate(); });
+  if (action == "test") return begin("flashing", [this] { flash(); });
+  if (action == "capture") return begin("capturing", [this] { capture(); });
+  if (action == "calibrate") return begin("calibrating", [this] { calibrate(); });
   if (action == "record" && calibrated_rig().empty())
     return "a frame needs a calibrated rig: capture poses first";
-  if (action == "record") return work_.begin("recording", [this] { record(); });
+  if (action == "record") return begin("recording", [this] { record(); });
   return "no such button";
 }
 
@@ -225,7 +262,7 @@ std::string Desk::set_camera(const Values& values) {
     return "an exposure is at most " + formatted(kLongestExposureMs, "%.0f") + " ms";
   const auto index = static_cast<std::size_t>(*camera);
   LabCamera& wanted = options_.lab.cameras[rig_.cameras[index].name];
-  return work_.begin("setting", [this, index, &wanted, exposure, gain = number_in(values, "gain")] {
+  return begin("setting", [this, index, &wanted, exposure, gain = number_in(values, "gain")] {
     LabCamera changed = wanted;
     changed.exposure_ms = *exposure;
     if (gain) changed.gain = *gain;
