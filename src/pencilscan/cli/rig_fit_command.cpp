@@ -40,12 +40,13 @@ PickedFrames picked_frames(const Rig& rig, const FrameSource& frames, std::size_
 }
 
 void print_devices(const RigFit& fit) {
-  std::printf("%-12s %9s %12s %12s %10s\n", "device", "crossings", "they miss px", "expected px",
-              "off by px");
+  std::printf("%-12s %9s %12s %12s %10s %12s\n", "device", "crossings", "they miss px",
+              "expected px", "off by px", "seen from px");
   for (const DeviceFit& device : fit.devices) {
-    std::printf("%-12s %9zu %12.3f %12.3f %10.3f%s\n", device.name.c_str(),
+    std::printf("%-12s %9zu %12.3f %12.3f %10.3f %12.3f%s\n", device.name.c_str(),
                 device.crossings.crossings, device.crossings.median_px,
-                device.crossings.expected_px, device.shift_px, device.has_moved ? "  moved" : "");
+                device.crossings.expected_px, device.shift_px, device.seen_from_px,
+                device.has_moved ? "  moved" : "");
   }
   std::printf("\n");
   std::fflush(stdout);
@@ -79,10 +80,7 @@ void run_rig_fit(const CommonOptions& common, const std::string& rig_path,
   const std::vector<RigPeriod> periods =
       check_rig_over_frames(rig, picked.curves, {}, stderr_progress());
   for (const RigPeriod& period : periods) {
-    if (periods.size() > 1) {
-      std::printf("frames %s to %s\n", picked.names[period.first].c_str(),
-                  picked.names[period.last].c_str());
-    }
+    if (periods.size() > 1) std::printf("%s\n", frames_of(period, picked.names).c_str());
     print_devices(period.fit);
   }
   const RigFit& fit = periods.back().fit;  // how the rig stands now
@@ -94,7 +92,7 @@ void run_rig_fit(const CommonOptions& common, const std::string& rig_path,
   const bool is_known = fit.verdict == RigVerdict::kFits || fit.verdict == RigVerdict::kOneMoved ||
                         fit.verdict == RigVerdict::kSeveralMoved;
   if (is_known && !options.put_back.empty()) write_rig(fit.put_back, options.put_back);
-  if (!fits(periods)) {
+  if (verdict_of(periods) != to_string(RigVerdict::kFits)) {
     throw StageError(
         describe_periods(periods, picked.names) +
         (is_known || options.put_back.empty() ? "" : "; " + options.put_back + " was not written"));

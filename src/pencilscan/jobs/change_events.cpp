@@ -8,6 +8,7 @@
 #include "pencilscan/core/median.h"
 #include "pencilscan/jobs/change_words.h"
 #include "pencilscan/pipeline/repeated_pictures.h"
+#include "pencilscan/refinement/device_mover.h"
 
 namespace pencilscan {
 namespace {
@@ -48,7 +49,7 @@ std::string named_with(const std::vector<FoundChange>& together, const SequenceD
 
 /// Crossings meet again as they should.
 bool agrees_again(const FoundChange& found) {
-  return is_shift(found) ? std::abs(found.change.after) < kShiftPx : !rises(found);
+  return is_shift(found) ? std::abs(found.change.after) < kSmallestMovePx : !rises(found);
 }
 
 double size_of(const FoundChange& found) {
@@ -66,7 +67,8 @@ bool is_steady(std::span<const FrameRow> rows, const FoundChange& found) {
         rows, found.change, [&](const FrameRow& row) { return row.cameras[camera].*shift; });
     return within - before;
   };
-  return std::hypot(change(&CameraRow::shift_x_px), change(&CameraRow::shift_y_px)) < kShiftPx;
+  return std::hypot(change(&CameraRow::shift_x_px), change(&CameraRow::shift_y_px)) <
+         kSmallestMovePx;
 }
 
 }  // namespace

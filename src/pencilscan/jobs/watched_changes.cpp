@@ -7,6 +7,7 @@
 
 #include "pencilscan/core/median.h"
 #include "pencilscan/jobs/change_words.h"
+#include "pencilscan/refinement/device_mover.h"
 
 namespace pencilscan {
 namespace {
@@ -106,8 +107,8 @@ std::vector<WatchedFigure> watched_figures(const SequenceDevices& devices) {
     of_camera("width", true, kWidth, &CameraRow::line_width_px);
     all.back().follows = false;  // a lens creeps out of focus
     of_camera("level", true, kLevel, &CameraRow::image_level);
-    of_camera(kShift, false, kShiftPx, &CameraRow::shift_x_px);
-    of_camera(kShift, false, kShiftPx, &CameraRow::shift_y_px);
+    of_camera(kShift, false, kSmallestMovePx, &CameraRow::shift_x_px);
+    of_camera(kShift, false, kSmallestMovePx, &CameraRow::shift_y_px);
   }
   for (std::size_t d = 0; d < devices.cameras.size() + devices.projectors.size(); ++d) {
     all.push_back({"crossings", d, false, kCrossingsPx,

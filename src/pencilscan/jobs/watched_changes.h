@@ -38,9 +38,6 @@ struct FoundChange {
 /// A shift of a camera's picture with which its crossings meet.
 [[nodiscard]] bool is_shift(const FoundChange& found);
 
-/// As rig check (moved_devices.h): a camera that is off by less is as calibrated.
-inline constexpr double kShiftPx = 0.2;
-
 /// "cam1" and "camera cam1"; devices are cameras, then projectors.
 [[nodiscard]] const std::string& bare_name(const SequenceDevices& devices, std::size_t device);
 [[nodiscard]] std::string name_of(const SequenceDevices& devices, std::size_t device);

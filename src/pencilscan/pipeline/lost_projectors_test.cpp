@@ -11,7 +11,7 @@
 #include "pencilscan/geometry/ray_scene.h"
 #include "pencilscan/joint/joint.h"
 #include "pencilscan/pipeline/projector_places.h"
-#include "pencilscan/pipeline/rig_fit.h"
+#include "pencilscan/pipeline/rig_periods.h"
 #include "pencilscan/pipeline/sample_frame.h"
 #include "pencilscan/planning/ring.h"
 #include "pencilscan/points/triangulate.h"
@@ -152,7 +152,8 @@ TEST_F(LostProjectors, ARefinedRigHasOneAPeriodOfTheCodeOffInItsPlace) {
 }
 
 TEST_F(LostProjectors, ACheckedRigNamesOneThatIsRolledToo) {
-  const RigFit fit = check_rig_on_frames(knocked(kAcross, kByHalfPeriodAndRoll), {curves_, 1});
+  const RigFit fit =
+      check_rig_over_frames(knocked(kAcross, kByHalfPeriodAndRoll), {curves_, 1}).front().fit;
   EXPECT_TRUE(fit.verdict == RigVerdict::kOneMoved || fit.verdict == RigVerdict::kSeveralMoved)
       << fit.text;
   EXPECT_TRUE(fit.devices[rig_->cameras.size() + kAcross].has_moved) << fit.text;

@@ -21,7 +21,7 @@
 #include "pencilscan/evaluation/truth_scene.h"
 #include "pencilscan/io/file.h"
 #include "pencilscan/pipeline/pipeline_fixture.h"
-#include "pencilscan/pipeline/rig_fit.h"
+#include "pencilscan/pipeline/rig_periods.h"
 #include "pencilscan/pipeline/rig_refinement.h"
 #include "pencilscan/pipeline/sample_frame.h"
 #include "pencilscan/pipeline/sequence.h"
@@ -355,9 +355,10 @@ TEST_F(PipelineTest, AProjectorThatIsWholeLinesOffIsPutBackByItsColors) {
     EXPECT_GT(points.size(), 1000U);
     EXPECT_LT(label_figures(truth, points, judge_points(truth, points)).wrong.value(), 0.01)
         << lines;
-    EXPECT_NE(check_rig_on_frames(wrong, {&curves, 1}).verdict, RigVerdict::kFits) << lines;
+    EXPECT_NE(check_rig_over_frames(wrong, {&curves, 1}).front().fit.verdict, RigVerdict::kFits)
+        << lines;
   }
-  EXPECT_EQ(check_rig_on_frames(*rig_, {&curves, 1}).verdict, RigVerdict::kFits);
+  EXPECT_EQ(check_rig_over_frames(*rig_, {&curves, 1}).front().fit.verdict, RigVerdict::kFits);
 }
 
 TEST_F(PipelineTest, ACameraThatWasKnockedIsFoundByTheSurfaceOfTheOthers) {
@@ -374,31 +375,12 @@ TEST_F(PipelineTest, ACameraThatWasKnockedIsFoundByTheSurfaceOfTheOthers) {
     EXPECT_GT(points_by_camera(*rig_, points)[1].size(), 300U);
     EXPECT_LT(label_figures(truth, points, judge_points(truth, points)).wrong.value(), 0.01)
         << turn.transpose();
-    const RigFit fit = check_rig_on_frames(wrong, {&curves, 1});
+    const RigFit fit = check_rig_over_frames(wrong, {&curves, 1}).front().fit;
     // Of two cameras and two projectors, others may seem to have moved a little too.
     EXPECT_TRUE(fit.verdict == RigVerdict::kOneMoved || fit.verdict == RigVerdict::kSeveralMoved)
         << fit.text;
     EXPECT_NEAR(fit.devices[1].shift_px, turn.norm(), 4) << fit.text;
   }
-}
-
-/// Turned so far that crossings meet at the names of other lines.
-TEST(RigCheck, ACameraThatMeasuresWhatTheOthersDoNotIsNoFit) {
-  RingOptions ring = sample::small_ring();
-  ring.cameras = ring.projectors = 3;
-  const Rig rig = make_ring(ring);
-  TriangleMesh egg = make_sphere(100, 40);
-  for (Vec3& vertex : egg.vertices) vertex = vertex.cwiseProduct(Vec3(1, 0.8, 1.3));
-  const Frame frame = sample::photographed_frame(rig, SimulatedObject(egg), {});
-  const PointResult seen = detect_frame(rig, frame);
-  const FrameCurves curves{seen.families, seen.graphs};
-  EXPECT_EQ(check_rig_on_frames(rig, {&curves, 1}).verdict, RigVerdict::kFits);
-  Rig wrong = rig;
-  wrong.cameras[1].device_from_world =
-      corrected_pose(wrong.cameras[1], {Vec3(12, 0, 0), Vec3::Zero()});
-  const RigFit fit = check_rig_on_frames(wrong, {&curves, 1});
-  EXPECT_NE(fit.verdict, RigVerdict::kFits) << fit.text;
-  EXPECT_NE(fit.verdict, RigVerdict::kUnknown) << fit.text;
 }
 
 }  // namespace

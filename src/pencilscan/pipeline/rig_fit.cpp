@@ -9,7 +9,6 @@
 #include "pencilscan/pipeline/disagreement_warnings.h"
 #include "pencilscan/pipeline/frame.h"
 #include "pencilscan/pipeline/lost_cameras.h"
-#include "pencilscan/pipeline/lost_projectors.h"
 
 namespace pencilscan {
 namespace {
@@ -27,6 +26,18 @@ RigVerdict verdict_of(const RigFit& fit, std::size_t moved) {
                       : RigVerdict::kSeveralMoved;
 }
 
+std::string unseen_text(const RigFit& fit) {
+  std::string unseen;
+  for (const DeviceFit& device : fit.devices) {
+    if (!device.may_have_moved_unseen) continue;
+    add_name(unseen,
+             full_name(device) + (std::isfinite(device.seen_from_px)
+                                      ? formatted(device.seen_from_px, " by less than %.0f px")
+                                      : ""));
+  }
+  return unseen.empty() ? "" : "; crossings of lines would hardly show a move of " + unseen;
+}
+
 std::string verdict_text(const RigFit& fit) {
   std::string moved;
   for (const DeviceFit& device : fit.devices) {
@@ -38,9 +49,10 @@ std::string verdict_text(const RigFit& fit) {
       "where image noise explains " + formatted(fit.before.expected_px, "%.3f");
   switch (fit.verdict) {
     case RigVerdict::kFits:
-      return "the rig fits: " + misses;
+      return "the rig fits: " + misses + unseen_text(fit);
     case RigVerdict::kOneMoved:
-      return "one device is to be put back: " + moved + "; then they miss by " +
+      return "one device is to be put back: " + moved +
+             "; then crossing lines miss each other by " +
              formatted(fit.after.median_px, "%.3f px");
     case RigVerdict::kSeveralMoved:
       return "several devices moved: " + moved + "; then crossing lines miss each other by " +
@@ -123,10 +135,16 @@ RigFit fit_of(const Rig& stated, const Rig& rig, const Explanation& explained) {
     fit.doubt = contradiction_text(explained.contradicted);
   if (fit.doubt.empty()) fit.doubt = explained.misplaced;
   const auto per_device = device_disagreements(rig, named.tracks);
+  const Sphere volume = working_volume(rig);
   for (std::size_t d = 0; d < device_count(rig); ++d) {
     fit.devices.push_back({device_at(rig, d).name, d >= rig.cameras.size(), per_device[d],
                            found.alone[d].shift_px, found.alone[d].sigma_px, false,
-                           are_enough(per_device[d]) || named.doubt.telling(d).are_enough(), 0, 0});
+                           are_enough(per_device[d]) || named.doubt.telling(d).are_enough(), 0, 0,
+                           found.alone[d].seen_from_px});
+    const Device& device = device_at(rig, d);
+    const double spacing_px =
+        line_spacing(rig) * device.focal_px() / (device.center() - volume.center).norm();
+    fit.devices.back().may_have_moved_unseen = found.alone[d].seen_from_px > spacing_px / 2;
   }
   fit.put_back = stated;
   for (const DeviceMove& move : found.moved) {
@@ -144,14 +162,6 @@ RigFit fit_of(const Rig& stated, const Rig& rig, const Explanation& explained) {
   fit.verdict = verdict_of(fit, found.moved.size());
   fit.text = verdict_text(fit);
   return fit;
-}
-
-RigFit check_rig_on_frames(const Rig& stated, std::span<const FrameCurves> frames,
-                           const MovedDevicesOptions& options) {
-  const Rig rig = in_footprints(stated);
-  return fit_of(
-      stated, rig,
-      explain(rig, frames, explanation_of(rig, frames, labels_of(rig, frames), options), options));
 }
 
 ordered_json rig_fit_json(const RigFit& fit) {
@@ -173,6 +183,9 @@ ordered_json rig_fit_json(const RigFit& fit) {
                           {"expected_px", thousandth(device.crossings.expected_px)},
                           {"off_by_px", thousandth(device.shift_px)},
                           {"off_by_sigma_px", thousandth(device.sigma_px)},
+                          {"seen_from_px", std::isfinite(device.seen_from_px)
+                                               ? ordered_json(thousandth(device.seen_from_px))
+                                               : ordered_json()},
                           {"moved", device.has_moved}};
     if (device.has_moved) {
       entry["rotation_px"] = thousandth(device.rotation_px);

@@ -11,13 +11,14 @@
 
 namespace pencilscan {
 
-/// Does a rig still fit what its devices see?
+/// Does a rig still fit what its devices see? From the best answer to the worst: with a device put
+/// back, a rig is known again.
 enum class RigVerdict {
   kFits,
   kOneMoved,  ///< one device has to be put back
   kSeveralMoved,
-  kUnexplained,  ///< crossings miss each other, and no device put back helps; or names are wrong
   kUnknown,      ///< too few crossings, of the rig or of a device
+  kUnexplained,  ///< crossings miss each other, and no device put back helps; or names are wrong
 };
 
 [[nodiscard]] const char* to_string(RigVerdict verdict);
@@ -32,6 +33,10 @@ struct DeviceFit {
   bool is_told = true;        ///< what is named of it is enough to judge it by
   double rotation_px = 0;     ///< where it has moved, with the others that have
   double translation_mm = 0;  ///< the same
+  double seen_from_px = 0;    ///< DeviceMove
+  /// Crossings show a move only where it is farther than half a line spacing on its image, which
+  /// names show: one along the lines that it sees, or shows, may not show at all.
+  bool may_have_moved_unseen = false;
 };
 
 /// "camera cam1"
@@ -53,12 +58,6 @@ struct RigFit {
 
 /// What is said of a rig (in footprints: in_footprints(stated)) whose frames are explained.
 [[nodiscard]] RigFit fit_of(const Rig& stated, const Rig& rig, const Explanation& explained);
-
-/// Looks at the crossings of labelled lines of some frames (joint labels, made with corrected
-/// devices where the rig is off: line_naming.h) and finds the fewest devices that moved
-/// (moved_devices.h).
-[[nodiscard]] RigFit check_rig_on_frames(const Rig& rig, std::span<const FrameCurves> frames,
-                                         const MovedDevicesOptions& options = {});
 
 /// A figure of a report, px or mm, in thousandths; 0 where it is not known.
 [[nodiscard]] double thousandth(double value);

@@ -125,8 +125,20 @@ class PeriodFinder {
     const std::size_t end = b.said.last + 1;
     std::vector<Labeling> named = a.explained.labelings;
     named.insert(named.end(), b.explained.labelings.begin(), b.explained.labelings.end());
-    b.said.moved_before = move_between(a.explained.put_back, first, named);
-    if (b.said.moved_before || a.said.fit.verdict != b.said.fit.verdict) return;
+    auto move = move_between(a.explained.put_back, first, named);
+    if (move) {
+      move->frame += first;
+      // Names changed in one frame, and in another one the device moved.
+      if (move->frame != b.said.first) {
+        const auto before = a.said.moved_before;
+        a = explained(first, move->frame, first_explanation(first, move->frame));
+        a.said.moved_before = before;
+        b = explained(move->frame, end, first_explanation(move->frame, end));
+      }
+      b.said.moved_before = move;
+      return;
+    }
+    if (a.said.fit.verdict != b.said.fit.verdict) return;
     Period joined = explained(first, end, first_explanation(first, end));
     joined.said.moved_before = a.said.moved_before;
     if (joined.said.fit.verdict != a.said.fit.verdict) return;
@@ -143,13 +155,21 @@ class PeriodFinder {
   std::vector<Period> found_;
 };
 
+/// True where both are known, and differ in the devices that are to be put back.
+bool stands_elsewhere(const RigFit& a, const RigFit& b) {
+  if (std::max(a.verdict, b.verdict) > RigVerdict::kSeveralMoved) return false;
+  return !std::equal(
+      a.devices.begin(), a.devices.end(), b.devices.begin(), b.devices.end(),
+      [](const DeviceFit& x, const DeviceFit& y) { return x.has_moved == y.has_moved; });
+}
+
+}  // namespace
+
 std::string frames_of(const RigPeriod& period, std::span<const std::string> names) {
   return period.first == period.last
              ? "frame " + names[period.first]
              : "frames " + names[period.first] + " to " + names[period.last];
 }
-
-}  // namespace
 
 std::vector<RigPeriod> check_rig_over_frames(const Rig& rig, std::span<const FrameCurves> frames,
                                              const MovedDevicesOptions& options,
@@ -157,8 +177,14 @@ std::vector<RigPeriod> check_rig_over_frames(const Rig& rig, std::span<const Fra
   return PeriodFinder(rig, frames, options, progress).periods();
 }
 
-bool fits(std::span<const RigPeriod> periods) {
-  return periods.size() == 1 && periods.front().fit.verdict == RigVerdict::kFits;
+std::string verdict_of(std::span<const RigPeriod> periods) {
+  RigVerdict worst = RigVerdict::kFits;
+  for (std::size_t i = 0; i < periods.size(); ++i) {
+    if (periods[i].moved_before || (i > 0 && stands_elsewhere(periods[i - 1].fit, periods[i].fit)))
+      return kMovedMeanwhile;
+    worst = std::max(worst, periods[i].fit.verdict);
+  }
+  return to_string(worst);
 }
 
 std::string describe_periods(std::span<const RigPeriod> periods,
@@ -180,7 +206,7 @@ std::string describe_periods(std::span<const RigPeriod> periods,
 ordered_json periods_json(std::span<const RigPeriod> periods, std::span<const std::string> names) {
   ordered_json report = rig_fit_json(periods.back().fit);
   if (periods.size() == 1) return report;
-  report["verdict"] = kMovedMeanwhile;
+  report["verdict"] = verdict_of(periods);
   report["text"] = describe_periods(periods, names);
   report["periods"] = ordered_json::array();
   for (const RigPeriod& period : periods) {

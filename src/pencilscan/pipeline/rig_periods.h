@@ -17,7 +17,7 @@ struct RigPeriod {
   std::size_t last = 0;
   RigFit fit;  ///< of these frames
   /// What moved between the period before and this one, where crossings tell it.
-  std::optional<MoveBetweenFrames> moved_before;
+  std::optional<MoveBetweenFrames> moved_before;  ///< its frame: `first`
 };
 
 /// Whether a rig still fits frames, in the order of time, between which devices may move: as many
@@ -30,8 +30,13 @@ struct RigPeriod {
                                                            const MovedDevicesOptions& options = {},
                                                            const Progress& progress = {});
 
-/// Whether the rig fits all frames.
-[[nodiscard]] bool fits(std::span<const RigPeriod> periods);
+/// What is said of all frames: "moved meanwhile" where crossings tell that a device moved between
+/// two periods, or other devices are to be put back in the one than in the other; else the worst of
+/// to_string(RigVerdict).
+[[nodiscard]] std::string verdict_of(std::span<const RigPeriod> periods);
+
+/// "frame 000003", "frames 000000 to 000002". `names`: of the frames that were checked.
+[[nodiscard]] std::string frames_of(const RigPeriod& period, std::span<const std::string> names);
 
 /// The same in plain words. `names`: of the frames that were checked.
 [[nodiscard]] std::string describe_periods(std::span<const RigPeriod> periods,

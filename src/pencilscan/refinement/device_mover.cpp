@@ -42,24 +42,27 @@ DeviceMover::DeviceMover(const Rig& rig, std::span<const std::vector<CrossingTra
     : rig_(rig), options_(options), start_(options.start) {
   start_.resize(device_count(rig));
   correction_ = start_;
-  std::vector<std::pair<std::size_t, std::size_t>> all;  // group, place in it
-  for (std::size_t g = 0; g < groups.size(); ++g)
-    for (std::size_t t = 0; t < groups[g].size(); ++t) all.emplace_back(g, t);
-  for (const auto& [group, t] : evenly_picked(all, options.max_tracks)) {
-    const CrossingTrack& track = groups[group][t];
-    const TrackResidual residual(rig, track, options.refine.line_sigma_px);
-    if (!residual.evaluate(poses(residual, correction_), false)) continue;
-    tracks_.push_back(track);
-    groups_.push_back(group);
+  const std::size_t enough =
+      static_cast<std::size_t>(options.refine.min_tracks) * device_count(rig);
+  const std::size_t of_group =
+      std::max(options.max_tracks / std::max<std::size_t>(groups.size(), 1), enough);
+  for (const std::vector<CrossingTrack>& group : groups) {
+    group_begin_.push_back(tracks_.size());
+    for (const CrossingTrack& track : evenly_picked(group, of_group)) {
+      const TrackResidual residual(rig, track, options.refine.line_sigma_px);
+      if (residual.evaluate(poses(residual, correction_), false)) tracks_.push_back(track);
+    }
   }
+  group_begin_.push_back(tracks_.size());
   for (const CrossingTrack& track : tracks_)
     residuals_.emplace_back(rig, track, options.refine.line_sigma_px);
   scale_ = std::max(1.0, residual_deviation());
 }
 
-std::vector<std::size_t> DeviceMover::tracks_of(std::size_t device) const {
+std::vector<std::size_t> DeviceMover::tracks_of(std::size_t device, std::size_t begin,
+                                                std::size_t end) const {
   std::vector<std::size_t> own;
-  for (std::size_t t = 0; t < residuals_.size(); ++t) {
+  for (std::size_t t = begin; t < end; ++t) {
     const auto& devices = residuals_[t].devices();
     if (std::find(devices.begin(), devices.end(), device) != devices.end()) own.push_back(t);
   }
@@ -83,12 +86,14 @@ DeviceMove DeviceMover::alone(std::size_t device) const {
                solve_symmetric(Eigen::MatrixXd(best.normal.matrix), Mat6::Identity()));
   move.shift_px = shift.px;
   move.sigma_px = shift.sigma_px;
+  move.seen_from_px =
+      std::max(options_.smallest_px, std::sqrt(options_.smallest_gain) * shift.sigma_px);
   return move;
 }
 
 DeviceMover::Place DeviceMover::place_in(std::size_t device, std::size_t group) const {
-  std::vector<std::size_t> own = tracks_of(device);
-  std::erase_if(own, [&](std::size_t t) { return groups_[t] != group; });
+  const std::vector<std::size_t> own =
+      tracks_of(device, group_begin_[group], group_begin_[group + 1]);
   if (own.size() < static_cast<std::size_t>(options_.refine.min_tracks)) return {};
   const Best best = best_of(own, device);
   return {vector_of(best.correction), best.normal.matrix};

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -21,19 +22,26 @@ struct DeviceMove {
   /// translation make good for each other.
   double shift_px = 0;
   double sigma_px = 0;  ///< one standard deviation of it that noise gives
+  /// A move of the device that gains MovedDevicesOptions::smallest_gain, in any direction; infinite
+  /// where too few crossings tell of it.
+  double seen_from_px = std::numeric_limits<double>::infinity();
   /// What it takes off the cost of all crossings, in squared deviations of the residuals as they
   /// are before, the loss of correlated ones taken off.
   double gain = 0;
 };
 
+/// A device that is off by less is as calibrated; px. Lens models, curves and calibrations leave
+/// some hundredths of a pixel, and the joint labels take errors of 0.3 px.
+inline constexpr double kSmallestMovePx = 0.2;
+
 struct MovedDevicesOptions {
-  /// A device that is off by less is as calibrated; px. Lens models, curves and calibrations leave
-  /// some hundredths of a pixel, and the joint labels take errors of 0.3 px.
-  double smallest_px = 0.2;
+  double smallest_px = kSmallestMovePx;
   /// And one that gains less. By chance alone the gain of six parameters is chi-squared with six
   /// degrees of freedom, which exceeds 40 once in two million.
   double smallest_gain = 40;
-  std::size_t max_tracks = 6000;  ///< an even subset is used
+  /// An even subset is used, but of each group (DeviceMover) as many as give a device in an even
+  /// share of them refine.min_tracks: what costs most is their time.
+  std::size_t max_tracks = 6000;
   /// Where devices that stand far off were found, one per device, or empty: none. Their moves begin
   /// there, since steps from where the rig has them may not lead so far.
   RigCorrection start;
@@ -77,7 +85,12 @@ class DeviceMover {
   struct Normal;  ///< equations of one device
   struct Best;    ///< correction and its equations
 
-  [[nodiscard]] std::vector<std::size_t> tracks_of(std::size_t device) const;
+  /// Among tracks_[begin] to tracks_[end - 1].
+  [[nodiscard]] std::vector<std::size_t> tracks_of(std::size_t device, std::size_t begin,
+                                                   std::size_t end) const;
+  [[nodiscard]] std::vector<std::size_t> tracks_of(std::size_t device) const {
+    return tracks_of(device, 0, tracks_.size());
+  }
   [[nodiscard]] double residual_deviation() const;
   [[nodiscard]] Normal normal_of(const std::vector<std::size_t>& own, std::size_t device,
                                  const PoseCorrection& at) const;
@@ -89,7 +102,7 @@ class DeviceMover {
   RigCorrection start_;
   RigCorrection correction_;
   std::vector<CrossingTrack> tracks_;
-  std::vector<std::size_t> groups_;  ///< of the tracks
+  std::vector<std::size_t> group_begin_;  ///< where the tracks of each begin; then their number
   std::vector<TrackResidual> residuals_;
   double scale_ = 1;
 };

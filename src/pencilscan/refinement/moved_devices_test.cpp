@@ -106,11 +106,12 @@ std::vector<std::size_t> all_devices(const Rig& rig) {
   return devices;
 }
 
-/// Crossings of six frames; from frame `moved_at` on, `device` stands elsewhere by half a pixel
+/// Crossings of some frames; from frame `moved_at` on, `device` stands elsewhere by half a pixel
 /// than the rig has it.
-std::vector<std::vector<CrossingTrack>> film(std::size_t device, std::size_t moved_at) {
+std::vector<std::vector<CrossingTrack>> film(std::size_t device, std::size_t moved_at,
+                                             std::size_t count = 6) {
   std::vector<std::vector<CrossingTrack>> frames;
-  for (std::size_t f = 0; f < 6; ++f) {
+  for (std::size_t f = 0; f < count; ++f) {
     RingScene scene;
     if (f >= moved_at) scene.rig = stated_rig(scene, device, 0.5, device + 1);
     frames.push_back(scene.tracks(3, 0.1, f + 1));
@@ -136,6 +137,14 @@ TEST(MoveBetweenFrames, TheDeviceAndTheFrameAreFound) {
     EXPECT_NEAR(move->shift_px, 0.5, 0.1);
     EXPECT_LT(move->sigma_px, 0.1);
   }
+}
+
+TEST(MoveBetweenFrames, IsFoundAmongManyFrames) {
+  const RingScene scene;
+  const auto move = find_move_between(scene.rig, film(5, 70, 120), all_devices(scene.rig));
+  ASSERT_TRUE(move);
+  EXPECT_EQ(move->device, 5U);
+  EXPECT_EQ(move->frame, 70U);
 }
 
 TEST(MoveBetweenFrames, OnlyStatedDevicesAndThoseWithEnoughCrossingsAreAccused) {
