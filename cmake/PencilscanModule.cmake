@@ -1,10 +1,11 @@
-# pencilscan_module(<name> SOURCES ... [TESTS ...] [DEPENDS modules...] [LIBRARIES targets...] [PRIVATE_LIBRARIES targets...] [NO_PCH] [LONG_TESTS] [SHARED_SCENES suites...] [AGAINST_CLOCK])
+# pencilscan_module(<name> SOURCES ... [TESTS ...] [DEPENDS modules...] [LIBRARIES targets...] [PRIVATE_LIBRARIES targets...] [NO_PCH] [LONG_TESTS] [SHARED_SCENES suites...] [SLOW_SUITES suites...] [AGAINST_CLOCK])
 # One module = one static library pencilscan_<name> (alias pencilscan::<name>) and, with tests on,
 # one GoogleTest program <name>_test made of the *_test.cpp files beside the sources. CTest runs it as
 # one test, <name>: to start it takes longer than most tests in it. With LONG_TESTS or AGAINST_CLOCK every test is one of CTest's, <name>.<suite>.<test>,
 # so that cores share them, or one alone can be tried again. A suite whose tests share a scene
-# (SetUpTestSuite) is one test, <name>.<suite>: one program makes the scene once. Sanitizers leave out
-# single tests (script/test): with them it is as many as it has tests.
+# (SetUpTestSuite) is one test, <name>.<suite>: one program makes the scene once. Those, and suites
+# that take long (SLOW_SUITES), have the label slow. Sanitizers leave out single tests (script/test):
+# with them every test is one, and none is slow.
 function(pencilscan_target_options target)
   target_compile_features(${target} PUBLIC cxx_std_20)
   set_target_properties(${target} PROPERTIES CXX_EXTENSIONS OFF)
@@ -33,7 +34,7 @@ function(pencilscan_target_options target)
 endfunction()
 
 function(pencilscan_module name)
-  cmake_parse_arguments(ARG "NO_PCH;LONG_TESTS;AGAINST_CLOCK" "" "SOURCES;TESTS;DEPENDS;LIBRARIES;PRIVATE_LIBRARIES;SHARED_SCENES" ${ARGN})
+  cmake_parse_arguments(ARG "NO_PCH;LONG_TESTS;AGAINST_CLOCK" "" "SOURCES;TESTS;DEPENDS;LIBRARIES;PRIVATE_LIBRARIES;SHARED_SCENES;SLOW_SUITES" ${ARGN})
   set(target pencilscan_${name})
   if(ARG_SOURCES)
     add_library(${target} STATIC ${ARG_SOURCES})
@@ -75,14 +76,23 @@ function(pencilscan_module name)
       endforeach()
     elseif(ARG_LONG_TESTS)
       set(others "*")
-      if(ARG_SHARED_SCENES AND NOT CMAKE_CXX_FLAGS MATCHES "-fsanitize")
+      if(NOT CMAKE_CXX_FLAGS MATCHES "-fsanitize")
         foreach(suite IN LISTS ARG_SHARED_SCENES)
           add_test(NAME ${name}.${suite} COMMAND ${name}_test --gtest_filter=${suite}.*)
-          set_tests_properties(${name}.${suite} PROPERTIES TIMEOUT 600 COST 90 LABELS unit ENVIRONMENT GTEST_BRIEF=1
+          set_tests_properties(${name}.${suite} PROPERTIES TIMEOUT 600 COST 90 LABELS "unit;slow" ENVIRONMENT GTEST_BRIEF=1
                                FAIL_REGULAR_EXPRESSION " 0 tests from 0 test suites")
         endforeach()
-        list(TRANSFORM ARG_SHARED_SCENES APPEND ".*" OUTPUT_VARIABLE others)
-        list(JOIN others ":" others)
+        list(TRANSFORM ARG_SHARED_SCENES APPEND ".*")
+        list(TRANSFORM ARG_SLOW_SUITES APPEND ".*")
+        if(ARG_SLOW_SUITES)
+          list(JOIN ARG_SLOW_SUITES ":" slow)
+          gtest_discover_tests(${name}_test TEST_PREFIX "${name}." TEST_FILTER "${slow}" DISCOVERY_TIMEOUT 60
+                               PROPERTIES TIMEOUT 300 LABELS slow)
+        endif()
+        list(JOIN ARG_SHARED_SCENES ":" others)
+        if(ARG_SLOW_SUITES)
+          string(APPEND others ":${slow}")
+        endif()
         set(others "-${others}")
       endif()
       gtest_discover_tests(${name}_test TEST_PREFIX "${name}." TEST_FILTER "${others}" DISCOVERY_TIMEOUT 60
