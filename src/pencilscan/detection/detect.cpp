@@ -7,6 +7,7 @@
 
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/detection/ghosts.h"
+#include "pencilscan/detection/missing_channels.h"
 #include "pencilscan/detection/mosaic_trace.h"
 #include "pencilscan/detection/room_light.h"
 #include "pencilscan/rig/camera_light.h"
@@ -92,6 +93,7 @@ CameraDetection detect_curves(const Camera& camera, const Rig& rig,
   }
   // Read the colour code along each curve.
   measure_code(rgb, families, result.curves, options.code);
+  allow_for_missing_channels(families, rgb.size(), pitch_px, result.curves);
   const Eigen::Vector2f corner(static_cast<float>(area.x), static_cast<float>(area.y));
   for (Curve& curve : result.curves) {
     for (CurvePoint& point : curve.points) point.position += corner;

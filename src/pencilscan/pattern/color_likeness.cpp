@@ -27,6 +27,20 @@ bool look_alike(const PatternColor& a, const PatternColor& b) {
   return cosine > 0 && 1 - cosine * cosine < kColorError * kColorError;
 }
 
+bool is_rest_of(const PatternColor& rest, const PatternColor& full) {
+  const auto has = [](const PatternColor& color, std::size_t channel) {
+    const Rgb& light = color.light();
+    return light[channel] > kColorError * std::hypot(light[0], light[1], light[2]);
+  };
+  Rgb left{};
+  bool lacks = false;
+  for (std::size_t c = 0; c < 3; ++c) {
+    if (has(rest, c)) left[c] = full.light()[c];
+    lacks = lacks || (has(full, c) && !has(rest, c));
+  }
+  return lacks && std::hypot(left[0], left[1], left[2]) > 0 && look_alike(PatternColor(left), rest);
+}
+
 int likeliest_color(const PatternColor& color, std::span<const PatternColor> family) {
   auto found = std::find(family.begin(), family.end(), color);
   if (found == family.end())

@@ -361,6 +361,30 @@ TEST_F(PipelineTest, AProjectorThatIsWholeLinesOffIsPutBackByItsColors) {
   EXPECT_EQ(check_rig_over_frames(*rig_, {&curves, 1}).front().fit.verdict, RigVerdict::kFits);
 }
 
+/// Its upper part is red, its lower part blue: cyan lines are blue there, and yellow ones red.
+TEST_F(PipelineTest, LinesOnAColoredObjectHaveTheirNames) {
+  Frame painted = *frame_;
+  for (cv::Mat& image : painted.images) {
+    image = image.clone();
+    const int middle = image.rows / 2;
+    const auto paint = [&](int begin, int end, const cv::Scalar& rgb) {
+      cv::Mat part = image.rowRange(begin, end);
+      cv::multiply(part, rgb, part);
+    };
+    paint(0, middle, {1, 0.06, 0.05});
+    paint(middle, image.rows, {0.05, 0.08, 0.9});
+  }
+  const TruthScene truth(ball(), *rig_);
+  const PointResult white = sample::labelled_points(*rig_, *frame_);
+  const PointResult result = sample::labelled_points(*rig_, painted);
+  const auto verdicts = judge_points(truth, result.points);
+  EXPECT_LT(label_figures(truth, result.points, verdicts).wrong.value(), 0.01);
+  EXPECT_GT(static_cast<double>(result.points.size()),
+            0.8 * static_cast<double>(white.points.size()));
+  for (const Warning& warning : result.warnings)
+    EXPECT_NE(warning.code, WarningCode::kNamesDoubtful) << warning.text;
+}
+
 TEST_F(PipelineTest, ACameraThatWasKnockedIsFoundByTheSurfaceOfTheOthers) {
   const PointResult seen = detect_frame(*rig_, *frame_);
   const FrameCurves curves{seen.families, seen.graphs};

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "pencilscan/core/name_list.h"
+#include "pencilscan/pattern/color_likeness.h"
 
 namespace pencilscan {
 namespace {
@@ -31,6 +32,16 @@ SeenColor seen_color(const float* code, int colors) {
   }
   seen.weight = 1 - std::exp(static_cast<double>(second - code[seen.color]));
   return seen;
+}
+
+/// Of each colour of a family, whether no other one can look like it.
+std::vector<char> firm_colors(const ColorFamily& family) {
+  std::vector<char> firm;
+  for (const PatternColor& color : family.colors)
+    firm.push_back(
+        std::none_of(family.colors.begin(), family.colors.end(),
+                     [&](const PatternColor& other) { return is_rest_of(color, other); }));
+  return firm;
 }
 
 /// Share of a pattern's lines that have each symbol.
@@ -79,6 +90,9 @@ void ShownColorCount::add(const std::vector<ColorFamily>& families,
       const LinePattern& lines = pattern(count->ref);
       const std::vector<int> color_of = family.color_of_symbol(lines);
       const int reach = reach_of(lines);
+      const std::vector<char> firm = firm_colors(family);
+      Firm of_run;
+      int firm_points = 0;
       Seen& in_camera = seen_[static_cast<std::size_t>(graph.camera)]
                              [static_cast<std::size_t>(count - counts_.begin())];
       ++count->runs;
@@ -94,9 +108,20 @@ void ShownColorCount::add(const std::vector<ColorFamily>& families,
           const int id = (run.label.line + shift + lines.period() * kFarthest) % lines.period();
           if (color_of[static_cast<std::size_t>(lines.symbol(id))] != seen.color) continue;
           count->agree[static_cast<std::size_t>(shift + reach)] += seen.weight;
-          if (shift == 0) in_camera.agree += seen.weight;
+          if (shift != 0) continue;
+          in_camera.agree += seen.weight;
+          if (firm[static_cast<std::size_t>(seen.color)] != 0) of_run.agree += seen.weight;
         }
         in_camera.weight += seen.weight;
+        if (firm[static_cast<std::size_t>(seen.color)] == 0) continue;
+        of_run.weight += seen.weight;
+        ++firm_points;
+      }
+      of_run.runs = 2 * firm_points > run.end - run.begin ? 1 : 0;
+      for (Firm* sum : {&count->firm, &in_camera.firm}) {
+        sum->runs += of_run.runs;
+        sum->weight += of_run.weight;
+        sum->agree += of_run.agree;
       }
     }
   }
@@ -114,6 +139,8 @@ std::vector<ShownColors> ShownColorCount::shown() const {
     if (!(count.weight > 0)) continue;  // no colour tells
     shown.chance = count.chance;
     shown.one_color = *std::max_element(count.seen.begin(), count.seen.end()) / count.weight;
+    shown.firm_runs = count.firm.runs;
+    if (count.firm.weight > 0) shown.firm_share = count.firm.agree / count.firm.weight;
     shown.most_lines = *std::max_element(shares.begin(), shares.end());
     const auto share_at = [&](int shift) {
       return count.agree[static_cast<std::size_t>(shift + reach)] / count.weight;
@@ -138,16 +165,22 @@ std::vector<ShownColors> ShownColorCount::seen() const {
     double weight = 0;
     double chance = 0;
     double agree = 0;
+    Firm firm;
     for (std::size_t k = 0; k < counts_.size(); ++k) {
       if (!(counts_[k].chance < 1) || of_patterns[k].all_look_alike()) continue;
       seen.runs += in_camera[k].runs;
       weight += in_camera[k].weight;
       chance += counts_[k].chance * in_camera[k].weight;
       agree += in_camera[k].agree;
+      firm.runs += in_camera[k].firm.runs;
+      firm.weight += in_camera[k].firm.weight;
+      firm.agree += in_camera[k].firm.agree;
     }
     if (!(weight > 0)) continue;
     seen.chance = chance / weight;
     seen.share = seen.shifted_share = agree / weight;
+    seen.firm_runs = firm.runs;
+    if (firm.weight > 0) seen.firm_share = firm.agree / firm.weight;
   }
   return result;
 }

@@ -19,7 +19,12 @@ struct ShownColors {
   std::size_t runs = 0;  ///< stretches with a name
   double chance = 1;     ///< share that would agree if names had no meaning
   double share = 0;      ///< of the points, by what their colours tell: they have their line's
-  int shift = 0;         ///< if all lines were named so much further, most would agree
+  /// The same of those points, and how many stretches there are of them, whose colour no other one
+  /// can look like: a coloured surface makes red of yellow and blue of cyan, but nothing makes
+  /// yellow or cyan. Wrong names have wrong colours both ways.
+  double firm_share = 1;
+  std::size_t firm_runs = 0;
+  int shift = 0;  ///< if all lines were named so much further, most would agree
   double shifted_share = 0;
   double one_color = 0;   ///< share of the points that have the colour that most of them have
   double most_lines = 1;  ///< share of the pattern's lines that have the commonest colour
@@ -31,7 +36,10 @@ struct ShownColors {
   }
   /// Half of what lies between chance and certainty. Right names have .9 and more, names a few
   /// lines off what chance gives; in between lie patterns of which some places are named wrong.
-  [[nodiscard]] bool deny() const { return tell() && share < 0.5 * (chance + 1); }
+  [[nodiscard]] bool deny() const {
+    const double least = 0.5 * (chance + 1);
+    return tell() && share < least && firm_runs >= 8 && firm_share < least;
+  }
   /// Which shift is right, where they deny the names as they are; 0: none is.
   [[nodiscard]] int better_shift() const {
     return deny() && shifted_share > 0.5 * (chance + 1) ? shift : 0;
@@ -61,6 +69,12 @@ class ShownColorCount {
   [[nodiscard]] std::string alike() const;
 
  private:
+  /// Points of firm colours.
+  struct Firm {
+    std::size_t runs = 0;
+    double weight = 0;
+    double agree = 0;
+  };
   struct Count {
     PatternRef ref;
     double chance = 1;
@@ -68,6 +82,7 @@ class ShownColorCount {
     double weight = 0;
     std::vector<double> agree;  ///< per shift, from -reach
     std::vector<double> seen;   ///< weight per colour of the family
+    Firm firm = {};
   };
   [[nodiscard]] const LinePattern& pattern(PatternRef ref) const;
 
@@ -76,6 +91,7 @@ class ShownColorCount {
     std::size_t runs = 0;
     double weight = 0;
     double agree = 0;
+    Firm firm = {};
   };
 
   const Rig* rig_;

@@ -20,8 +20,11 @@ class ShownColorsTest : public ::testing::Test {
     std::vector<GridGraph> graphs;
     for (const int camera : {0, 1}) {
       graphs.push_back(scene.graph(camera, 60, 0.02, 3));
+      int drawn = 0;
       for (Curve& curve : graphs.back().curves) {
-        if (curve.family >= seen_in_one_color_) continue;
+        const bool is_painted = ++drawn % 5 < painted_fifths_;
+        if (curve.family >= seen_in_one_color_ && !is_painted) continue;
+        // Of blue and cyan, and of red and yellow, the first is what is left of the second.
         for (std::size_t k = 0; k < curve.code.size(); ++k) curve.code[k] = k % 2 == 0 ? 0 : -5;
       }
       const GridGraph& graph = graphs.back();
@@ -42,6 +45,7 @@ class ShownColorsTest : public ::testing::Test {
     return count.shown();
   }
   int seen_in_one_color_ = 0;  ///< so many projectors
+  int painted_fifths_ = 0;     ///< of the curves are on a surface that is not green
   int one_in_ = 1;             ///< curves of the second one has a name
   int frames_ = 1;
   std::string denied_;
@@ -91,6 +95,27 @@ TEST_F(ShownColorsTest, LinesThatAllLookAlikeDoNotAccuseTheCamerasThatSeeThem) {
   EXPECT_TRUE(shown[0].all_look_alike());
   EXPECT_FALSE(shown[1].all_look_alike());
   EXPECT_EQ(denied_, "");
+}
+
+TEST_F(ShownColorsTest, AColoredObjectDeniesNoRightName) {
+  painted_fifths_ = 3;
+  frames_ = 2;
+  for (const ShownColors& shown : shown_with({0, 0})) {
+    EXPECT_FALSE(shown.all_look_alike());
+    EXPECT_LT(shown.share, 0.75);
+    EXPECT_GE(shown.firm_runs, 8U);
+    EXPECT_DOUBLE_EQ(shown.firm_share, 1);
+    EXPECT_FALSE(shown.deny());
+  }
+  EXPECT_EQ(denied_, "");
+}
+
+TEST_F(ShownColorsTest, OnAColoredObjectWrongNamesAreStillDenied) {
+  painted_fifths_ = 2;
+  frames_ = 3;
+  const std::vector<ShownColors> shown = shown_with({0, 3});
+  EXPECT_FALSE(shown[0].deny());
+  EXPECT_TRUE(shown[1].deny());
 }
 
 class ColorsThatDoNotTell : public ShownColorsTest {
