@@ -91,15 +91,16 @@ class MissingChannels {
   std::size_t full_;
   std::size_t rest_;
   std::size_t colors_;
-  cv::Mat lines_;     ///< per cell of a spacing, spacings of curve
-  cv::Mat evidence_;  ///< the same, weighed; then around each cell
-  double share_ = 0.1;
+  cv::Mat lines_;       ///< per cell of a spacing, spacings of curve
+  cv::Mat evidence_;    ///< the same, weighed; then around each cell
+  double share_ = 0.1;  ///< of places that lack the channels; where the turns begin
 };
 
 }  // namespace
 
 void allow_for_missing_channels(const std::vector<ColorFamily>& families, cv::Size size,
                                 double spacing_px, std::vector<Curve>& curves) {
+  spacing_px = std::max(1.0, spacing_px);  // lines closer than pixels are none
   for (std::size_t f = 0; f < families.size(); ++f) {
     const std::vector<PatternColor>& colors = families[f].colors;
     for (std::size_t full = 0; full < colors.size(); ++full) {

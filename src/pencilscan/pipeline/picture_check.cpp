@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <functional>
+#include <numbers>
 #include <opencv2/imgproc.hpp>
 
+#include "pencilscan/core/formatted.h"
 #include "pencilscan/core/median.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/pipeline/picture_trial.h"
@@ -11,6 +13,7 @@
 #include "pencilscan/pipeline/view_agreement.h"
 #include "pencilscan/points/settle.h"
 #include "pencilscan/rig/camera_light.h"
+#include "pencilscan/rig/object_space.h"
 
 namespace pencilscan {
 namespace {
@@ -58,6 +61,28 @@ struct Suspect {
   PictureFinding best;
   double best_named = 0;
 };
+
+/// How wide a camera's lines are: the median over its curves' points, of the lines' width at the
+/// volume's centre in its picture; 0 without curves.
+double usual_line_width(const Rig& rig, const GridGraph& graph) {
+  std::vector<float> widths;
+  for (const Curve& curve : graph.curves)
+    for (const CurvePoint& point : curve.points) widths.push_back(point.width_px);
+  return widths.empty() ? 0
+                        : static_cast<double>(upper_median(std::move(widths))) /
+                              pixels_at_center(rig, rig.camera(graph.camera), line_width(rig));
+}
+
+PictureFinding misfit(const Rig& rig, const PointResult& found, std::size_t camera) {
+  std::vector<double> of_others;
+  for (std::size_t c = 0; c < found.graphs.size(); ++c)
+    if (const double width = usual_line_width(rig, found.graphs[c]); c != camera && width > 0)
+      of_others.push_back(width);
+  PictureFinding finding{PictureFault::kDoesNotFit, static_cast<int>(camera), -1};
+  const double own = usual_line_width(rig, found.graphs[camera]);
+  if (own > 0 && !of_others.empty()) finding.line_width = own / upper_median(std::move(of_others));
+  return finding;
+}
 
 /// The two of the doubtful cameras whose pictures contradict nothing where the other one stands, if
 /// there are no other two. `points`: what each measured.
@@ -129,10 +154,13 @@ std::string describe(const Rig& rig, const PictureFinding& finding) {
     case PictureFault::kDoesNotFit:
       break;
   }
-  return who +
-         "does not fit the rig as the others' do: the camera was moved, or the picture is of "
-         "another moment or rig" +
-         out;
+  const std::string misfit = "does not fit the rig as the others' do: ";
+  const std::string moved = "the camera was moved, or the picture is of another moment or rig";
+  // A blur as wide as the lines.
+  if (finding.line_width > std::numbers::sqrt2)
+    return who + misfit + "its lines are " + formatted(finding.line_width, "%.1f") +
+           " times as wide as theirs, so it is out of focus; or " + moved + out;
+  return who + misfit + moved + out;
 }
 
 std::vector<PictureFinding> misplaced_pictures(const Rig& rig, const Frame& frame,
@@ -202,7 +230,7 @@ std::vector<PictureFinding> misplaced_pictures(const Rig& rig, const Frame& fram
     } else if (s.shown.fits()) {
       ++fit;
     } else if (s.share < kFarLess * usual && (s.shown.misfits() || is_contradicted(s.camera))) {
-      unfit.push_back({PictureFault::kDoesNotFit, static_cast<int>(s.camera), -1});
+      unfit.push_back(misfit(rig, found, s.camera));
     }
   }
   // Where most do not fit, their pictures are not what is wrong.
@@ -243,7 +271,7 @@ std::vector<PictureFinding> contradicting_pictures(const Rig& rig, const Frame& 
                         named < kFewer * upper_median(std::move(of_others));
   points[alone].clear();
   if (count < 3 || !is_plain || ViewAgreement(rig, points).doubtful_pairs() > 0) return {};
-  return {{PictureFault::kDoesNotFit, static_cast<int>(alone), -1}};
+  return {misfit(rig, found, alone)};
 }
 
 bool points_lie_on_lines(const Rig& rig, const PointResult& found) {

@@ -260,6 +260,14 @@ TEST_F(PictureCheck, OfFewLinesThatAreExpectedNextToAllHaveToBeMissing) {
   EXPECT_FALSE(are_missing(4000, 1100));  // as few as a right projector has
 }
 
+TEST_F(PictureCheck, ACameraOutOfFocusIsSaidToBe) {
+  Frame frame = *frame_;
+  cv::GaussianBlur(frame_->images[2], frame.images[2], {}, 6);
+  expect_said(frame,
+              {"camera cam2: its picture does not fit the rig as the others' do: its lines are"});
+  EXPECT_THAT(said_of(frame).front(), HasSubstr("out of focus"));
+}
+
 /// What is left in its colours is of others that share them, and no sign that it was moved.
 TEST_F(PictureCheck, AProjectorThatIsOffStandsNowhereElse) {
   const Rig rig = make_ring(sample::small_ring());
