@@ -11,6 +11,7 @@
 #include "pencilscan/core/check.h"
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/formatted.h"
+#include "pencilscan/io/codec.h"
 
 namespace pencilscan {
 namespace {
@@ -193,6 +194,7 @@ void CameraGroup::configure(std::size_t camera, const CameraSettings& settings) 
 
 void CameraGroup::start(Sink sink) {
   PENCILSCAN_CHECK(!running_);
+  load_codecs();  // now: nobody can wait for them once pictures come
   running_ = true;
   for (auto& member : members_) {
     {

@@ -247,8 +247,6 @@ CameraSettings VideoCamera::configure(const CameraSettings& settings) {
 
 void VideoCamera::start() {
   if (running_) return;
-  // Before pictures come: the buffers hold those of a quarter of a second.
-  if (format_.pixelformat == V4L2_PIX_FMT_MJPEG) load_codecs();
   v4l2_requestbuffers request{};
   request.count = kBuffers;
   request.type = kStream;

@@ -149,8 +149,8 @@ void Desk::pulse() {
   }
 }
 
-/// A picture of each camera, and waits for them: those of slow cameras would pile up, and come
-/// when something else is shown.
+/// A picture of each camera. Waits for programs that take them: their pictures would pile up, and
+/// come when something else is shown. A camera that loses one has lost it, and others go on.
 void Desk::take_previews() {
   const std::lock_guard in_use(cameras_in_use_);
   const auto pictures = [this](std::size_t camera) {
@@ -160,7 +160,7 @@ void Desk::take_previews() {
   std::vector<std::size_t> before;
   for (std::size_t c = 0; c < rig_.cameras.size(); ++c) before.push_back(pictures(c));
   const auto is_awaited = [&](std::size_t camera) {
-    if (pictures(camera) > before[camera]) return false;
+    if (!cameras_->group().info(camera).of_files || pictures(camera) > before[camera]) return false;
     const std::vector<Fault> faults = cameras_->group().faults();
     return std::none_of(faults.begin(), faults.end(), [&](const Fault& fault) {
       return fault.device == rig_.cameras[camera].name;

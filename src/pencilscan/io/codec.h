@@ -7,8 +7,8 @@
 
 namespace pencilscan {
 
-/// Loads OpenCV's codecs, which the functions below do when they are first called: some tenths of a
-/// second, for those who cannot wait then.
+/// Loads OpenCV's codecs, which the functions below do when they are first called. For those who
+/// cannot wait then: it takes some tenths of a second, on a busy machine one or two.
 /// @throws StageError where they cannot be loaded.
 void load_codecs();
 
