@@ -1,8 +1,8 @@
 # pencilscan_module(<name> SOURCES ... [TESTS ...] [DEPENDS modules...] [LIBRARIES targets...] [PRIVATE_LIBRARIES targets...] [NO_PCH] [LONG_TESTS] [SHARED_SCENES suites...] [SLOW_SUITES suites...] [AGAINST_CLOCK])
 # One module = one static library pencilscan_<name> (alias pencilscan::<name>) and, with tests on,
 # one GoogleTest program <name>_test made of the *_test.cpp files beside the sources. CTest runs it as
-# one test, <name>: to start it takes longer than most tests in it. With LONG_TESTS or AGAINST_CLOCK every test is one of CTest's, <name>.<suite>.<test>,
-# so that cores share them, or one alone can be tried again. A suite whose tests share a scene
+# one test, <name>: to start it takes longer than most tests in it. With LONG_TESTS or AGAINST_CLOCK
+# every test is one of CTest's, <name>.<suite>.<test>, so that cores share them, or one alone can be tried again. A suite whose tests share a scene
 # (SetUpTestSuite) is one test, <name>.<suite>: one program makes the scene once. Those, and suites
 # that take long (SLOW_SUITES), have the label slow. Sanitizers leave out single tests (script/test):
 # with them every test is one, and none is slow.
@@ -75,27 +75,24 @@ function(pencilscan_module name)
                              PROPERTIES TIMEOUT 300 RUN_SERIAL ${alone} LABELS clock)
       endforeach()
     elseif(ARG_LONG_TESTS)
-      set(others "*")
+      set(apart "")  # suites that have tests of their own
       if(NOT CMAKE_CXX_FLAGS MATCHES "-fsanitize")
         foreach(suite IN LISTS ARG_SHARED_SCENES)
           add_test(NAME ${name}.${suite} COMMAND ${name}_test --gtest_filter=${suite}.*)
           set_tests_properties(${name}.${suite} PROPERTIES TIMEOUT 600 COST 90 LABELS "unit;slow" ENVIRONMENT GTEST_BRIEF=1
                                FAIL_REGULAR_EXPRESSION " 0 tests from 0 test suites")
         endforeach()
-        list(TRANSFORM ARG_SHARED_SCENES APPEND ".*")
-        list(TRANSFORM ARG_SLOW_SUITES APPEND ".*")
+        set(apart ${ARG_SHARED_SCENES} ${ARG_SLOW_SUITES})
+        list(TRANSFORM apart APPEND ".*")
         if(ARG_SLOW_SUITES)
-          list(JOIN ARG_SLOW_SUITES ":" slow)
+          list(TRANSFORM ARG_SLOW_SUITES APPEND ".*" OUTPUT_VARIABLE slow)
+          list(JOIN slow ":" slow)
           gtest_discover_tests(${name}_test TEST_PREFIX "${name}." TEST_FILTER "${slow}" DISCOVERY_TIMEOUT 60
                                PROPERTIES TIMEOUT 300 LABELS slow)
         endif()
-        list(JOIN ARG_SHARED_SCENES ":" others)
-        if(ARG_SLOW_SUITES)
-          string(APPEND others ":${slow}")
-        endif()
-        set(others "-${others}")
       endif()
-      gtest_discover_tests(${name}_test TEST_PREFIX "${name}." TEST_FILTER "${others}" DISCOVERY_TIMEOUT 60
+      list(JOIN apart ":" apart)
+      gtest_discover_tests(${name}_test TEST_PREFIX "${name}." TEST_FILTER "*-${apart}" DISCOVERY_TIMEOUT 60
                            PROPERTIES TIMEOUT 300 LABELS unit)
     else()
       add_test(NAME ${name} COMMAND ${name}_test)

@@ -64,6 +64,7 @@ class FrameGathering {
   /// `clocks`: what is known of the cameras' clocks already; empty: nothing.
   explicit FrameGathering(GatheringOptions options, std::vector<ClockFit> clocks = {});
 
+  [[nodiscard]] const GatheringOptions& options() const { return options_; }
   void add(std::size_t camera, CameraFrame frame);
   /// Sets that are ready at this time (host_now_ns()).
   [[nodiscard]] std::vector<GatheredFrame> take(std::int64_t now_ns);

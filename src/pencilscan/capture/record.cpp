@@ -220,7 +220,7 @@ RecordReport Session::run(const RecordWatch& watch) {
   // What began in time may still be on its way.
   end_ns_ = host_now_ns();
   const Stopwatch rest;
-  const double patience = gathering_of(cameras_.group(), options_).patience_s;
+  const double patience = gathering_.options().patience_s;
   const bool still = options_.software_trigger && options_.still_s > 0;
   while (!enough() && rest.seconds() < patience && !(still && all_answered())) turn();
   take_in(gathering_.take(INT64_MAX / 2));

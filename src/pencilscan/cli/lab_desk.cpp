@@ -157,19 +157,20 @@ void Desk::take_previews() {
     const LiveCameras::Count count = cameras_->count(camera);
     return count.whole + count.incomplete;
   };
-  std::vector<std::size_t> before;
-  for (std::size_t c = 0; c < rig_.cameras.size(); ++c) before.push_back(pictures(c));
-  const auto is_awaited = [&](std::size_t camera) {
-    if (!cameras_->group().info(camera).of_files || pictures(camera) > before[camera]) return false;
+  const auto is_at_fault = [this](std::size_t camera) {
     const std::vector<Fault> faults = cameras_->group().faults();
-    return std::none_of(faults.begin(), faults.end(), [&](const Fault& fault) {
+    return std::any_of(faults.begin(), faults.end(), [&](const Fault& fault) {
       return fault.device == rig_.cameras[camera].name;
     });
   };
+  std::vector<std::pair<std::size_t, std::size_t>> awaited;  // camera, its pictures before
+  for (std::size_t c = 0; c < rig_.cameras.size(); ++c)
+    if (cameras_->group().info(c).of_files) awaited.emplace_back(c, pictures(c));
   const Stopwatch waited;
   cameras_->group().trigger();
-  for (std::size_t c = 0; c < before.size(); ++c) {
-    while (!ending_ && waited.seconds() < options_.lab.patience_s && is_awaited(c))
+  for (const auto& [camera, before] : awaited) {
+    while (!ending_ && waited.seconds() < options_.lab.patience_s && pictures(camera) == before &&
+           !is_at_fault(camera))
       std::this_thread::sleep_for(kLookEvery);
   }
 }

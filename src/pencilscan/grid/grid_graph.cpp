@@ -1,8 +1,8 @@
-#include "pencilscan/grid/grid_graph.h"
 
 #include <algorithm>
 
 #include "pencilscan/core/disjoint_sets.h"
+#include "pencilscan/core/median.h"
 #include "pencilscan/grid/local_ids.h"
 #include "pencilscan/grid/projector_votes.h"
 
@@ -90,6 +90,15 @@ std::size_t curve_points(const GridGraph& graph) {
   std::size_t count = 0;
   for (const Curve& curve : graph.curves) count += curve.points.size();
   return count;
+}
+
+double median_of_points(std::span<const GridGraph> graphs, float CurvePoint::*figure) {
+  std::vector<double> values;
+  for (const GridGraph& graph : graphs)
+    for (const Curve& curve : graph.curves)
+      for (const CurvePoint& point : curve.points)
+        if (point.*figure > 0) values.push_back(point.*figure);
+  return upper_median(std::move(values));
 }
 
 GridGraph build_grid_graph(const Rig& rig, const std::vector<ColorFamily>& families, int camera,

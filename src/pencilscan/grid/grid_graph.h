@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "pencilscan/detection/detect.h"
@@ -30,6 +31,8 @@ struct GridGraph {
 };
 
 [[nodiscard]] std::size_t curve_points(const GridGraph& graph);
+/// The median of a figure of all curve points that have it (above 0); 0 without any.
+[[nodiscard]] double median_of_points(std::span<const GridGraph> graphs, float CurvePoint::*figure);
 
 struct GridOptions {
   bool identify = true;         ///< decide pattern and local ID of each curve on its own

@@ -166,16 +166,6 @@ double line_spacing_px(const Rig& rig) {
   return upper_median(std::move(of_cameras));
 }
 
-/// The median of a figure of all curve points that have it.
-double median_of_points(const PointResult& result, float CurvePoint::*figure) {
-  std::vector<double> values;
-  for (const GridGraph& graph : result.graphs)
-    for (const Curve& curve : graph.curves)
-      for (const CurvePoint& point : curve.points)
-        if (point.*figure > 0) values.push_back(point.*figure);
-  return upper_median(std::move(values));
-}
-
 /// Noise of a pixel of such light, as a share of full scale, with a poor sensor: that of `simulate
 /// --noise high` (simulation/sensor.cpp), which holds 2,500 electrons and reads with 3/255.
 double noise_of_poor_sensor(double light) {
@@ -209,9 +199,10 @@ std::optional<Warning> little_light_warning(const Rig& rig, const PointResult& r
                    {},
                    {{"line_spacing_px", spacing}}};
   }
-  if (spacing < kWidthsApart * median_of_points(result, &CurvePoint::width_px)) return std::nullopt;
+  if (spacing < kWidthsApart * median_of_points(result.graphs, &CurvePoint::width_px))
+    return std::nullopt;
   // Bright lines in more than a sensor's noise lie on fine paint or over each other.
-  const double height = median_of_points(result, &CurvePoint::amplitude);
+  const double height = median_of_points(result.graphs, &CurvePoint::amplitude);
   if (height > ratio * noise_of_poor_sensor(height)) return std::nullopt;
   return Warning{WarningCode::kLittleLight,
                  "light is too little: the lines that were found are " + formatted(ratio, "%.1f") +

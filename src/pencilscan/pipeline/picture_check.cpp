@@ -65,12 +65,8 @@ struct Suspect {
 /// How wide a camera's lines are: the median over its curves' points, of the lines' width at the
 /// volume's centre in its picture; 0 without curves.
 double usual_line_width(const Rig& rig, const GridGraph& graph) {
-  std::vector<float> widths;
-  for (const Curve& curve : graph.curves)
-    for (const CurvePoint& point : curve.points) widths.push_back(point.width_px);
-  return widths.empty() ? 0
-                        : static_cast<double>(upper_median(std::move(widths))) /
-                              pixels_at_center(rig, rig.camera(graph.camera), line_width(rig));
+  return median_of_points({&graph, 1}, &CurvePoint::width_px) /
+         pixels_at_center(rig, rig.camera(graph.camera), line_width(rig));
 }
 
 PictureFinding misfit(const Rig& rig, const PointResult& found, std::size_t camera) {

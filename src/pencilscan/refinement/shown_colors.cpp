@@ -79,6 +79,8 @@ const LinePattern& ShownColorCount::pattern(PatternRef ref) const {
 
 void ShownColorCount::add(const std::vector<ColorFamily>& families,
                           std::span<const GridGraph> graphs, const Labeling& labeling) {
+  std::vector<std::vector<char>> firm_of;
+  for (const ColorFamily& family : families) firm_of.push_back(firm_colors(family));
   for (const GridGraph& graph : graphs) {
     for (const LabeledRun& run : labeling.runs[static_cast<std::size_t>(graph.camera)]) {
       const Curve& curve = graph.curves[static_cast<std::size_t>(run.curve)];
@@ -90,38 +92,37 @@ void ShownColorCount::add(const std::vector<ColorFamily>& families,
       const LinePattern& lines = pattern(count->ref);
       const std::vector<int> color_of = family.color_of_symbol(lines);
       const int reach = reach_of(lines);
-      const std::vector<char> firm = firm_colors(family);
-      Firm of_run;
+      const std::vector<char>& firm = firm_of[static_cast<std::size_t>(curve.family)];
       int firm_points = 0;
       Seen& in_camera = seen_[static_cast<std::size_t>(graph.camera)]
                              [static_cast<std::size_t>(count - counts_.begin())];
       ++count->runs;
       count->seen.resize(family.colors.size(), 0);
-      ++in_camera.runs;
+      ++in_camera.all.runs;
+      const auto color_at = [&](int shift) {
+        // Lines before the first one are those of the period before.
+        const int id = (run.label.line + shift + lines.period() * kFarthest) % lines.period();
+        return color_of[static_cast<std::size_t>(lines.symbol(id))];
+      };
       for (int i = run.begin; i < run.end; ++i) {
         const SeenColor seen =
             seen_color(curve.code.data() + static_cast<std::ptrdiff_t>(i) * colors, colors);
         count->weight += seen.weight;
         count->seen[static_cast<std::size_t>(seen.color)] += seen.weight;
         for (int shift = -reach; shift <= reach; ++shift) {
-          // Lines before the first one are those of the period before.
-          const int id = (run.label.line + shift + lines.period() * kFarthest) % lines.period();
-          if (color_of[static_cast<std::size_t>(lines.symbol(id))] != seen.color) continue;
-          count->agree[static_cast<std::size_t>(shift + reach)] += seen.weight;
-          if (shift != 0) continue;
-          in_camera.agree += seen.weight;
-          if (firm[static_cast<std::size_t>(seen.color)] != 0) of_run.agree += seen.weight;
+          if (color_at(shift) == seen.color)
+            count->agree[static_cast<std::size_t>(shift + reach)] += seen.weight;
         }
-        in_camera.weight += seen.weight;
+        const bool agrees = color_at(0) == seen.color;
+        in_camera.all.add(seen.weight, agrees);
         if (firm[static_cast<std::size_t>(seen.color)] == 0) continue;
-        of_run.weight += seen.weight;
+        count->firm.add(seen.weight, agrees);
+        in_camera.firm.add(seen.weight, agrees);
         ++firm_points;
       }
-      of_run.runs = 2 * firm_points > run.end - run.begin ? 1 : 0;
-      for (Firm* sum : {&count->firm, &in_camera.firm}) {
-        sum->runs += of_run.runs;
-        sum->weight += of_run.weight;
-        sum->agree += of_run.agree;
+      if (2 * firm_points > run.end - run.begin) {
+        ++count->firm.runs;
+        ++in_camera.firm.runs;
       }
     }
   }
@@ -140,7 +141,7 @@ std::vector<ShownColors> ShownColorCount::shown() const {
     shown.chance = count.chance;
     shown.one_color = *std::max_element(count.seen.begin(), count.seen.end()) / count.weight;
     shown.firm_runs = count.firm.runs;
-    if (count.firm.weight > 0) shown.firm_share = count.firm.agree / count.firm.weight;
+    shown.firm_share = count.firm.share();
     shown.most_lines = *std::max_element(shares.begin(), shares.end());
     const auto share_at = [&](int shift) {
       return count.agree[static_cast<std::size_t>(shift + reach)] / count.weight;
@@ -162,25 +163,21 @@ std::vector<ShownColors> ShownColorCount::seen() const {
   std::vector<ShownColors> result;
   for (const std::vector<Seen>& in_camera : seen_) {
     ShownColors& seen = result.emplace_back();
-    double weight = 0;
+    Tally all;
+    Tally firm;
     double chance = 0;
-    double agree = 0;
-    Firm firm;
     for (std::size_t k = 0; k < counts_.size(); ++k) {
       if (!(counts_[k].chance < 1) || of_patterns[k].all_look_alike()) continue;
-      seen.runs += in_camera[k].runs;
-      weight += in_camera[k].weight;
-      chance += counts_[k].chance * in_camera[k].weight;
-      agree += in_camera[k].agree;
-      firm.runs += in_camera[k].firm.runs;
-      firm.weight += in_camera[k].firm.weight;
-      firm.agree += in_camera[k].firm.agree;
+      all.add(in_camera[k].all);
+      firm.add(in_camera[k].firm);
+      chance += counts_[k].chance * in_camera[k].all.weight;
     }
-    if (!(weight > 0)) continue;
-    seen.chance = chance / weight;
-    seen.share = seen.shifted_share = agree / weight;
+    seen.runs = all.runs;
+    if (!(all.weight > 0)) continue;
+    seen.chance = chance / all.weight;
+    seen.share = seen.shifted_share = all.share();
     seen.firm_runs = firm.runs;
-    if (firm.weight > 0) seen.firm_share = firm.agree / firm.weight;
+    seen.firm_share = firm.share();
   }
   return result;
 }

@@ -69,11 +69,22 @@ class ShownColorCount {
   [[nodiscard]] std::string alike() const;
 
  private:
-  /// Points of firm colours.
-  struct Firm {
+  /// Points by what their colours tell, and those whose line has their colour.
+  struct Tally {
     std::size_t runs = 0;
     double weight = 0;
     double agree = 0;
+
+    void add(double point_weight, bool agrees) {
+      weight += point_weight;
+      if (agrees) agree += point_weight;
+    }
+    void add(const Tally& other) {
+      runs += other.runs;
+      weight += other.weight;
+      agree += other.agree;
+    }
+    [[nodiscard]] double share() const { return weight > 0 ? agree / weight : 1; }
   };
   struct Count {
     PatternRef ref;
@@ -82,16 +93,14 @@ class ShownColorCount {
     double weight = 0;
     std::vector<double> agree;  ///< per shift, from -reach
     std::vector<double> seen;   ///< weight per colour of the family
-    Firm firm = {};
+    Tally firm = {};
   };
   [[nodiscard]] const LinePattern& pattern(PatternRef ref) const;
 
   /// Of a camera and a pattern.
   struct Seen {
-    std::size_t runs = 0;
-    double weight = 0;
-    double agree = 0;
-    Firm firm = {};
+    Tally all;
+    Tally firm;
   };
 
   const Rig* rig_;
