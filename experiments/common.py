@@ -7,6 +7,7 @@ import argparse
 import csv
 import json
 import math
+import os
 import resource
 import subprocess
 import sys
@@ -91,10 +92,12 @@ class Rows:
         self._write()
 
     def _write(self):
-        with open(self.path, "w", newline="") as file:
+        part = self.path.with_name(self.path.name + ".part")
+        with open(part, "w", newline="") as file:
             writer = csv.DictWriter(file, self.columns)
             writer.writeheader()
             writer.writerows(self.rows)
+        os.replace(part, self.path)
 
     def has(self, **key):
         return any(all(row[k] == v for k, v in key.items()) for row in self.rows)

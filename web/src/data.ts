@@ -239,6 +239,9 @@ export class Source {
     if (!value) {
       value = read();
       this.cache.set(key, value);
+      value.catch(() => {
+        if (this.cache.get(key) === value) this.cache.delete(key); // the next who asks may have more luck
+      });
     }
     return value;
   }

@@ -35,12 +35,16 @@ export class Film {
       this.kept.set(result, known);
       return known.mesh;
     }
-    const read = this.source.has(result, 'mesh')
-      ? this.source.mesh(result, 'mesh', this.thousands).catch(() => null) : Promise.resolve(null);
+    const has = this.source.has(result, 'mesh');
+    const read = has ? this.source.mesh(result, 'mesh', this.thousands).catch(() => null) : Promise.resolve(null);
     const entry = {mesh: read, bytes: 0};
     this.kept.set(result, entry);
     void read.then((mesh) => {
-      if (!mesh || this.kept.get(result) !== entry) return;
+      if (this.kept.get(result) !== entry) return;
+      if (!mesh) {
+        if (has) this.kept.delete(result); // what could not be read is asked for again
+        return;
+      }
       entry.bytes = bytesOf(mesh);
       this.room -= entry.bytes;
       this.forget();

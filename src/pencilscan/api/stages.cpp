@@ -199,13 +199,6 @@ Reconstruction reconstruct(const DetectedFrame& detected, std::span<const PointL
         "labels", "", std::to_string(labels.size()),
         "must be " + std::to_string(inner.curves.samples.size()) + ", one for every curve point");
   Labeling labeling = labeling_of(inner.rig, inner.found.graphs, labels);
-  PointResult lines = check_pictures(inner.sensor.rig, inner.sensor.frame, inner.found);
-  for (std::size_t c = 0; c < lines.left_out.size(); ++c)
-    if (lines.left_out[c] != 0) labeling.runs[c].clear();
-  // Images of `found` stay as they are, whatever the stages do to theirs.
-  for (CameraDetection& detection : lines.detections)
-    for (cv::Mat& image : detection.presence) image = image.clone();
-  lines.labeling = std::move(labeling);
   std::optional<ThreadLimit> limit;
   if (options.threads > 0) limit.emplace(options.threads);
   Reconstruction result;
@@ -213,6 +206,13 @@ Reconstruction reconstruct(const DetectedFrame& detected, std::span<const PointL
     std::vector<StageTime> times;
     FrameLinks links;
     links.progress = progress;
+    PointResult lines = check_pictures(inner.sensor.rig, inner.sensor.frame, inner.found);
+    for (std::size_t c = 0; c < lines.left_out.size(); ++c)
+      if (lines.left_out[c] != 0) labeling.runs[c].clear();
+    // Images of `found` stay as they are, whatever the stages do to theirs.
+    for (CameraDetection& detection : lines.detections)
+      for (cv::Mat& image : detection.presence) image = image.clone();
+    lines.labeling = std::move(labeling);
     const StageClock clock(progress, times);
     FrameResult found =
         measure_frame(inner.sensor.rig, inner.sensor.frame, std::move(lines), how, links, clock);

@@ -45,6 +45,8 @@ struct CameraGroup::Member {
   std::thread thread;
 
   void run(std::size_t index);
+  /// Pictures from now on, or what keeps it from them, noted and thrown.
+  void start();
   /// Runs on the camera's thread, and waits; what it throws is thrown here. False when it does not
   /// answer in time: `body` may run later, and owns what it uses.
   [[nodiscard]] bool call(std::function<void()> body, double longest_s);
@@ -57,6 +59,17 @@ struct CameraGroup::Member {
     where = text;
   }
 };
+
+void CameraGroup::Member::start() {
+  try {
+    device->start();
+    delivering = true;
+    note(trouble, "");
+  } catch (const std::exception& error) {
+    note(trouble, error.what());
+    throw;
+  }
+}
 
 void CameraGroup::Member::post(std::function<void()> body) {
   {
@@ -175,8 +188,9 @@ bool CameraGroup::running() const { return running_; }
 
 void CameraGroup::configure(std::size_t camera, const CameraSettings& settings) {
   Member& member = *members_[camera];
-  const auto body = [&member, settings] {
+  const auto body = [&member, settings, runs = running_] {
     if (member.delivering) member.device->stop();
+    member.delivering = false;
     std::exception_ptr refusal;
     try {
       const CameraSettings made = member.device->configure(settings);
@@ -185,7 +199,11 @@ void CameraGroup::configure(std::size_t camera, const CameraSettings& settings) 
     } catch (...) {
       refusal = std::current_exception();
     }
-    if (member.delivering) member.device->start();
+    try {
+      if (runs) member.start();
+    } catch (...) {
+      if (!refusal) refusal = std::current_exception();
+    }
     if (refusal) std::rethrow_exception(refusal);
   };
   if (!member.call(body, longest_answer_s_))
@@ -203,11 +221,8 @@ void CameraGroup::start(Sink sink) {
     }
     member->post([&m = *member] {
       try {
-        m.device->start();
-        m.delivering = true;
-        m.note(m.trouble, "");
-      } catch (const std::exception& error) {
-        m.note(m.trouble, error.what());
+        m.start();
+      } catch (const std::exception&) {  // faults() tells
       }
     });
   }

@@ -64,6 +64,7 @@ class StubbornCamera final : public CameraDevice {
     std::atomic<bool> hangs = false;
     std::atomic<bool> refuses = false;
     std::atomic<bool> runs = false;
+    std::atomic<bool> starts = true;
     std::promise<void> closed;
   };
   explicit StubbornCamera(std::shared_ptr<State> state) : state_(std::move(state)) {}
@@ -74,7 +75,10 @@ class StubbornCamera final : public CameraDevice {
     if (state_->refuses) throw InputError("camera", "gain", "", "must be less");
     return settings;
   }
-  void start() override { state_->runs = true; }
+  void start() override {
+    if (!state_->starts) throw StageError("no room on the bus");
+    state_->runs = true;
+  }
   void stop() override { state_->runs = false; }
   void trigger() override {}
   std::optional<CameraFrame> next(Seconds patience) override {
@@ -119,6 +123,21 @@ TEST(CameraGroup, ACameraThatRefusesGoesOn) {
   group.start([](std::size_t, const CameraFrame&) {});
   state->refuses = true;
   EXPECT_THROW(group.configure(0, {}), InputError);
+  EXPECT_TRUE(state->runs);
+}
+
+TEST(CameraGroup, ACameraThatDoesNotStartAgainIsNamed) {
+  const auto state = std::make_shared<StubbornCamera::State>();
+  CameraGroup group(stubborn(state));
+  group.start([](std::size_t, const CameraFrame&) {});
+  EXPECT_TRUE(group.faults().empty());
+  state->starts = false;
+  EXPECT_THROW(group.configure(0, {}), StageError);
+  ASSERT_EQ(group.faults().size(), 1U);
+  EXPECT_EQ(to_string(group.faults()[0]), "cam0: no room on the bus");
+  state->starts = true;
+  group.configure(0, {});
+  EXPECT_TRUE(group.faults().empty());
   EXPECT_TRUE(state->runs);
 }
 

@@ -120,7 +120,7 @@ class FolderCamera final : public CameraDevice {
     if (!oldest) return std::nullopt;
     const std::uintmax_t size = now.at(*oldest);
     const auto before = sizes_.find(*oldest);
-    const bool settled = before != sizes_.end() && before->second == size && size > 0;
+    const bool settled = before != sizes_.end() && before->second == size;
     sizes_[*oldest] = size;
     if (!settled) return std::nullopt;
     CameraFrame frame = frame_of_file(*oldest, settings_);

@@ -118,6 +118,7 @@ class VideoCamera final : public CameraDevice {
     return control(VIDIOC_S_CTRL, value);
   }
   [[nodiscard]] std::vector<std::uint32_t> offered_formats();
+  void start_stream();
   void choose_format(const CameraSettings& settings, CameraSettings& result);
   void choose_exposure(const CameraSettings& settings, CameraSettings& result);
   void choose_rate(const CameraSettings& settings, CameraSettings& result);
@@ -247,6 +248,16 @@ CameraSettings VideoCamera::configure(const CameraSettings& settings) {
 
 void VideoCamera::start() {
   if (running_) return;
+  try {
+    start_stream();
+  } catch (...) {
+    stop();  // buffers that it has already
+    throw;
+  }
+  running_ = true;
+}
+
+void VideoCamera::start_stream() {
   v4l2_requestbuffers request{};
   request.count = kBuffers;
   request.type = kStream;
@@ -267,7 +278,6 @@ void VideoCamera::start() {
   int type = static_cast<int>(kStream);
   if (!control(VIDIOC_STREAMON, type))
     throw StageError(info_.address + ": it does not start: " + std::strerror(errno));
-  running_ = true;
 }
 
 void VideoCamera::stop() {

@@ -14,12 +14,12 @@
 #include <thread>
 
 #include "pencilscan/capture/projector_tests.h"
-#include "pencilscan/cli/interruption.h"
 #include "pencilscan/cli/lab_camera_view.h"
 #include "pencilscan/cli/lab_devices.h"
 #include "pencilscan/cli/lab_work.h"
 #include "pencilscan/cli/own_command.h"
 #include "pencilscan/cli/pose_cover.h"
+#include "pencilscan/cli/serve.h"
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/formatted.h"
 #include "pencilscan/core/name_list.h"
@@ -352,12 +352,10 @@ void Desk::calibrate() {
     words.emplace_back("--known-distance");
     words.insert(words.end(), options_.known_distance.begin(), options_.known_distance.end());
   }
-  std::string failure;
   Json found;
   try {
     found = run(words, "calibrate");
-  } catch (const StageError& error) {
-    failure = error.what();
+  } catch (const StageError&) {
     if (work_.stopping() || !fs::exists(at("logs/calibrate.json"))) throw;
     found = Json(read_json(at("logs/calibrate.json")));  // an unusable rig has figures, too
   }
@@ -408,13 +406,8 @@ void Desk::record() {
 void serve_lab(LabDeskOptions options, LabServer& server, Interruption& interruption) {
   Desk desk(std::move(options));
   server.set_desk(desk);
-  std::thread serving([&] { server.run(); });
   std::cout << "address " << server.link() << std::endl;
-  std::cerr << "pencilscan: open " << server.link() << " in a browser; Ctrl-C stops\n";
-  while (!interruption.within(1)) {
-  }
-  server.stop();
-  serving.join();
+  serve(server, interruption);
 }
 
 }  // namespace pencilscan::cli

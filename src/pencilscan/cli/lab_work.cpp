@@ -11,15 +11,12 @@ constexpr std::size_t kSaidLines = 40;  ///< kept for the page
 }  // namespace
 
 std::string LabWork::begin(const std::string& what, std::function<void()> work) {
-  {
-    const std::lock_guard lock(mutex_);
-    if (running_) return "something is being done: stop it first";
-    running_ = true;
-    what_ = what;
-    share_ = 0;
-    stopping_ = false;
-  }
-  if (thread_.joinable()) thread_.join();
+  const std::lock_guard lock(mutex_);
+  if (running_) return "something is being done: stop it first";
+  if (thread_.joinable()) thread_.join();  // it needs the mutex no more
+  what_ = what;
+  share_ = 0;
+  stopping_ = false;
   thread_ = std::thread([this, work = std::move(work)] {
     try {
       work();
@@ -29,6 +26,7 @@ std::string LabWork::begin(const std::string& what, std::function<void()> work) 
     const std::lock_guard lock(mutex_);
     running_ = false;
   });
+  running_ = true;
   return "";
 }
 

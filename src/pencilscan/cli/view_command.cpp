@@ -1,13 +1,10 @@
-#include <pthread.h>
-
-#include <csignal>
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <thread>
 
 #include "pencilscan/cli/command.h"
 #include "pencilscan/cli/page_arguments.h"
+#include "pencilscan/cli/serve.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/server/view_server.h"
 
@@ -21,12 +18,7 @@ struct ViewCommandOptions {
 };
 
 void run_view(const ViewCommandOptions& options) {
-  // Signals are waited for by a thread of their own; all others, made from here on, ignore them.
-  sigset_t signals;
-  sigemptyset(&signals);
-  sigaddset(&signals, SIGINT);
-  sigaddset(&signals, SIGTERM);
-  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+  Interruption interruption;  // before any thread
   const ThreadLimit limit(options.common.threads);
   ViewOptions view = options.view;
   view.page.program = "pencilscan " PENCILSCAN_VERSION;
@@ -41,15 +33,7 @@ void run_view(const ViewCommandOptions& options) {
         "other computers reach this page, and what they read is not encrypted; only who knows "
         "the link gets an answer");
   }
-  std::cerr << "pencilscan: open " << server.link() << " in a browser; Ctrl-C stops\n";
-  std::thread waiting([&] {
-    int signal = 0;
-    sigwait(&signals, &signal);
-    server.stop();
-  });
-  server.run();
-  pthread_kill(waiting.native_handle(), SIGTERM);  // when run() ended by itself
-  waiting.join();
+  serve(server, interruption);
 }
 
 }  // namespace

@@ -224,6 +224,25 @@ TEST_F(Exchange, CoefficientsOfOtherLensModelsAreRefused) {
   }
 }
 
+TEST_F(Exchange, OmnidirectionalPairsAreRefused) {
+  const auto matrix = [](const std::string& key, int rows, int cols, const std::string& data) {
+    return key + ": !!opencv-matrix\n   rows: " + std::to_string(rows) +
+           "\n   cols: " + std::to_string(cols) + "\n   dt: d\n   data: [" + data + "]\n";
+  };
+  std::string pair = "%YAML:1.0\n---\nimage_width: 640\nimage_height: 480\n";
+  for (const char* k : {"1", "2"}) {
+    pair += matrix(std::string("camera_matrix_") + k, 3, 3, "700,0,320,0,701,240,0,0,1");
+    pair += matrix(std::string("distortion_coefficients_") + k, 1, 4, "-0.3,0.1,0,0");
+  }
+  ExchangedRig files;
+  EXPECT_NO_THROW(read_opencv(write("pair.yml", pair), {}, files));
+  for (const char* key : {"xi_1", "xi2"}) {
+    ExchangedRig others;
+    const fs::path file = write("omni.yml", pair + matrix(key, 1, 1, "1.2"));
+    expect_bad([&] { read_opencv(file, {}, others); }, "must be a pinhole with k1 k2 p1 p2 k3");
+  }
+}
+
 TEST_F(Exchange, BaseKeepsPatternsAndTakesValuesOver) {
   Device found = rig_.cameras[0];
   found.K(0, 0) = 911;

@@ -234,6 +234,24 @@ const std::vector<std::array<StereoKeys, 2>>& stereo_spellings() {
   return kSpellings;
 }
 
+/// Refuses other lens models, whose coefficients would be read as k1 k2 p1 p2.
+void refuse_other_models(const OpencvReader& file) {
+  constexpr const char* kRule = "must be a pinhole with k1 k2 p1 p2 k3";
+  constexpr std::array kOtherModels = {
+      "equidistant", "fisheye", "kannala_brandt", "equi", "omni", "mei", "eucm", "ds", "fov"};
+  for (const char* key : {"distortion_model", "camera_model"}) {
+    const std::string model = file.text({key});
+    if (std::find(kOtherModels.begin(), kOtherModels.end(), model) != kOtherModels.end())
+      file.fail(key, model, kRule);
+  }
+  // Of cv::omnidir and of Mei's model; a file of two cameras has one for each.
+  for (const char* key : {"xi", "xi1", "xi2", "xi_1", "xi_2"})
+    if (!file.find({key}).empty()) file.fail(key, "", kRule);
+  const cv::FileNode fisheye = file.find({"fisheye_model"});
+  if (!fisheye.empty() && static_cast<int>(fisheye) != 0)
+    file.fail("fisheye_model", std::to_string(static_cast<int>(fisheye)), kRule);
+}
+
 std::optional<RigidTransform> read_step(const OpencvReader& file) {
   return file.pose({"R", "rotation", "stereo_R"}, {"T", "translation", "stereo_T"});
 }
@@ -241,6 +259,7 @@ std::optional<RigidTransform> read_step(const OpencvReader& file) {
 bool read_stereo(const OpencvReader& file, ExchangedRig& rig) {
   for (const auto& spelling : stereo_spellings()) {
     if (file.find(spelling[0].K).empty() || file.find(spelling[1].K).empty()) continue;
+    refuse_other_models(file);
     std::array<std::string, 2> names;
     for (std::size_t k = 0; k < 2; ++k) {
       const StereoKeys& keys = spelling[k];
@@ -268,27 +287,13 @@ bool read_single(const OpencvReader& file, ExchangedRig& rig) {
   const cv::FileNode K = file.find({"camera_matrix", "cameraMatrix", "Camera_Matrix", "K", "M",
                                     "mtx", "intrinsic_matrix", "intrinsics"});
   if (K.empty()) return false;
+  refuse_other_models(file);
   ExchangedDevice& d = rig.devices.emplace_back();
   d.source = file.path();
   d.device.name = file.text({"camera_name", "name"});
   if (d.device.name.empty()) d.device.name = std::filesystem::path(file.path()).stem().string();
   d.device.K = file.camera_matrix(K);
   d.given.K = true;
-  // What other lens models are called, whose coefficients would be read as k1 k2 p1 p2; xi is that
-  // of cv::omnidir and of Mei's model.
-  constexpr std::array kOtherModels = {
-      "equidistant", "fisheye", "kannala_brandt", "equi", "omni", "mei", "eucm", "ds", "fov"};
-  for (const char* key : {"distortion_model", "camera_model"}) {
-    const std::string model = file.text({key});
-    if (std::find(kOtherModels.begin(), kOtherModels.end(), model) != kOtherModels.end())
-      file.fail(key, model, "must be a pinhole with k1 k2 p1 p2 k3");
-  }
-  if (!file.find({"xi"}).empty()) file.fail("xi", "", "must be a pinhole with k1 k2 p1 p2 k3");
-  if (!file.find({"fisheye_model"}).empty()) {
-    const cv::FileNode flag = file.find({"fisheye_model"});
-    if (flag.empty() || static_cast<int>(flag) != 0)
-      file.fail("distortion_model", "fisheye", "must be a pinhole with k1 k2 p1 p2 k3");
-  }
   const cv::FileNode D =
       file.find({"distortion_coefficients", "Distortion_Coefficients", "distCoeffs", "dist_coeffs",
                  "dist_coefs", "dist", "D", "distortion"});

@@ -1,5 +1,7 @@
 #include "pencilscan/server/page_server.h"
 
+#include <thread>
+
 #include "pencilscan/server/guarded_server.h"
 
 namespace pencilscan {
@@ -15,7 +17,18 @@ PageServer::~PageServer() = default;
 int PageServer::port() const { return server_->gate.port(); }
 std::string PageServer::link() const { return server_->gate.link(); }
 std::string PageServer::answer(const std::string& request) { return server_->answer(request); }
-void PageServer::run() { server_->listen_after_bind(); }
-void PageServer::stop() { server_->stop(); }
+
+void PageServer::run() {
+  running_ = true;
+  if (!stopping_) server_->listen_after_bind();
+  running_ = false;
+}
+
+void PageServer::stop() {
+  if (stopping_.exchange(true)) return;
+  // cpp-httplib forgets a stop that comes before it listens.
+  while (running_ && !server_->is_running()) std::this_thread::yield();
+  server_->stop();
+}
 
 }  // namespace pencilscan

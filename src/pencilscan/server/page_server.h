@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <memory>
 #include <string>
 
@@ -17,8 +18,9 @@ class PageServer {
   [[nodiscard]] std::string link() const;
   /// The whole answer to the bytes of one request, without a network: for tests.
   [[nodiscard]] std::string answer(const std::string& request);
-  /// Answers requests until stop() is called, from another thread.
+  /// Answers requests until stop() is called, by another thread, before or meanwhile.
   void run();
+  /// Does not wait for run() to end.
   void stop();
 
  protected:
@@ -31,6 +33,8 @@ class PageServer {
 
  private:
   std::unique_ptr<GuardedServer> server_;
+  std::atomic<bool> running_ = false;
+  std::atomic<bool> stopping_ = false;
 };
 
 }  // namespace pencilscan
