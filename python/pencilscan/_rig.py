@@ -228,8 +228,6 @@ def ring(
     colors
         Of the projectors in turn.
     """
-    from ._errors import InputError
-
     def require(holds: bool, field: str, value: object, rule: str) -> None:
         if not holds:
             raise InputError("ring", field, str(value), rule)

@@ -57,9 +57,7 @@ CalibratedRig calibrate_rig(const UncalibratedRig& devices,
     const CapturesCalibration found = calibrate_captures(devices, captures, of_captures, progress);
     result.rig = found.result.rig;
     result.verdict = to_string(found.verdict.grade);
-    for (const Finding& finding : found.verdict.findings)
-      if (finding.grade == found.verdict.grade && finding.grade != Grade::kGood)
-        result.reasons.push_back(finding.what);
+    result.reasons = found.verdict.reasons();
     result.figures = json_text(calibration_figures(found));
     result.report = json_text(calibration_json(found));
   });

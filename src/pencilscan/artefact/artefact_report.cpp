@@ -7,15 +7,12 @@
 #include "pencilscan/artefact/artefact.h"
 #include "pencilscan/artefact/residual_map.h"
 #include "pencilscan/artefact/sphere_fit.h"
+#include "pencilscan/core/formatted.h"
 
 namespace pencilscan {
 namespace {
 
-std::string number(double value, int decimals = 3) {
-  std::array<char, 64> text{};
-  std::snprintf(text.data(), text.size(), "%.*f", decimals, value);
-  return text.data();
-}
+std::string number(double value, int decimals = 3) { return fixed(value, decimals); }
 /// Signed, for errors of size and length.
 std::string error(double value) { return (value >= 0 ? "+" : "") + number(value, 4); }
 std::string percent(double share) { return number(100 * share, 1) + " %"; }

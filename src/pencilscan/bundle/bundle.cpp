@@ -12,6 +12,7 @@
 #include "pencilscan/bundle/reprojection.h"
 #include "pencilscan/core/check.h"
 #include "pencilscan/core/evenly_picked.h"
+#include "pencilscan/core/median.h"
 
 namespace pencilscan {
 namespace {
@@ -30,16 +31,6 @@ struct PriorCost {
     return true;
   }
 };
-
-Mat3 rotation(const BundleDevice& device) {
-  Mat3 R;
-  ceres::AngleAxisToRotationMatrix(device.pose.data(), R.data());
-  return R;
-}
-
-Vec3 center(const BundleDevice& device) {
-  return -rotation(device).transpose() * Vec3(device.pose[3], device.pose[4], device.pose[5]);
-}
 
 double prior_weight(double sigma) { return sigma > 0 && std::isfinite(sigma) ? 1 / sigma : 0; }
 
@@ -111,13 +102,13 @@ class ProblemBuilder {
   /// Keeps the translation component that scaling the scene about the first device changes most.
   void hold_scale(std::size_t first) {
     if (first == from_.devices.size()) return;
-    const Vec3 origin = center(from_.devices[first]);
+    const Vec3 origin = center_of(from_.devices[first]);
     double farthest = 0;
     std::size_t device = first;
     int component = 0;
     for (std::size_t d = first + 1; d < from_.devices.size(); ++d) {
       if (in_use_[d] == 0) continue;
-      const Vec3 offset = rotation(from_.devices[d]) * (center(from_.devices[d]) - origin);
+      const Vec3 offset = rotation_of(from_.devices[d]) * (center_of(from_.devices[d]) - origin);
       int largest = 0;
       const double size = offset.cwiseAbs().maxCoeff(&largest);
       if (size <= farthest) continue;
@@ -203,6 +194,18 @@ BundleSummary adjust(BundleProblem& problem, const BundleOptions& options) {
   if (builder.empty()) return {};
   builder.add_devices();
   return builder.solve();
+}
+
+Vec3 middle_of_points(const BundleProblem& problem) {
+  std::array<std::vector<double>, 3> coordinates;
+  for (std::size_t t = 0; t < problem.points.size(); ++t)
+    if (problem.used[t] != 0)
+      for (std::size_t k = 0; k < 3; ++k)
+        coordinates[k].push_back(problem.points[t][static_cast<Eigen::Index>(k)]);
+  Vec3 middle = Vec3::Zero();
+  for (std::size_t k = 0; k < 3; ++k)
+    middle[static_cast<Eigen::Index>(k)] = upper_median(std::move(coordinates[k]));
+  return middle;
 }
 
 std::size_t present_devices(const BundleProblem& problem) {

@@ -66,6 +66,9 @@ void for_each_residual(const BundleProblem& problem, Visit visit) {
   }
 }
 
+/// Of the coordinates of the points in use, the upper medians.
+[[nodiscard]] Vec3 middle_of_points(const BundleProblem& problem);
+
 /// Number of devices that have a pose.
 [[nodiscard]] std::size_t present_devices(const BundleProblem& problem);
 

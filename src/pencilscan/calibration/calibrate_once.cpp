@@ -216,9 +216,8 @@ class Calibration {
   void drop() {
     BundleProblem& problem = result_.problem;
     drop_corners(problem, options_.outlier_deviations);
-    const double scale = error_scale(problem);
     result_.views_dropped +=
-        drop_outliers(problem, std::max(options_.outlier_deviations * scale, 0.3));
+        drop_outliers(problem, outlier_limit(problem, options_.outlier_deviations));
   }
 
   void refine() {
@@ -249,7 +248,7 @@ class Calibration {
   }
 
   [[nodiscard]] PairFit pair_fit() const {
-    return {result_.problem.devices, std::max(2.0, 8 * error_scale(result_.problem))};
+    return {result_.problem.devices, contradiction_limit(error_scale(result_.problem))};
   }
 
   /// The prior of an unknown focal length only keeps it from running away. Around a guess that the

@@ -58,9 +58,7 @@ nlohmann::ordered_json calibration_figures(const CapturesCalibration& calibratio
   const Verdict& verdict = calibration.verdict;
   nlohmann::ordered_json figures;
   figures["verdict"] = to_string(verdict.grade);
-  for (const Finding& finding : verdict.findings)
-    if (finding.grade == verdict.grade && verdict.grade != Grade::kGood)
-      figures["reasons"].push_back(finding.what);
+  if (verdict.grade != Grade::kGood) figures["reasons"] = verdict.reasons();
   figures["rms_px"] = result.rms_px;
   figures["held_out_rms_px"] = result.held_out_rms_px;
   if (!result.problem.board_views.empty()) figures["board_rms_px"] = result.board_rms_px;

@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "pencilscan/bundle/bundle_device.h"
+#include "pencilscan/core/formatted.h"
 #include "pencilscan/core/median.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/geometry/least_squares.h"
@@ -25,14 +26,7 @@ struct RingStep {
 /// Devices by their direction from the middle of the points, in the plane that lies nearest to
 /// them.
 std::vector<std::size_t> round_the_middle(const BundleProblem& problem, double widest_step_rad) {
-  std::array<std::vector<double>, 3> coordinates;
-  for (std::size_t t = 0; t < problem.points.size(); ++t)
-    if (problem.used[t] != 0)
-      for (std::size_t k = 0; k < 3; ++k)
-        coordinates[k].push_back(problem.points[t][static_cast<Eigen::Index>(k)]);
-  Vec3 middle;
-  for (std::size_t k = 0; k < 3; ++k)
-    middle[static_cast<Eigen::Index>(k)] = upper_median(std::move(coordinates[k]));
+  const Vec3 middle = middle_of_points(problem);
   Eigen::MatrixXd spread = Eigen::MatrixXd::Zero(3, 3);
   std::vector<std::size_t> present;
   for (std::size_t d = 0; d < problem.devices.size(); ++d) {
@@ -158,13 +152,11 @@ LoopClosure close_loop(const CalibrationResult& result, const LoopClosureOptions
 std::optional<Finding> judge_loop(const CalibrationResult& result, const LoopClosure& loop,
                                   double most_px) {
   if (loop.devices.empty() || loop.gap_px <= most_px) return std::nullopt;
-  std::array<char, 40> gap{};
-  std::snprintf(gap.data(), gap.size(), "%.2g px", loop.gap_px);
   return Finding{
       Grade::kDoubtful,
       "the ring does not close: once round it, each step by the correspondences of its "
       "own two devices, points come back " +
-          std::string(gap.data()) + " off in " + device_at(result.rig, loop.devices.front()).name,
+          formatted(loop.gap_px) + " px off in " + device_at(result.rig, loop.devices.front()).name,
       "look at the errors of the single devices, and add captures that neighbours share"};
 }
 

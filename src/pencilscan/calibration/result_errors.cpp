@@ -20,7 +20,7 @@ void measure_held_out(const CalibrationInput& input, const CalibrateOptions& opt
   check.devices = result.problem.devices;
   check.tracks = result.held_out;
   triangulate_all(check, kLeastAngle);
-  const double limit = std::max(options.outlier_deviations * error_scale(result.problem), 0.3);
+  const double limit = outlier_limit(result.problem, options.outlier_deviations);
   BundleOptions points_only;
   points_only.free_poses = false;
   points_only.extra_sigma_px = result.adjustment.extra_sigma_px;

@@ -12,18 +12,6 @@
 namespace pencilscan {
 namespace {
 
-Vec3 middle_of_points(const BundleProblem& problem) {
-  std::array<std::vector<double>, 3> coordinates;
-  for (std::size_t t = 0; t < problem.points.size(); ++t)
-    if (problem.used[t] != 0)
-      for (std::size_t k = 0; k < 3; ++k)
-        coordinates[k].push_back(problem.points[t][static_cast<Eigen::Index>(k)]);
-  Vec3 middle = Vec3::Zero();
-  for (std::size_t k = 0; k < 3; ++k)
-    middle[static_cast<Eigen::Index>(k)] = upper_median(std::move(coordinates[k]));
-  return middle;
-}
-
 /// z against the mean of the cameras' y axes, x towards the first placed device.
 RigidTransform own_frame(const BundleProblem& problem, std::size_t cameras) {
   const Vec3 origin = middle_of_points(problem);

@@ -7,6 +7,7 @@
 #include <set>
 
 #include "pencilscan/bundle/bundle_device.h"
+#include "pencilscan/calibration/track_errors.h"
 #include "pencilscan/core/formatted.h"
 #include "pencilscan/core/name_list.h"
 
@@ -182,7 +183,7 @@ void take_out_moved(const std::vector<CaptureMove>& moves, Contradicting& bad) {
 }  // namespace
 
 PairFit tolerant_fit(const CalibrationResult& result) {
-  return {result.problem.devices, std::max(2.0, 8 * result.rms_px)};
+  return {result.problem.devices, contradiction_limit(result.rms_px)};
 }
 
 Contradictions find_contradictions(const CalibrationInput& input, const CalibrationResult& result) {

@@ -29,6 +29,12 @@ double error_scale(const BundleProblem& problem) {
   return kDeviationPerMedian * lower_quantile(errors, 0.5);
 }
 
+double outlier_limit(const BundleProblem& problem, double deviations) {
+  return std::max(deviations * error_scale(problem), 0.3);
+}
+
+double contradiction_limit(double usual_px) { return std::max(2.0, 8 * usual_px); }
+
 double median_sigma(const BundleProblem& problem) {
   std::vector<double> sigmas;
   for (const Track& track : problem.tracks)

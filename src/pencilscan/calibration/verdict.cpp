@@ -310,6 +310,14 @@ class Judge {
 
 }  // namespace
 
+std::vector<std::string> Verdict::reasons() const {
+  std::vector<std::string> reasons;
+  if (grade == Grade::kGood) return reasons;
+  for (const Finding& finding : findings)
+    if (finding.grade == grade) reasons.push_back(finding.what);
+  return reasons;
+}
+
 std::vector<std::vector<TrendCell>> residual_trends(const CalibrationResult& result) {
   std::vector<std::vector<TrendCell>> trends(result.placed.size(),
                                              std::vector<TrendCell>(kCells * kCells));

@@ -12,6 +12,9 @@ namespace pencilscan {
 struct Verdict {
   Grade grade = Grade::kGood;  ///< the worst of the findings
   std::vector<Finding> findings;
+
+  /// What made it this grade; nothing of a good one.
+  [[nodiscard]] std::vector<std::string> reasons() const;
 };
 
 struct VerdictOptions {

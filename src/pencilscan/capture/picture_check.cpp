@@ -30,8 +30,6 @@ constexpr float kMoved = 0.15F;
 constexpr float kBeyondNoise = 5;
 constexpr double kMovedShare = 0.02;
 constexpr double kLampChange = 0.1;
-/// A quarter of what is normally distributed is smaller than so many standard deviations.
-constexpr float kQuarterOfNormal = 0.3186F;
 
 /// A change of light in units in which noise is alike in all blocks: it grows with the light's
 /// root.
@@ -132,7 +130,8 @@ WhiteTrouble white_again_trouble(const cv::Mat& white, const cv::Mat& again, con
     changes.push_back(in_noise(block.change, block.light));
   }
   // However much moved: noise alone is what the quarter of the blocks shows that changed least.
-  const float noise = lower_quantile(changes, 0.25) / kQuarterOfNormal;
+  const float noise =
+      lower_quantile(changes, 0.25) / static_cast<float>(kLowerQuartilePerDeviation);
   const auto moved = std::count_if(blocks.begin(), blocks.end(), [&](const Block& block) {
     return std::abs(block.change) > kMoved * block.light &&
            in_noise(block.change, block.light) > kBeyondNoise * noise;

@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <opencv2/imgproc.hpp>
 
+#include "pencilscan/core/formatted.h"
 #include "pencilscan/core/median.h"
 #include "pencilscan/core/name_list.h"
 #include "pencilscan/io/linear_light.h"
@@ -20,12 +21,6 @@ constexpr std::size_t kLeastDecoded = 3000;
 constexpr double kGammaSlack = 0.08;
 /// Displacements that move lines by less (root mean square, panel px) are not worth their noise.
 constexpr double kLeastDisplacement = 0.02;
-
-std::string text(double value, int digits) {
-  std::array<char, 32> buffer{};
-  std::snprintf(buffer.data(), buffer.size(), "%.*f", digits, value);
-  return buffer.data();
-}
 
 cv::Mat channel(const cv::Mat& image, int c) {
   cv::Mat result;
@@ -152,8 +147,8 @@ void ColorCollector::remark_on(ColorCalibration& result) const {
   for (std::size_t c = 0; c < rig_.cameras.size(); ++c) {
     const double stated = rig_.cameras[c].gamma;
     if (result.gamma[c] && gamma_of(c, result.gamma[c]) != stated)
-      say("camera " + rig_.cameras[c].name + ": gamma " + text(result.gamma[c]->value, 2) + " +- " +
-          text(result.gamma[c]->sigma, 2) + " instead of " + text(stated, 2));
+      say("camera " + rig_.cameras[c].name + ": gamma " + fixed(result.gamma[c]->value, 2) +
+          " +- " + fixed(result.gamma[c]->sigma, 2) + " instead of " + fixed(stated, 2));
   }
   for (std::size_t p = 0; p < rig_.projectors.size(); ++p) {
     std::vector<double> gammas;
@@ -163,7 +158,7 @@ void ColorCollector::remark_on(ColorCalibration& result) const {
     constexpr double kClear = 0.1;
     const double gamma = gammas.empty() ? 1 : upper_median(gammas);
     if (std::abs(gamma - 1) > kClear)
-      say("projector " + rig_.projectors[p].name + " shows value^" + text(gamma, 2) +
+      say("projector " + rig_.projectors[p].name + " shows value^" + fixed(gamma, 2) +
           " of its light: lines keep their places, their soft edges do not; set it to linear");
   }
   if (!in_color) {
@@ -183,7 +178,7 @@ void ColorCollector::remark_on(ColorCalibration& result) const {
     say("too little of the channels could be decoded to compare them");
     return;
   }
-  say("colours displace lines by " + text(result.lateral.explained_rms_px, 3) +
+  say("colours displace lines by " + fixed(result.lateral.explained_rms_px, 3) +
       " panel px (root mean square): " +
       (result.displaces_lines ? "color_registration was written"
                               : "too little to matter, nothing was written"));

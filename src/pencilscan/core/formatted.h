@@ -14,6 +14,13 @@ namespace pencilscan {
   return text.data();
 }
 
+/// A number with so many digits behind the point.
+[[nodiscard]] inline std::string fixed(double value, int decimals) {
+  std::array<char, 48> text{};
+  std::snprintf(text.data(), text.size(), "%.*f", decimals, value);
+  return text.data();
+}
+
 /// The size of a picture or panel in a sentence: "1920 x 1080".
 [[nodiscard]] inline std::string size_text(int width, int height) {
   return std::to_string(width) + " x " + std::to_string(height);

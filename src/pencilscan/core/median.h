@@ -9,6 +9,8 @@ namespace pencilscan {
 
 /// Standard deviation of a Gaussian per median of its absolute value: 1 / quantile(0.75).
 inline constexpr double kDeviationPerMedian = 1.4826;
+/// Lower quartile of its absolute value per standard deviation: quantile(0.625).
+inline constexpr double kLowerQuartilePerDeviation = 0.3186;
 
 /// upper_median() of values that may be put into another order.
 template <typename Number>

@@ -11,12 +11,6 @@
 namespace pencilscan {
 namespace {
 
-std::string hz(double refresh) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.2f Hz", refresh);
-  return text;
-}
-
 bool overlap(const DisplayOutput& a, const DisplayOutput& b) {
   return a.x < b.x + b.width && b.x < a.x + a.width && a.y < b.y + b.height && b.y < a.y + a.height;
 }
@@ -64,8 +58,9 @@ void judge_refresh(std::span<const OutputUse> uses, std::vector<Fault>& faults) 
     const double there = first->output->refresh_hz;
     if (std::abs(here - there) <= kRefreshTolerance * there) continue;
     faults.push_back({"refresh", use.projector->name,
-                      "output " + use.output->name + " refreshes at " + hz(here) + ", that of " +
-                          first->projector->name + " at " + hz(there) +
+                      "output " + use.output->name + " refreshes at " + formatted(here, "%.2f Hz") +
+                          ", that of " + first->projector->name + " at " +
+                          formatted(there, "%.2f Hz") +
                           ": no exposure is a multiple of both periods",
                       "give all projectors the same refresh rate (xrandr --rate)"});
   }

@@ -15,11 +15,9 @@ void adopt_lens(const ExchangeOptions& options, ExchangedDevice& d) {
   if (!d.lens) return;
   const BrownFit fit = fit_brown(d.device, d.lens);
   if (!(fit.worst_px <= options.worst_lens_px)) {
-    std::array<char, 32> text{};
-    std::snprintf(text.data(), text.size(), "%.3g px", fit.worst_px);
-    throw InputError(d.source, "distortion of " + d.device.name, text.data(),
-                     "k1 k2 p1 p2 k3 must reproduce its lens to " +
-                         std::to_string(options.worst_lens_px).substr(0, 4) + " px");
+    throw InputError(
+        d.source, "distortion of " + d.device.name, formatted(fit.worst_px, "%.3g px"),
+        "k1 k2 p1 p2 k3 must reproduce its lens to " + formatted(options.worst_lens_px) + " px");
   }
   d.device.distortion = fit.distortion;
   d.given.distortion = true;

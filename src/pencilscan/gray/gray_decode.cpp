@@ -49,9 +49,8 @@ LevelNoise level_noise(const cv::Mat& image, const cv::Mat_<std::uint8_t>& mask)
       values.push_back(b[u]);
     }
   }
-  constexpr double kLowerQuartileOfAbsoluteNormal = 0.3186;
   return {lower_quantile(values, 0.5),
-          lower_quantile(residuals, 0.25) / kLowerQuartileOfAbsoluteNormal};
+          lower_quantile(residuals, 0.25) / kLowerQuartilePerDeviation};
 }
 
 NoiseModel noise_model(const GrayStack& stack) {

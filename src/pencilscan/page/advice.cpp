@@ -76,10 +76,6 @@ constexpr std::array<Known, 21> kKnown = {{
     {"colors-filled-in", "Let the camera give raw pictures and state its mosaic in the rig."},
 }};
 
-std::string percent(double share) {
-  return formatted(100 * share, share < 0.1 ? "%.1f %%" : "%.0f %%");
-}
-
 double number_at(const json& object, const char* key) {
   if (!object.is_object()) return 0;
   const auto it = object.find(key);
@@ -144,7 +140,7 @@ void advise_holes(const json& area, std::vector<Advice>& advice) {
     const auto known = kByReason.find(words);
     const double share = mm2.is_number() ? mm2.get<double>() / total : 0;
     if (known == kByReason.end() || share < kWorthSaying) continue;
-    advice.push_back({percent(share) + " " + known->second.about, known->second.action});
+    advice.push_back({percent_text(share) + " " + known->second.about, known->second.action});
   }
 }
 
@@ -153,7 +149,7 @@ void advise_undecided(const json& report, std::vector<Advice>& advice) {
   const auto labelled = labelled_share(report);
   if (labelled && *labelled < 1 - kMuch) {
     advice.push_back(
-        {percent(1 - *labelled) + " of the detected curve points got no line",
+        {percent_text(1 - *labelled) + " of the detected curve points got no line",
          "Switch the image layer to \"undecided\": it shows the reason of every piece. Many "
          "crossings from two or more projectors on each part of the surface help most."});
   }

@@ -9,6 +9,8 @@
 
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/evenly_picked.h"
+#include "pencilscan/core/formatted.h"
+#include "pencilscan/core/lower_case.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/io/codec.h"
 #include "pencilscan/io/file.h"
@@ -21,11 +23,7 @@ namespace {
 namespace fs = std::filesystem;
 using Kind = ExperimentPicture::Kind;
 
-std::string lower_ending(const fs::path& file) {
-  std::string ending = file.extension().string();
-  for (char& c : ending) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  return ending;
-}
+std::string lower_ending(const fs::path& file) { return lower_case(file.extension().string()); }
 
 std::string media_type(const fs::path& file) {
   static const std::map<std::string, std::string> types = {
@@ -144,11 +142,8 @@ class Album {
     if (!shown.broken.empty()) return note(name, shown.broken, Flaw::kUnreadable);
     const std::size_t bytes = embedded(shown.bytes.size());
     if (bytes > room()) {
-      const auto megabytes = static_cast<double>(bytes) / 1e6;
-      std::array<char, 80> text{};
-      std::snprintf(text.data(), text.size(), "left out: its %.1f MB do not fit (--max-size)",
-                    megabytes);
-      return note(name, text.data(), Flaw::kNote);
+      const std::string megabytes = fixed(static_cast<double>(bytes) / 1e6, 1);
+      return note(name, "left out: its " + megabytes + " MB do not fit (--max-size)", Flaw::kNote);
     }
     used_ += bytes;
     nlohmann::ordered_json entry = {{"file", name},

@@ -116,9 +116,8 @@ ResultFolder find_results(const fs::path& root, const ResultSources& sources) {
     } else if (of_run && looks_like_frame(folder)) {
       found.failed.push_back(folder);
     }
-    for (const fs::path& file : {folder / "calibration.json"}) {
-      if (is_file(file)) found.calibrations.push_back(file);
-    }
+    const fs::path calibration = folder / "calibration.json";
+    if (is_file(calibration)) found.calibrations.push_back(calibration);
     return !found.results.empty() && found.results.back().folder == folder;
   };
   if (visit(root, false)) return found;

@@ -20,8 +20,8 @@ constexpr double kClear = 1;
 
 /// How places lie about a plane; sums of weights.
 struct Sides {
-  double on = 0, above = 0, below = 0;  ///< in the volume
-  double on_outside = 0;
+  double on = 0;                ///< in the volume and outside
+  double above = 0, below = 0;  ///< in the volume
 };
 
 class Search {
@@ -123,7 +123,7 @@ class Search {
       const auto weight = static_cast<double>(place.weight);
       const bool is_in = is_in_volume(place.x);
       if (std::abs(height) < kOn) {
-        (is_in ? sides.on : sides.on_outside) += weight;
+        sides.on += weight;
       } else if (is_in && height > kClear) {
         sides.above += weight;
       } else if (is_in && height < -kClear) {
@@ -176,11 +176,10 @@ class Search {
     constexpr double kObject = 0.05;  // of those on it
     constexpr double kMostSides = 0.5;
     const Sides sides = sides_of(plane);
-    const double on = sides.on + sides.on_outside;
     double all = 0;
     for (const NamedPlace& place : places_) all += static_cast<double>(place.weight);
-    const FoundFloor found{plane, on / all, open_sides(plane), sides.on_outside / on};
-    if (found.share < kMuch || sides.below > kNone * on || sides.above < kObject * on ||
+    const FoundFloor found{plane, sides.on / all, open_sides(plane)};
+    if (found.share < kMuch || sides.below > kNone * sides.on || sides.above < kObject * sides.on ||
         found.sides < kMostSides)
       return std::nullopt;
     return found;

@@ -13,10 +13,9 @@ namespace pencilscan {
 
 /// A plane that named lines show and that the rig does not state: what the object stands on.
 struct FoundFloor {
-  Floor floor;               ///< its point below the volume's centre
-  double share = 0;          ///< of the places on named lines, those on it
-  double sides = 0;          ///< of the directions around the object, those in which it goes on
-  double share_outside = 0;  ///< of the places on it, those outside the volume
+  Floor floor;       ///< its point below the volume's centre
+  double share = 0;  ///< of the places on named lines, those on it
+  double sides = 0;  ///< of the directions around the object, those in which it goes on
 };
 
 /// A place on a named line.

@@ -59,7 +59,6 @@ TEST(FoundFloor, IsWhatABallStandsOn) {
   EXPECT_NEAR(found->floor.point.z(), kHeightOfFloor, 0.05);
   EXPECT_GT(found->floor.normal.z(), 0.9999);
   EXPECT_GT(found->sides, 0.9);
-  EXPECT_GT(found->share_outside, 0.5);
 }
 
 TEST(FoundFloor, IsNoneThatTheRigStates) {

@@ -34,8 +34,6 @@ constexpr double kPartnerShare = 0.2;
 /// Fewer shared samples than this say nothing about a pair.
 constexpr double kFewSamples = 10;
 
-std::string percent(double share) { return formatted(100 * share, "%.0f %%"); }
-
 /// Collects the warnings of one rig.
 class Collector {
  public:
@@ -116,7 +114,7 @@ class Collector {
     const auto check_device = [&](const Device& device, double view) {
       if (view < kEnoughView) {
         warn(view <= 0, "out_of_view",
-             device.name + " has only " + percent(view) +
+             device.name + " has only " + percent_text(view) +
                  " of the working volume in its image: turn it to the volume, move it away or "
                  "shorten its focal length");
       }
@@ -177,7 +175,7 @@ class Collector {
         "the " + std::string(rows ? "horizontal" : "vertical") + " lines of " + name(family) +
             (none ? " give no depth" : " give little depth") + " (mean sensitivity " +
             formatted(sensitivity, "%.2f") + "; " + formatted(options_.min_sensitivity, "%.2f") +
-            " is reached on " + percent(share) +
+            " is reached on " + percent_text(share) +
             " of what cameras see of them): they run along the epipolar lines of the cameras; " +
             (rows ? "raise or lower this projector to about 30 degrees off the cameras' height, or "
                     "let it show vertical lines"
@@ -216,12 +214,12 @@ class Collector {
     const double two_views = of_lit(check_.coverage.two_views);
     const bool has_views = two_views >= kEnoughGrid;
     warn(grid < kTooFewGrid && !has_views, "no_grid",
-         "only " + percent(grid) +
+         "only " + percent_text(grid) +
              " of the surface that is seen and lit shows some camera line sets of different "
              "projectors that cross and tell each other apart: crossings decide which line is "
              "which" +
              (has_views ? ", and where there are none, two cameras that see the same lines (" +
-                              percent(two_views) + " of it) and the code"
+                              percent_text(two_views) + " of it) and the code"
                         : std::string()) +
              "; mix directions of lines, and let neighbouring projectors overlap");
   }
@@ -271,7 +269,7 @@ class Collector {
     }
     if (worst == nullptr) return;
     warn(ambiguous >= kMuchAmbiguity, "same_color",
-         percent(ambiguous) +
+         percent_text(ambiguous) +
              " of what the cameras see has two line sets of the same colour in nearly the same "
              "direction (most often " +
              name(worst->first) + " and " + name(worst->second) +
@@ -282,9 +280,9 @@ class Collector {
     const CoverageCheck& coverage = check_.coverage;
     if (coverage.usable >= kEnoughUsable) return;
     warn(coverage.usable < kTooFewUsable * coverage.seen, "coverage",
-         "only " + percent(coverage.usable) + " of the surface can be measured (" +
-             percent(coverage.seen) + " is seen, " + percent(coverage.lit) + " is lit, " +
-             percent(coverage.seen_and_lit) +
+         "only " + percent_text(coverage.usable) + " of the surface can be measured (" +
+             percent_text(coverage.seen) + " is seen, " + percent_text(coverage.lit) + " is lit, " +
+             percent_text(coverage.seen_and_lit) +
              " is both): add devices where they are missing, or accept a partial shape");
   }
 

@@ -34,8 +34,8 @@ Opinion opinion_of(const SurfacePatch& patch, const Camera& camera, const Eigen:
 ///   - how far these points lie to one side (patch.one_sidedness),
 ///   - the bend of the patch,
 ///   - `deviations`: how many of their own deviations point and patch lie apart.
-/// Exponents and scale are fitted to the errors of rendered objects, most of them those of
-/// experiments/objects.py.
+/// Exponents and scale were fitted to the errors of rendered objects by a program that is not kept.
+/// They order and weigh points until depth is known; what is written comes from error_model.h.
 double settled_sigma(double propagated, double deviations, const Camera& camera, double footprint,
                      const SurfacePatch& patch) {
   constexpr double kScale = 0.43;

@@ -28,12 +28,6 @@ std::vector<const Device*> all_devices(const Rig& rig) {
   return devices;
 }
 
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>((values.size() - 1) / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 /// Radius of the largest sphere about `center` inside the device's view: the distance to the
 /// nearest of the four planes through the image's edges. Negative when the centre itself is
 /// outside.
@@ -103,8 +97,8 @@ Sphere working_volume(const Rig& rig) {
     radii.push_back(visible_radius(*device, volume.center));
     distances.push_back((device->center() - volume.center).norm());
   }
-  volume.radius = median(radii);
-  if (!(volume.radius > 0)) volume.radius = kGuessedRadiusShare * median(distances);
+  volume.radius = lower_quantile(radii, 0.5);
+  if (!(volume.radius > 0)) volume.radius = kGuessedRadiusShare * lower_quantile(distances, 0.5);
   return volume;
 }
 

@@ -28,6 +28,18 @@ constexpr double kFitRadius = 1.6;         // spacings, neighbourhood of a local
 constexpr double kClusterGap = 2;          // spacings; one missing line does not split an object
 constexpr double kLeastCluster = 0.01;     // of the largest cluster's samples
 
+/// Both kinds of options have these in common.
+ClosingOptions closing_of(const auto& options, double spacing_mm, const Rig& rig) {
+  ClosingOptions closing;
+  closing.spacing_mm = spacing_mm;
+  closing.cell_mm = options.cell_spacings * spacing_mm;
+  closing.max_depth = options.max_depth;
+  closing.reach_spacings = options.reach_spacings;
+  closing.min_component_share = options.min_component_share;
+  closing.floor = rig.floor;
+  return closing;
+}
+
 std::vector<Vec3> positions_of(std::span<const SurfaceSample> samples) {
   std::vector<Vec3> positions;
   positions.reserve(samples.size());
@@ -187,14 +199,7 @@ SurfaceResult reconstruct_surface(const Rig& rig, std::span<const MeasuredPoint>
 
   fit_local_surfaces(kept, kFitRadius * set.spacing);
   tell(0.4);
-  ClosingOptions closing;
-  closing.spacing_mm = set.spacing;
-  closing.cell_mm = options.cell_spacings * set.spacing;
-  closing.max_depth = options.max_depth;
-  closing.reach_spacings = options.reach_spacings;
-  closing.min_component_share = options.min_component_share;
-  closing.floor = rig.floor;
-  take(closed_surface(kept, closing), result);
+  take(closed_surface(kept, closing_of(options, set.spacing, rig)), result);
   finish(4 * set.spacing * set.spacing, result);
   tell(1);
   return result;
@@ -214,14 +219,7 @@ SurfaceResult close_depth(const Rig& rig, std::span<const DepthMap> maps,
     return result;
   }
   fit_local_surfaces(samples, options.fit_spacings * report.spacing_mm);
-  ClosingOptions closing;
-  closing.spacing_mm = report.spacing_mm;
-  closing.cell_mm = options.cell_spacings * report.spacing_mm;
-  closing.max_depth = options.max_depth;
-  closing.reach_spacings = options.reach_spacings;
-  closing.min_component_share = options.min_component_share;
-  closing.floor = rig.floor;
-  take(closed_surface(samples, closing), result);
+  take(closed_surface(samples, closing_of(options, report.spacing_mm, rig)), result);
   const std::vector<Vec3> closed = result.mesh.vertices;
   carve(rig, silhouettes, options.carving, result.mesh);
   untangle(closed, result.mesh);

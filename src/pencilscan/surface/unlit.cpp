@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "pencilscan/core/chunks.h"
+#include "pencilscan/core/median.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/surface/sight.h"
 
@@ -18,15 +19,6 @@ constexpr double kLeastLitCosine = 0.2;  // of the incidence to the projector, a
 
 cv::Mat square(int reach) {
   return cv::getStructuringElement(cv::MORPH_RECT, cv::Size(2 * reach + 1, 2 * reach + 1));
-}
-
-/// The value below which a share of the values lies; 0 of none.
-float quantile(std::vector<float> values, double share) {
-  if (values.empty()) return 0;
-  const auto at =
-      values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), at, values.end());
-  return *at;
 }
 
 constexpr int kStep = 4;  // px: levels of light change slowly
@@ -58,13 +50,14 @@ cv::Mat lit_in(const cv::Mat& presence, double spacing_px, int dark_beside) {
   const cv::Mat peaks = coarse(highest);
   cv::Mat beside;
   cv::dilate(peaks, beside, square(reach(spacing_px / kStep)));
-  const float bright = quantile({picked.begin<float>(), picked.end<float>()}, 0.99);
+  const float bright =
+      lower_quantile(std::vector<float>(picked.begin<float>(), picked.end<float>()), 0.99);
   std::vector<float> in_dark(static_cast<std::size_t>(dark_beside / (kStep * kStep)), 0.F);
   for (int v = 0; v < picked.rows; ++v) {
     for (int u = 0; u < picked.cols; ++u)
       if (beside.at<float>(v, u) <= kDark * bright) in_dark.push_back(picked.at<float>(v, u));
   }
-  const float noise = kBeyondNoise * quantile(std::move(in_dark), kInNoise);
+  const float noise = kBeyondNoise * lower_quantile(std::move(in_dark), kInNoise);
   cv::Mat around;
   cv::dilate(peaks, around, square(reach(kAround * spacing_px / kStep)));
   const cv::Mat scattered = around * kScattered;

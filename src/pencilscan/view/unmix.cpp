@@ -12,6 +12,7 @@
 namespace pencilscan {
 namespace {
 
+/// Of a colour's lines; directions of fewer, each known to some hundredths, are not known to .002.
 constexpr std::size_t kMinimumSamples = 200;
 
 /// What the lines of one colour look like in the camera.
@@ -116,8 +117,8 @@ void find_line_colors(const std::vector<Eigen::Vector3f>& samples, std::vector<L
 /// What channel c shows of the two others, where it was not projected itself: least squares over
 /// the colours without c.
 Eigen::Vector2d leak_coefficients(const std::vector<LineColor>& colors, std::size_t c) {
-  constexpr double kPrior = 1e-3;  // towards no leak, where one colour alone says little
-  constexpr double kLargestLeak = 0.6;
+  constexpr double kPrior = 1e-3;       // towards no leak, where one colour alone says little
+  constexpr double kLargestLeak = 0.6;  // filters of cameras overlap by less; chosen
   Eigen::Matrix2d N = Eigen::Matrix2d::Zero();
   Eigen::Vector2d r(0, 0);
   for (const LineColor& color : colors) {
