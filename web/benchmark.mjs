@@ -27,7 +27,7 @@ const drawnAt = (page) => page.waitForFunction(() =>
   performance.getEntriesByName('shape-drawn')[0]?.startTime, null, {polling: 20});
 
 async function measure() {
-  const browser = await openBrowser(['--no-sandbox', '--disable-gpu', '--enable-unsafe-swiftshader']);
+  const browser = await openBrowser(['--no-sandbox', '--disable-gpu', '--enable-unsafe-swiftshader'], '/usr/bin/chromium');
   const page = await browser.newPage({viewport: {width: 1366, height: 768}});
   await page.goto(served ? file : pathToFileURL(resolve(file)).href, {waitUntil: 'commit'});
   const drawn = await (await drawnAt(page)).jsonValue();
