@@ -238,9 +238,9 @@ std::optional<TurnedCamera> turn_of(const Rig& rig, const SeenCurves& seen,
 
 /// That a camera is off, and not that the others measured little: cameras of right rigs have shifts
 /// up to .1 px (a film of 320x240, every sixth of 120 frames), one turned by 2 px wins half of its
-/// places and loses a fiftieth. After the turn its places lie .08 px from their lines in the median,
-/// as those of right cameras do (.07 to .26); by chance, where relief is as fine as lines and hides
-/// them from the others, .6 px and more.
+/// places and loses a fiftieth. After the turn its places lie .08 px from their lines in the
+/// median, as those of right cameras do (.07 to .26); by chance, where relief is as fine as lines
+/// and hides them from the others, .6 px and more.
 bool is_off(const TurnedCamera& turn, double margin_px) {
   constexpr double kClearly = 3;     // three in four of those that change
   constexpr double kLeastWon = 0.1;  // of the places

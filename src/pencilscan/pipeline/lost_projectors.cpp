@@ -122,7 +122,7 @@ class CloseFit {
     const auto lines = lines_at(start);
     for (int round = 0; round < kRounds; ++round) {
       const Equations at = equations(pose.correction, lines);
-      pose.scale = std::max(kLeastScale, at.deviation);
+      pose.scale = std::max(kLeastResidualScale, at.deviation);
       Mat6 normal = Mat6::Zero();
       Vec6 right = Vec6::Zero();
       for (const Equation& e : at.all) {
@@ -156,9 +156,6 @@ class CloseFit {
   }
 
  private:
-  /// Deviations of curves count that errors along one are alike, and so do gains, of which several
-  /// places count as one. What places show decides between the two.
-  static constexpr double kLeastScale = 1 / TrackOptions{}.position_factor;
   static constexpr double kLossScale = 3;  // as RefineRigOptions::loss_scale
   struct Equation {
     double residual = 0;  ///< in deviations

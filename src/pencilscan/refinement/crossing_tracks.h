@@ -45,6 +45,10 @@ struct TrackOptions {
       2;  ///< crossings whose point is less certain for 1 px of error are left out
 };
 
+/// Residuals as found are at least so large over what deviations predict. Deviations of curves
+/// count that errors along one are alike, and whoever adds many crossings counts it once more.
+inline constexpr double kLeastResidualScale = 1 / TrackOptions{}.position_factor;
+
 /// The label of the curve at a fractional point index, when both points around it have it; null:
 /// they have none, or two. `runs`: of its camera.
 [[nodiscard]] const CurveLabel* label_at(std::span<const LabeledRun> runs, int curve, float at);

@@ -14,6 +14,7 @@
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/geometry/least_squares.h"
 #include "pencilscan/refinement/determinacy.h"
+#include "pencilscan/refinement/prior_scale.h"
 #include "pencilscan/refinement/track_residual.h"
 
 namespace pencilscan {
@@ -27,17 +28,18 @@ struct Scales {
   std::vector<double> translation_mm;  ///< likewise
   std::vector<double> mm_per_px;       ///< likewise: of the volume's centre in its image
 
-  Scales(const Rig& rig, const RefineRigOptions& options)
-      : rotation_px(device_count(rig), options.rotation_sigma_px) {
+  /// `likely`: of these, what they are for devices that did not move.
+  Scales(const Rig& rig, const RefineRigOptions& options, double likely = 1)
+      : rotation_px(device_count(rig), likely * options.rotation_sigma_px) {
     const Vec3 center = working_volume(rig).center;
     for (std::size_t d = 0; d < device_count(rig); ++d) {
       const Device& device = device_at(rig, d);
       mm_per_px.push_back((device.center() - center).norm() / device.focal_px());
-      translation_mm.push_back(options.translation_sigma_px * mm_per_px.back());
+      translation_mm.push_back(likely * options.translation_sigma_px * mm_per_px.back());
     }
     for (const std::size_t d : options.moved) {
-      rotation_px[d] *= kMovedFarther;
-      translation_mm[d] *= kMovedFarther;
+      rotation_px[d] *= kMovedFarther / likely;
+      translation_mm[d] *= kMovedFarther / likely;
     }
   }
   [[nodiscard]] PoseCorrection correction(std::size_t device, const double* p) const {
@@ -249,6 +251,19 @@ std::string lack_of_equations(const UsedTracks& used, const RefineRigOptions& op
          std::to_string(static_cast<int>(std::ceil(wanted))) + " are needed";
 }
 
+/// How large the errors of the calibration are, over what is expected of them.
+double likely_scale(const Eigen::MatrixXd& seen, const std::vector<Parameters>& parameters,
+                    const RefineRigOptions& options) {
+  Eigen::VectorXd found(6 * static_cast<Eigen::Index>(parameters.size()));
+  for (std::size_t d = 0; d < parameters.size(); ++d)
+    found.segment<6>(6 * static_cast<Eigen::Index>(d)) =
+        Eigen::Map<const Vec6>(parameters[d].data());
+  std::vector<Eigen::Index> moved;
+  for (const std::size_t d : options.moved)
+    for (Eigen::Index k = 0; k < 6; ++k) moved.push_back(6 * static_cast<Eigen::Index>(d) + k);
+  return likely_prior_scale(seen, found, moved);
+}
+
 }  // namespace
 
 RefineRigResult refine_rig(const Rig& calibrated, std::span<const CrossingTrack> tracks,
@@ -263,7 +278,7 @@ RefineRigResult refine_rig(const Rig& calibrated, std::span<const CrossingTrack>
   report.reason = lack_of_equations(used, options);
   if (!report.reason.empty()) return result;
 
-  const Scales scales(calibrated, options);
+  Scales scales(calibrated, options);
   std::vector<Parameters> parameters(devices, Parameters{});
   for (std::size_t d = 0; d < start.size(); ++d) {
     if (used.is_refined[d] != 0) parameters[d] = scales.parameters(d, start[d]);
@@ -279,13 +294,46 @@ RefineRigResult refine_rig(const Rig& calibrated, std::span<const CrossingTrack>
 
   // The scale of the residuals shrinks as the devices find their places, and with it the bound
   // beyond which a track loses its say.
-  double scale = std::max(1.0, residual_scale(residuals, definite, scales, parameters));
-  for (int stage = 0; stage < options.max_stages; ++stage) {
-    minimize(residuals, definite, scales, scale, options, parameters);
-    const double next = std::max(1.0, residual_scale(residuals, definite, scales, parameters));
-    const bool is_settled = next > 0.95 * scale;
-    scale = next;
-    if (is_settled) break;
+  double scale =
+      std::max(kLeastResidualScale, residual_scale(residuals, definite, scales, parameters));
+  const auto settle = [&](const Scales& prior) {
+    for (int stage = 0; stage < options.max_stages; ++stage) {
+      minimize(residuals, definite, prior, scale, options, parameters);
+      const double next =
+          std::max(kLeastResidualScale, residual_scale(residuals, definite, prior, parameters));
+      const bool is_settled = next > 0.95 * scale;
+      scale = next;
+      if (is_settled) break;
+    }
+  };
+  settle(scales);
+
+  // Devices without crossings keep their error, but no line of theirs is looked at here.
+  const auto size = 6 * static_cast<Eigen::Index>(devices);
+  const Eigen::MatrixXd identity = Eigen::MatrixXd::Identity(size, size);
+  const auto seen = [&](const Scales& prior) {
+    return information(residuals, definite, prior, scale, options, parameters);
+  };
+  const auto expected_error = [&](const Scales& prior, const Eigen::MatrixXd& covariance) {
+    const Eigen::VectorXd unit = prior.all();
+    return line_error_px(calibrated, definite, unit.asDiagonal() * covariance * unit.asDiagonal(),
+                         unit.cwiseAbs2().cwiseInverse());
+  };
+  const auto remaining_error = [&](const Scales& prior, const Eigen::MatrixXd& information) {
+    return expected_error(prior, solve_symmetric(identity + information, identity));
+  };
+  const Eigen::MatrixXd told = seen(scales);
+  report.expected_error_px = expected_error(scales, identity);
+  report.remaining_error_px = remaining_error(scales, told);
+  const bool is_determined =
+      report.remaining_error_px <= options.max_remaining * report.expected_error_px;
+  if (const double likely = likely_scale(told, parameters, options); is_determined && likely < 1) {
+    const Scales likely_scales(calibrated, options, likely);
+    for (std::size_t d = 0; d < devices; ++d)
+      parameters[d] = likely_scales.parameters(d, scales.correction(d, parameters[d].data()));
+    scales = likely_scales;
+    settle(scales);
+    report.remaining_error_px = remaining_error(scales, seen(scales));
   }
   report.residual_scale = residual_scale(residuals, definite, scales, parameters);
 
@@ -297,20 +345,7 @@ RefineRigResult refine_rig(const Rig& calibrated, std::span<const CrossingTrack>
   for (const CrossingTrack& track : definite) report.sightings += track.sightings.size();
   report.before = crossing_disagreement(calibrated, definite);
   report.after = crossing_disagreement(refined, definite);
-
-  // Devices without crossings keep their error, but no line of theirs is looked at here.
-  const auto size = 6 * static_cast<Eigen::Index>(devices);
-  const Eigen::VectorXd unit = scales.all();
-  const Eigen::VectorXd precision = unit.cwiseAbs2().cwiseInverse();
-  const Eigen::MatrixXd identity = Eigen::MatrixXd::Identity(size, size);
-  const Eigen::MatrixXd seen =
-      identity + information(residuals, definite, scales, scale, options, parameters);
-  const Eigen::MatrixXd posterior = solve_symmetric(seen, identity);
-  const Eigen::MatrixXd prior = unit.cwiseAbs2().asDiagonal();
-  report.expected_error_px = line_error_px(refined, definite, prior, precision);
-  report.remaining_error_px = line_error_px(
-      refined, definite, unit.asDiagonal() * posterior * unit.asDiagonal(), precision);
-  if (report.remaining_error_px > options.max_remaining * report.expected_error_px) {
+  if (!is_determined) {
     report.reason = "the crossings do not determine the devices: of an expected line error of " +
                     formatted(report.expected_error_px) + " px, " +
                     formatted(report.remaining_error_px) + " px would remain";

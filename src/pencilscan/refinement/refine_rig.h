@@ -21,9 +21,11 @@ namespace pencilscan {
 /// 1973): each is solved for within its own residual. rho is Cauchy's loss, its scale that of the
 /// residuals as found, so that wrong labels lose their say as the others come to agree. The last
 /// sums say how well devices were calibrated; they also choose, among the motions and scales of the
-/// whole rig that no picture can tell apart, the one that moves the devices least.
+/// whole rig that no picture can tell apart, the one that moves the devices least. Once the tracks
+/// have settled, they say how large calibration errors are (likely_prior_scale), and settle again.
 struct RefineRigOptions {
-  double rotation_sigma_px = 1;  ///< expected calibration error per axis, at the image centre; > 0
+  /// Largest expected calibration error per axis, at the image centre; > 0.
+  double rotation_sigma_px = 1;
   /// Likewise of the translation, as the shift of the volume's centre in the image; > 0. At 1.1 m
   /// and f = 2300 px, 1 px is 0.48 mm.
   double translation_sigma_px = 1;

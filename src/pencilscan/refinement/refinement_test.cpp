@@ -186,9 +186,9 @@ TEST(RefineRig, LeavesATrueRigWhereItIs) {
   const RefineRigResult result = refine_rig(scene.rig, tracks);
   ASSERT_TRUE(result.report.refined) << result.report.reason;
   for (const DeviceRefinement& device : result.report.devices) {
-    // Below a third of what the priors expect: a turn and a shift make up for each other.
-    EXPECT_LT(device.rotation_px, 0.33) << device.name;
-    EXPECT_LT(device.translation_mm, 0.17) << device.name;
+    // Not by what noise says where a turn and a shift make up for each other.
+    EXPECT_LT(device.rotation_px, 0.02) << device.name;
+    EXPECT_LT(device.translation_mm, 0.01) << device.name;
   }
   EXPECT_LT(shape_error_mm(scene, corrected_rig(scene.rig, result.correction), tracks), kNoiseMm);
 }
