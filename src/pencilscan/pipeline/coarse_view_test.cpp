@@ -188,5 +188,24 @@ TEST(FrameWarnings, WhatAllDevicesMissIsNoFaultOfOne) {
   EXPECT_TRUE(device_that_is_off(of_devices)) << "such a rig still does not fit";
 }
 
+// A camera that turned keeps few crossings, and shares its misses with the projectors.
+TEST(FrameWarnings, TheDeviceThatMissesMostIsNamedThoughItsCrossingsAreFew) {
+  const Scene scene(fine_rig(1));
+  const std::size_t cameras = scene.rig.cameras.size();
+  std::vector<CrossingDisagreement> of_devices(cameras + scene.rig.projectors.size(),
+                                               {1000, 0.06, 0.06, {}});
+  of_devices[cameras].median_px = 0.16;
+  of_devices[1] = {150, 0.26, 0.06, {}};
+  const auto warning = device_warning(scene.rig, of_devices);
+  ASSERT_TRUE(warning);
+  EXPECT_EQ(warning->device, scene.rig.cameras[1].name);
+  of_devices[0].median_px = 0.18;
+  EXPECT_FALSE(device_warning(scene.rig, of_devices)) << "two cameras miss: of neither alone";
+  of_devices[0].median_px = 0.06;
+  of_devices[1].crossings = 40;
+  of_devices[cameras].median_px = 0.14;
+  EXPECT_FALSE(device_warning(scene.rig, of_devices)) << "chance";
+}
+
 }  // namespace
 }  // namespace pencilscan
