@@ -144,6 +144,29 @@ std::vector<double> next_times(const std::vector<TimedShot>& shots, std::size_t 
   return result;
 }
 
+/// Where a set ends that the shot `end` does not fit into, of those from `first` on: before the
+/// longest pause, so that a camera half a period late tears no others apart, unless the set has a
+/// shot of the same camera.
+std::size_t end_of_set(const std::vector<TimedShot>& shots, std::size_t first, std::size_t end) {
+  std::size_t longest = end;
+  const auto pause = [&](std::size_t at) { return shots[at].time_ns - shots[at - 1].time_ns; };
+  for (std::size_t k = end; k-- > first;) {
+    if (shots[k].camera == shots[end].camera) return end;
+    if (k > first && pause(k) > pause(longest)) longest = k;
+  }
+  return longest;
+}
+
+/// How much longer a set waits for a shot in the middle between others: an eighth of a period, so
+/// that one camera half a period late, a little more or less, is always of the moment before.
+double slack_for(const std::vector<TimedShot>& shots, std::size_t i, double period) {
+  const auto is_far = [&](std::size_t a, std::size_t b) {
+    return shots[b].time_ns - shots[a].time_ns > period / 4;
+  };
+  const bool is_alone = (i == 0 || is_far(i - 1, i)) && (i + 1 == shots.size() || is_far(i, i + 1));
+  return is_alone ? period / 8 : 0;
+}
+
 /// Shots in order of time fall into sets: a set ends where the next shot is half a period after its
 /// first one, of a camera that it holds already, or nearer to the next picture of a camera of it.
 std::vector<std::vector<TimedShot>> fall_into_sets(std::vector<TimedShot> shots,
@@ -156,14 +179,22 @@ std::vector<std::vector<TimedShot>> fall_into_sets(std::vector<TimedShot> shots,
   std::size_t first = 0;
   for (std::size_t i = 0; i < shots.size(); ++i) {
     const TimedShot& shot = shots[i];
-    bool fits = !sets.empty() && shot.time_ns - shots[first].time_ns < period / 2;
+    const double slack = slack_for(shots, i, period);
+    bool fits = !sets.empty() && shot.time_ns - shots[first].time_ns < period / 2 + slack;
     for (std::size_t k = first; fits && k < i; ++k) {
       fits = shots[k].camera != shot.camera &&
-             shot.time_ns - shots[k].time_ns <= next[k] - shot.time_ns;
+             shot.time_ns - shots[k].time_ns <= next[k] - shot.time_ns + 2 * slack;
     }
-    if (!fits) {
+    if (!fits && !sets.empty()) {
+      const std::size_t end = end_of_set(shots, first, i);
+      std::vector<TimedShot>& last = sets.back();
+      std::vector<TimedShot> rest(last.begin() + static_cast<std::ptrdiff_t>(end - first),
+                                  last.end());
+      last.resize(end - first);
+      sets.push_back(std::move(rest));
+      first = end;
+    } else if (!fits) {
       sets.emplace_back();
-      first = i;
     }
     sets.back().push_back(shot);
   }

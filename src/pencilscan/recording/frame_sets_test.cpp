@@ -243,6 +243,33 @@ TEST(FrameSets, FreeRunningCamerasAreGroupedByTimeAndLateInAllFrames) {
   EXPECT_NEAR(sets.sets[50].spread_ns, 15e6, 3e5);
 }
 
+// Its pictures fall now before and now behind the middle between two moments.
+TEST(FrameSets, ACameraHalfAPeriodLateTearsNoOthersApart) {
+  for (const std::size_t count : {4U, 6U}) {
+    Trigger trigger;
+    trigger.cameras.resize(count);
+    trigger.cameras.back().phase_ns = kPeriod / 2;
+    const FrameSets sets = group_frames(trigger.shots());
+    std::size_t whole = 0;
+    for (const FrameSet& set : sets.sets) {
+      std::size_t of_others = 0;
+      std::optional<std::size_t> moment;
+      for (std::size_t c = 0; c + 1 < count; ++c) {
+        if (!set.rows[c]) continue;
+        ++of_others;
+        const std::size_t of = trigger.moment_of_row[c][*set.rows[c]];
+        EXPECT_TRUE(!moment || *moment == of) << "set " << set.number;
+        moment = of;
+      }
+      EXPECT_TRUE(of_others == 0 || of_others + 1 == count) << "set " << set.number;
+      whole += of_others > 0;
+    }
+    EXPECT_EQ(whole, trigger.moments);
+    EXPECT_EQ(sets.sets.size(), trigger.moments);
+    EXPECT_EQ(sets.clocks.back().late.size(), trigger.moments);
+  }
+}
+
 TEST(FrameSets, LatePicturesAreNamed) {
   Trigger trigger;
   trigger.cameras[0].late = {{5, 3e6}, {6, 1e6}};  // the exposure is 4 ms
