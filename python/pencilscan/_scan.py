@@ -105,7 +105,7 @@ def reconstruct(
     depth
         Dense depth between the curves (joint only); else the surface rests on the curves.
     depth_maps
-        Keep them in the result.
+        Keep them in the result; InputError without mesh or depth, of which they come.
     plain
         The same moment in plain light, for the colour of the mesh.
     multiview_cost

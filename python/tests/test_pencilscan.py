@@ -157,6 +157,11 @@ class PackageTest(unittest.TestCase):
         self.assertGreater(np.isfinite(z).sum(), 10000)
         self.assertTrue((self.scene.result.depth["cam1"].sigma[np.isfinite(z)] > 0).all())
 
+    def test_depth_maps_need_a_mesh(self) -> None:
+        for options in ({"mesh": False}, {"depth": False}):
+            with self.assertRaisesRegex(ps.InputError, "depth_maps"):
+                ps.reconstruct(self.scene.rig, self.scene.frame, depth_maps=True, **options)
+
     # ---- memory ---------------------------------------------------------------------------------
 
     def test_results_are_views(self) -> None:

@@ -106,6 +106,9 @@ FrameOptions frame_options(const Rig& rig, const ReconstructionOptions& options)
   const std::string_view rule = broken_rule(rig, points.method);
   if (!rule.empty()) throw InputError("rig", "projectors", "", std::string(rule));
   frame.shape.depth.enabled = options.depth && method->capabilities.allows_dense_depth;
+  if (options.depth_maps && !(frame.meshes && frame.shape.depth.enabled))
+    throw InputError("options", "depth_maps", "true",
+                     "needs a mesh, depth, and the method joint: there would be none");
   return frame;
 }
 

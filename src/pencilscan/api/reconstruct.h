@@ -25,10 +25,10 @@ struct ReconstructionOptions {
   std::string multiview_cost = "normalized";  ///< or published
   bool mesh = true;                           ///< false: points and curves alone, much faster
   bool depth = true;                          ///< dense depth between the curves; joint only
-  bool depth_maps = false;                    ///< keep them in the result
-  Images plain;                               ///< the same moment in plain light, for colour
-  std::string frame = "000000";               ///< what the report calls it
-  int threads = 0;                            ///< of the whole process meanwhile; 0: as it is
+  bool depth_maps = false;       ///< keep them in the result; InputError without mesh or depth
+  Images plain;                  ///< the same moment in plain light, for colour
+  std::string frame = "000000";  ///< what the report calls it
+  int threads = 0;               ///< of the whole process meanwhile; 0: as it is
   StageListener progress;
 };
 

@@ -67,7 +67,8 @@ class Judge {
     if (input_.tracks.size() < 100) {
       add(Grade::kUnusable,
           "only " + std::to_string(input_.tracks.size()) + " correspondences were found",
-          "check exposure and focus: see the decoding table");
+          "check that the object fills a good part of the pictures, exposure and focus: see the "
+          "decoding table");
     }
     const bool helped = !result_.problem.board_views.empty();
     if (scene_.share < options_.planar_share) return;
@@ -88,6 +89,19 @@ class Judge {
   void judge_placement() {
     for (std::size_t d = 0; d < result_.placed.size(); ++d) {
       if (result_.placed[d] != 0 || explained_.contains(d)) continue;
+      const bool has_any =
+          std::any_of(input_.tracks.begin(), input_.tracks.end(), [&](const Track& track) {
+            return std::any_of(track.views.begin(), track.views.end(),
+                               [&](const TrackView& view) { return view.device == d; });
+          });
+      if (!has_any) {
+        add(Grade::kUnusable,
+            name(d) +
+                " has no correspondence with any other device: its pictures are missing, or "
+                "nothing in them was decoded",
+            "see the decoding table: a pair that is not in it has no folder");
+        continue;
+      }
       add(Grade::kUnusable,
           name(d) + " shares too few correspondences with the others to be placed",
           "put an object where " + name(d) + " and its neighbours see it");
