@@ -189,6 +189,18 @@ TEST(Judge, ADistanceThatTheBoardContradictsIsNamed) {
                     HasSubstr("the board is probably in centimetres")));
 }
 
+TEST(Judge, AVolumeThatIsFarLargerThanWhatWasMeasuredIsANote) {
+  CalibrationInput input = with_volume(0);
+  const CalibrationResult result = calibrate(input, {.hypotheses = 2});
+  ASSERT_TRUE(result.rig.unit_known);
+  const auto note = HasSubstr("the unit of the lengths is another");
+  EXPECT_THAT(all_findings(judged(input, result)), Not(note));
+  input.rig.volume->radius = 1700;  // as where a distance was given in centimetres
+  const Verdict verdict = judged(input, result);
+  EXPECT_THAT(all_findings(verdict), note);
+  EXPECT_EQ(verdict.grade, judged(with_volume(0), result).grade);
+}
+
 TEST(Calibrate, VolumeAndFloorStayInTheGivenFrameAndAreLeftOutOfAnother) {
   const auto in_given = calibrate(with_volume(3), {.hypotheses = 2});
   EXPECT_EQ(in_given.rig.volume->radius, 170);

@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <utility>
+#include <vector>
 
 #include "pencilscan/calibration/scale_deviation.h"
 #include "pencilscan/core/formatted.h"
 #include "pencilscan/core/length_units.h"
+#include "pencilscan/core/median.h"
 
 namespace pencilscan {
 namespace {
@@ -30,6 +32,7 @@ class ScaleJudge {
     judge_scale_deviation();
     if (result_.board_times) judge_board_lengths(*result_.board_times);
     if (result_.given_times) judge_given_lengths(*result_.given_times);
+    judge_volume();
     judge_given_places();
     return std::move(findings_);
   }
@@ -106,6 +109,27 @@ class ScaleJudge {
                        " times those of t. Poses, volume and floor were multiplied by it";
     what += unit_behind(factor, "t", "the " + measured);
     add(Grade::kDoubtful, what, "give the " + measured + " and t in mm");
+  }
+
+  /// Nothing else may tell the unit of a distance: objects mostly fill the volume that is stated. A
+  /// small one is no fault, so this is a note.
+  void judge_volume() {
+    constexpr double kFar = 5;
+    constexpr double kMost = 0.9;  // of the points; the others may lie on what stands around
+    if (!input_.rig.volume || !result_.rig.unit_known || result_.given_times) return;
+    const Vec3 middle = middle_of_points(result_.problem);
+    std::vector<double> distances;
+    for (std::size_t t = 0; t < result_.problem.points.size(); ++t)
+      if (result_.problem.used[t] != 0)
+        distances.push_back((result_.problem.points[t] - middle).norm());
+    const double reach = lower_quantile(std::move(distances), kMost);
+    const double stated = input_.rig.volume->radius;
+    if (!(reach > 0) || (stated < kFar * reach && reach < kFar * stated)) return;
+    add(Grade::kGood,
+        "what was measured reaches " + formatted(reach) +
+            " mm from its middle, the volume of the devices file " + formatted(stated) +
+            " mm: if it fills the volume, the unit of the lengths is another",
+        "give distances, squares of boards and t in mm");
   }
 
   void judge_given_places() {

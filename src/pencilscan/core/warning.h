@@ -28,7 +28,7 @@ enum class WarningCode {
   kNotClosed,       ///< figures "boundary", "non_manifold": edges of the surface
   kLittleMeasured,  ///< figure "share": of the closed surface
   kViewsDisagree,   ///< figure "deviations": of depths of different cameras
-  kMissingLines,    ///< of a projector; figures "share", "usual_share": of its lines, the others'
+  kMissingLines,    ///< of a device; figures "share", "usual_share": of its lines, the others'
   kFewNames,        ///< figure "share": of the curve points that got their line
   kMotion,          ///< within the exposure; figures "way_mm", "way_sigma_mm"
   kVolumeCuts,      ///< figure "share": of the named points, those where a line leaves the volume

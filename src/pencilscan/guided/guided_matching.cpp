@@ -17,9 +17,9 @@ std::vector<LocalSurface> match_guided(const Rig& rig, const std::vector<ColorFa
                                        const GuidedMatchingOptions& options,
                                        std::span<const MeasuredPoint> dense) {
   std::vector<std::optional<LocalSurface>> surfaces(graphs.size());
-  std::vector<std::vector<ExpectedLines>> expected(graphs.size());
   labeling.denied.assign(labeling.runs.size(), {});
   labeling.undecided.resize(labeling.runs.size());
+  labeling.expected.assign(labeling.runs.size(), {});
   parallel_for(graphs.size(), [&](std::size_t g) {
     const auto camera = static_cast<std::size_t>(graphs[g].camera);
     CameraNames names(rig, families, graphs[g], labeling.runs[camera], options, dense);
@@ -39,16 +39,9 @@ std::vector<LocalSurface> match_guided(const Rig& rig, const std::vector<ColorFa
     if (!denied.empty())
       drop_beside_denied(graphs[g], denied, labeling.runs[camera], labeling.undecided[camera]);
     labeling.denied[camera] = denied;
-    expected[g] = names.expected();
+    labeling.expected[camera] = names.expected();
     surfaces[g] = names.take_surface();
   });
-  labeling.expected.assign(rig.projectors.size(), {});
-  for (const std::vector<ExpectedLines>& of_camera : expected) {
-    for (std::size_t p = 0; p < of_camera.size(); ++p) {
-      labeling.expected[p].points += of_camera[p].points;
-      labeling.expected[p].named += of_camera[p].named;
-    }
-  }
   std::vector<LocalSurface> result;
   for (auto& surface : surfaces) result.push_back(*std::move(surface));
   return result;

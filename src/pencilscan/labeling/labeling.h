@@ -71,11 +71,16 @@ struct DeniedRun {
   float spacing_px = 0;  ///< of the lines there, in the picture
 };
 
-/// Of the lines of a projector, 5 px apart at least, that a surface lets cameras expect where
+/// Of the lines of a projector, 5 px apart at least, that a surface lets a camera expect where
 /// nothing shades it: points, and those with that name.
 struct ExpectedLines {
   std::size_t points = 0;
   std::size_t named = 0;
+
+  void add(const ExpectedLines& other) {
+    points += other.points;
+    named += other.named;
+  }
 };
 
 /// Result of a solution over all cameras; curve points in no run are undecided.
@@ -86,7 +91,8 @@ struct Labeling {
   std::vector<ComponentReport> components;           ///< all but joint
   std::vector<std::vector<UndecidedRun>> undecided;  ///< per camera; joint only
   std::vector<std::vector<DeniedRun>> denied;  ///< per camera; guided matching on a dense surface
-  std::vector<ExpectedLines> expected;         ///< per projector; as guided matching begins
+  /// Per camera and projector, as guided matching begins.
+  std::vector<std::vector<ExpectedLines>> expected;
 };
 
 [[nodiscard]] std::size_t labelled_points(std::span<const LabeledRun> runs);

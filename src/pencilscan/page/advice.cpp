@@ -68,7 +68,7 @@ constexpr std::array<Known, 21> kKnown = {{
      "it are named by it."},
     {"missing-lines",
      "Look whether the projector shines, and whether its picture is the one that the rig states "
-     "(pencilscan pattern writes it)."},
+     "(pencilscan pattern writes it); of a camera, whether its picture is sharp."},
     {"few-names",
      "Check that rig and pictures belong together: the rig's file, the names of its cameras, and "
      "what the projectors show."},

@@ -176,6 +176,10 @@ FrameResult match_on_surface(const Rig& rig, FrameResult result, const PointOpti
     const std::vector<LocalSurface> surfaces =
         match_guided(rig, points.families, taken_presence(points.detections), points.graphs,
                      points.labeling, guided, dense_points(rig, shape.depth.maps, *shape.scene));
+    // Of cameras without any line that was said.
+    for (const GridGraph& graph : points.graphs)
+      if (graph.curves.empty())
+        points.labeling.expected[static_cast<std::size_t>(graph.camera)].clear();
     for (Warning& warning : missing_lines_warnings(rig, points.labeling.expected))
       points.warnings.push_back(std::move(warning));
     std::vector<MeasuredPoint> triangulated =

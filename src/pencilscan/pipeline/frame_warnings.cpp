@@ -64,8 +64,16 @@ Warning naming_warning(const std::string& doubt) {
               "pieces; rig check --frames looks at several frames"};
 }
 
-std::vector<Warning> missing_lines_warnings(const Rig& rig,
-                                            std::span<const ExpectedLines> expected) {
+namespace {
+
+/// The devices of a kind whose lines are next to all missing, and what they have of the others'.
+struct MissingLines {
+  std::size_t device = 0;
+  double share = 0;
+  double usual = 0;
+};
+
+std::vector<MissingLines> missing_lines(std::span<const ExpectedLines> expected) {
   // Of 60 rigs drawn at random, right projectors have a third of the others' share and more; one
   // whose offset or pitch is another than the rig's has a tenth and less.
   constexpr double kHardly = 0.15;
@@ -77,28 +85,51 @@ std::vector<Warning> missing_lines_warnings(const Rig& rig,
   const auto share = [](const ExpectedLines& lines) {
     return static_cast<double>(lines.named) / static_cast<double>(lines.points);
   };
-  std::vector<Warning> warnings;
-  for (std::size_t p = 0; p < expected.size(); ++p) {
-    if (expected[p].points == 0) continue;
+  std::vector<MissingLines> missing;
+  for (std::size_t d = 0; d < expected.size(); ++d) {
+    if (expected[d].points == 0) continue;
     std::vector<double> of_others;
     for (std::size_t k = 0; k < expected.size(); ++k)
-      if (k != p && expected[k].points >= kEnough) of_others.push_back(share(expected[k]));
+      if (k != d && expected[k].points >= kEnough) of_others.push_back(share(expected[k]));
     if (of_others.empty()) continue;
     const double usual = upper_median(std::move(of_others));
-    const double own = share(expected[p]);
-    const double most = own + kUnseenPoints / static_cast<double>(expected[p].points);
-    if (own >= kHardly * usual || most >= kLeastOfRight * usual) continue;
-    const std::string& name = rig.projectors[p].name;
+    const double own = share(expected[d]);
+    const double most = own + kUnseenPoints / static_cast<double>(expected[d].points);
+    if (own < kHardly * usual && most < kLeastOfRight * usual) missing.push_back({d, own, usual});
+  }
+  return missing;
+}
+
+}  // namespace
+
+std::vector<Warning> missing_lines_warnings(const Rig& rig,
+                                            std::span<const std::vector<ExpectedLines>> expected) {
+  std::vector<ExpectedLines> of_cameras(rig.cameras.size());
+  std::vector<ExpectedLines> of_projectors(rig.projectors.size());
+  for (std::size_t c = 0; c < expected.size(); ++c) {
+    for (std::size_t p = 0; p < expected[c].size(); ++p) {
+      of_cameras[c].add(expected[c][p]);
+      of_projectors[p].add(expected[c][p]);
+    }
+  }
+  std::vector<Warning> warnings;
+  const auto warn = [&](const std::string& kind, const std::string& name, const MissingLines& lines,
+                        const std::string& where, const std::string& why) {
     warnings.push_back(
         {WarningCode::kMissingLines,
-         "projector " + name + ": of its lines that the measured surface lets expect, " +
-             formatted(100 * own, "%.0f") + " % are in the pictures (of the others' " +
-             formatted(100 * usual, "%.0f") +
-             " %): it was off, is covered, is too dim beside the others, was turned away, or shows "
-             "another pattern than the rig states",
+         kind + " " + name + ": of its lines that the measured surface lets expect, " +
+             formatted(100 * lines.share, "%.0f") + " % are in " + where + " (of the others' " +
+             formatted(100 * lines.usual, "%.0f") + " %): " + why,
          name,
-         {{"share", own}, {"usual_share", usual}}});
-  }
+         {{"share", lines.share}, {"usual_share", lines.usual}}});
+  };
+  for (const MissingLines& lines : missing_lines(of_cameras))
+    warn("camera", rig.cameras[lines.device].name, lines, "its picture",
+         "it is out of focus, is covered, or was moved");
+  for (const MissingLines& lines : missing_lines(of_projectors))
+    warn("projector", rig.projectors[lines.device].name, lines, "the pictures",
+         "it was off, is covered, is too dim beside the others, was turned away, or shows another "
+         "pattern than the rig states");
   return warnings;
 }
 

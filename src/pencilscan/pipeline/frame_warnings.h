@@ -22,10 +22,10 @@ namespace pencilscan {
 /// Of NamingDoubt::of_projectors().
 [[nodiscard]] Warning naming_warning(const std::string& doubt);
 
-/// Projectors that have hardly any of the lines that the measured surface lets expect, where the
-/// others have theirs.
-[[nodiscard]] std::vector<Warning> missing_lines_warnings(const Rig& rig,
-                                                          std::span<const ExpectedLines> expected);
+/// Cameras and projectors that have hardly any of the lines that the measured surface lets expect,
+/// where the others have theirs. `expected`: per camera and projector.
+[[nodiscard]] std::vector<Warning> missing_lines_warnings(
+    const Rig& rig, std::span<const std::vector<ExpectedLines>> expected);
 
 /// That the volume cuts what was measured.
 [[nodiscard]] std::optional<Warning> volume_warning(const Rig& rig, const CutLines& lines);

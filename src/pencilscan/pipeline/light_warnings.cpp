@@ -205,9 +205,11 @@ std::optional<Warning> little_light_warning(const Rig& rig, const PointResult& r
   const double height = median_of_points(result.graphs, &CurvePoint::amplitude);
   if (height > ratio * noise_of_poor_sensor(height)) return std::nullopt;
   return Warning{WarningCode::kLittleLight,
-                 "light is too little: the lines that were found are " + formatted(ratio, "%.1f") +
+                 "light is too little, or spread by pictures out of focus: the lines that were "
+                 "found are " +
+                     formatted(ratio, "%.1f") +
                      " times as bright as the noise of the pictures (median), and fainter ones "
-                     "are lost; longer exposure, a wider aperture or brighter projectors help",
+                     "are lost; longer exposure or brighter projectors help, or sharper pictures",
                  {},
                  {{"signal_to_noise", ratio}}};
 }

@@ -249,7 +249,8 @@ TEST_F(PictureCheck, AProjectorWithAnotherPatternIsNamed) {
 
 TEST_F(PictureCheck, OfFewLinesThatAreExpectedNextToAllHaveToBeMissing) {
   const auto are_missing = [](std::size_t points, std::size_t named) {
-    const std::vector<ExpectedLines> expected{{4000, 3200}, {points, named}, {3000, 2400}};
+    const std::vector<std::vector<ExpectedLines>> expected{
+        {{4000, 3200}, {points, named}, {3000, 2400}}};
     return !missing_lines_warnings(*rig_, expected).empty();
   };
   EXPECT_TRUE(are_missing(4000, 200));
@@ -267,6 +268,21 @@ TEST_F(PictureCheck, ACameraOutOfFocusIsSaidToBe) {
   expect_said(frame,
               {"camera cam2: its picture does not fit the rig as the others' do: its lines are"});
   EXPECT_THAT(said_of(frame).front(), HasSubstr("out of focus"));
+}
+
+// Out of focus by less, lines lie over each other: next to none is found, and no picture misfits.
+TEST_F(PictureCheck, ACameraWithoutTheLinesThatOthersMeasureIsNamed) {
+  std::vector<std::vector<ExpectedLines>> expected(
+      rig_->cameras.size(), std::vector<ExpectedLines>(rig_->projectors.size(), {1000, 800}));
+  EXPECT_THAT(missing_lines_warnings(*rig_, expected), IsEmpty());
+  for (ExpectedLines& lines : expected[2]) lines.named = 20;
+  const std::vector<Warning> found = missing_lines_warnings(*rig_, expected);
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_EQ(found[0].device, rig_->cameras[2].name);
+  EXPECT_THAT(found[0].text, HasSubstr("2 % are in its picture (of the others' 80 %): it is out of "
+                                       "focus"));
+  expected[2].clear();  // its picture was left out
+  EXPECT_THAT(missing_lines_warnings(*rig_, expected), IsEmpty());
 }
 
 /// What is left in its colours is of others that share them, and no sign that it was moved.
