@@ -251,18 +251,100 @@ std::string lack_of_equations(const UsedTracks& used, const RefineRigOptions& op
          std::to_string(static_cast<int>(std::ceil(wanted))) + " are needed";
 }
 
-/// How large the errors of the calibration are, over what is expected of them.
-double likely_scale(const Eigen::MatrixXd& seen, const std::vector<Parameters>& parameters,
-                    const RefineRigOptions& options) {
-  Eigen::VectorXd found(6 * static_cast<Eigen::Index>(parameters.size()));
-  for (std::size_t d = 0; d < parameters.size(); ++d)
-    found.segment<6>(6 * static_cast<Eigen::Index>(d)) =
-        Eigen::Map<const Vec6>(parameters[d].data());
-  std::vector<Eigen::Index> moved;
-  for (const std::size_t d : options.moved)
-    for (Eigen::Index k = 0; k < 6; ++k) moved.push_back(6 * static_cast<Eigen::Index>(d) + k);
-  return likely_prior_scale(seen, found, moved);
-}
+/// The adjustment of one rig to its tracks.
+class Adjustment {
+ public:
+  Adjustment(const Rig& rig, const UsedTracks& used, const RigCorrection& start,
+             const RefineRigOptions& options)
+      : rig_(rig),
+        options_(options),
+        scales_(rig, options),
+        parameters_(device_count(rig), Parameters{}) {
+    for (std::size_t d = 0; d < start.size(); ++d)
+      if (used.is_refined[d] != 0) parameters_[d] = scales_.parameters(d, start[d]);
+    for (const CrossingTrack& track : used.tracks) {
+      const TrackResidual residual(rig, track, options.line_sigma_px);
+      if (residual.evaluate(poses_of(residual, scales_, parameters_), false))
+        tracks_.push_back(track);
+    }
+    for (const CrossingTrack& track : tracks_)
+      residuals_.emplace_back(rig, track, options.line_sigma_px);
+    scale_ = std::max(kLeastResidualScale, scale_as_found());
+  }
+
+  /// The scale of the residuals shrinks as the devices find their places, and with it the bound
+  /// beyond which a track loses its say.
+  void settle() {
+    for (int stage = 0; stage < options_.max_stages; ++stage) {
+      minimize(residuals_, tracks_, scales_, scale_, options_, parameters_);
+      const double next = std::max(kLeastResidualScale, scale_as_found());
+      const bool is_settled = next > 0.95 * scale_;
+      scale_ = next;
+      if (is_settled) break;
+    }
+  }
+
+  /// Settles again with priors as large as the crossings say that calibration errors are.
+  void settle_with_likely_priors() {
+    Eigen::VectorXd found(size());
+    for (std::size_t d = 0; d < parameters_.size(); ++d)
+      found.segment<6>(6 * static_cast<Eigen::Index>(d)) =
+          Eigen::Map<const Vec6>(parameters_[d].data());
+    std::vector<Eigen::Index> moved;
+    for (const std::size_t d : options_.moved)
+      for (Eigen::Index k = 0; k < 6; ++k) moved.push_back(6 * static_cast<Eigen::Index>(d) + k);
+    const double likely = likely_prior_scale(told(), found, moved);
+    if (likely == 1) return;
+    const RigCorrection so_far = correction();
+    scales_ = Scales(rig_, options_, likely);
+    for (std::size_t d = 0; d < so_far.size(); ++d)
+      parameters_[d] = scales_.parameters(d, so_far[d]);
+    settle();
+  }
+
+  [[nodiscard]] RigCorrection correction() const {
+    RigCorrection correction;
+    for (std::size_t d = 0; d < parameters_.size(); ++d)
+      correction.push_back(scales_.correction(d, parameters_[d].data()));
+    return correction;
+  }
+  /// Of the line coordinate, by the priors, and by what tracks leave of them. Devices without
+  /// crossings keep their error, but no line of theirs is looked at here.
+  [[nodiscard]] double expected_error_px() const { return error_px(identity()); }
+  [[nodiscard]] double remaining_error_px() const {
+    return error_px(solve_symmetric(identity() + told(), identity()));
+  }
+  [[nodiscard]] double scale_as_found() const {
+    return residual_scale(residuals_, tracks_, scales_, parameters_);
+  }
+  [[nodiscard]] const std::vector<CrossingTrack>& tracks() const { return tracks_; }
+  [[nodiscard]] double mm_per_px(std::size_t device) const { return scales_.mm_per_px[device]; }
+
+ private:
+  [[nodiscard]] Eigen::Index size() const {
+    return 6 * static_cast<Eigen::Index>(parameters_.size());
+  }
+  [[nodiscard]] Eigen::MatrixXd identity() const {
+    return Eigen::MatrixXd::Identity(size(), size());
+  }
+  [[nodiscard]] Eigen::MatrixXd told() const {
+    return information(residuals_, tracks_, scales_, scale_, options_, parameters_);
+  }
+  /// `covariance`: in units of the priors.
+  [[nodiscard]] double error_px(const Eigen::MatrixXd& covariance) const {
+    const Eigen::VectorXd unit = scales_.all();
+    return line_error_px(rig_, tracks_, unit.asDiagonal() * covariance * unit.asDiagonal(),
+                         unit.cwiseAbs2().cwiseInverse());
+  }
+
+  const Rig& rig_;
+  const RefineRigOptions& options_;
+  Scales scales_;
+  std::vector<Parameters> parameters_;
+  std::vector<CrossingTrack> tracks_;  ///< with a residual where devices stand at the start
+  std::vector<TrackResidual> residuals_;
+  double scale_ = 1;
+};
 
 }  // namespace
 
@@ -271,80 +353,29 @@ RefineRigResult refine_rig(const Rig& calibrated, std::span<const CrossingTrack>
   const std::size_t devices = device_count(calibrated);
   RefineRigResult result;
   result.correction.resize(devices);
-  UsedTracks used = usable(calibrated, tracks, options);
+  const UsedTracks used = usable(calibrated, tracks, options);
   RefineRigReport& report = result.report;
   for (std::size_t d = 0; d < devices; ++d)
     report.devices.push_back({device_at(calibrated, d).name, used.per_device[d]});
   report.reason = lack_of_equations(used, options);
   if (!report.reason.empty()) return result;
 
-  Scales scales(calibrated, options);
-  std::vector<Parameters> parameters(devices, Parameters{});
-  for (std::size_t d = 0; d < start.size(); ++d) {
-    if (used.is_refined[d] != 0) parameters[d] = scales.parameters(d, start[d]);
-  }
-  std::vector<TrackResidual> residuals;
-  std::vector<CrossingTrack> definite;
-  for (const CrossingTrack& track : used.tracks) {
-    const TrackResidual residual(calibrated, track, options.line_sigma_px);
-    if (residual.evaluate(poses_of(residual, scales, parameters), false)) definite.push_back(track);
-  }
-  for (const CrossingTrack& track : definite)
-    residuals.emplace_back(calibrated, track, options.line_sigma_px);
-
-  // The scale of the residuals shrinks as the devices find their places, and with it the bound
-  // beyond which a track loses its say.
-  double scale =
-      std::max(kLeastResidualScale, residual_scale(residuals, definite, scales, parameters));
-  const auto settle = [&](const Scales& prior) {
-    for (int stage = 0; stage < options.max_stages; ++stage) {
-      minimize(residuals, definite, prior, scale, options, parameters);
-      const double next =
-          std::max(kLeastResidualScale, residual_scale(residuals, definite, prior, parameters));
-      const bool is_settled = next > 0.95 * scale;
-      scale = next;
-      if (is_settled) break;
-    }
-  };
-  settle(scales);
-
-  // Devices without crossings keep their error, but no line of theirs is looked at here.
-  const auto size = 6 * static_cast<Eigen::Index>(devices);
-  const Eigen::MatrixXd identity = Eigen::MatrixXd::Identity(size, size);
-  const auto seen = [&](const Scales& prior) {
-    return information(residuals, definite, prior, scale, options, parameters);
-  };
-  const auto expected_error = [&](const Scales& prior, const Eigen::MatrixXd& covariance) {
-    const Eigen::VectorXd unit = prior.all();
-    return line_error_px(calibrated, definite, unit.asDiagonal() * covariance * unit.asDiagonal(),
-                         unit.cwiseAbs2().cwiseInverse());
-  };
-  const auto remaining_error = [&](const Scales& prior, const Eigen::MatrixXd& information) {
-    return expected_error(prior, solve_symmetric(identity + information, identity));
-  };
-  const Eigen::MatrixXd told = seen(scales);
-  report.expected_error_px = expected_error(scales, identity);
-  report.remaining_error_px = remaining_error(scales, told);
+  Adjustment adjustment(calibrated, used, start, options);
+  adjustment.settle();
+  report.expected_error_px = adjustment.expected_error_px();
+  report.remaining_error_px = adjustment.remaining_error_px();
   const bool is_determined =
       report.remaining_error_px <= options.max_remaining * report.expected_error_px;
-  if (const double likely = likely_scale(told, parameters, options); is_determined && likely < 1) {
-    const Scales likely_scales(calibrated, options, likely);
-    for (std::size_t d = 0; d < devices; ++d)
-      parameters[d] = likely_scales.parameters(d, scales.correction(d, parameters[d].data()));
-    scales = likely_scales;
-    settle(scales);
-    report.remaining_error_px = remaining_error(scales, seen(scales));
+  if (is_determined) {
+    adjustment.settle_with_likely_priors();
+    report.remaining_error_px = adjustment.remaining_error_px();
   }
-  report.residual_scale = residual_scale(residuals, definite, scales, parameters);
-
-  RigCorrection correction;
-  for (std::size_t d = 0; d < devices; ++d)
-    correction.push_back(scales.correction(d, parameters[d].data()));
-  const Rig refined = corrected_rig(calibrated, correction);
-  report.tracks = definite.size();
-  for (const CrossingTrack& track : definite) report.sightings += track.sightings.size();
-  report.before = crossing_disagreement(calibrated, definite);
-  report.after = crossing_disagreement(refined, definite);
+  report.residual_scale = adjustment.scale_as_found();
+  const RigCorrection correction = adjustment.correction();
+  report.tracks = adjustment.tracks().size();
+  for (const CrossingTrack& track : adjustment.tracks()) report.sightings += track.sightings.size();
+  report.before = crossing_disagreement(calibrated, adjustment.tracks());
+  report.after = crossing_disagreement(corrected_rig(calibrated, correction), adjustment.tracks());
   if (!is_determined) {
     report.reason = "the crossings do not determine the devices: of an expected line error of " +
                     formatted(report.expected_error_px) + " px, " +
@@ -357,7 +388,7 @@ RefineRigResult refine_rig(const Rig& calibrated, std::span<const CrossingTrack>
     report.devices[d].refined = used.is_refined[d] != 0;
     report.devices[d].rotation_px = correction[d].rotation_px.norm();
     report.devices[d].translation_mm = correction[d].translation_mm.norm();
-    report.devices[d].translation_px = report.devices[d].translation_mm / scales.mm_per_px[d];
+    report.devices[d].translation_px = report.devices[d].translation_mm / adjustment.mm_per_px(d);
   }
   return result;
 }
