@@ -1,7 +1,6 @@
 #include "pencilscan/calibration/suspects.h"
 
 #include <algorithm>
-#include <cmath>
 #include <map>
 #include <optional>
 #include <set>

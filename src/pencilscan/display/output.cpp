@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/formatted.h"

@@ -1,7 +1,6 @@
 #include "pencilscan/exchange/exchanged_device.h"
 
 #include <algorithm>
-#include <cstdio>
 
 #include "pencilscan/core/error.h"
 #include "pencilscan/core/formatted.h"

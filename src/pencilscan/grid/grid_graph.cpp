@@ -1,3 +1,4 @@
+#include "pencilscan/grid/grid_graph.h"
 
 #include <algorithm>
 

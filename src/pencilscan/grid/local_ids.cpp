@@ -203,8 +203,8 @@ void infer_local_ids(const Rig& rig, const std::vector<ColorFamily>& families,
       messages.emplace_back(unary[static_cast<std::size_t>(e.from)].size(), 1.0);
   }
   std::vector<Belief> beliefs;
-  constexpr int kIterations =
-      15;  // a message reaches so many crossings far: two periods of 8 lines
+  // A message reaches so many crossings far: two periods of 8 lines.
+  constexpr int kIterations = 15;
   for (int iteration = 0; iteration <= kIterations; ++iteration) {
     beliefs = unary;
     for (std::size_t e = 0; e < edges.size(); ++e) {

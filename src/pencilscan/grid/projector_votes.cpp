@@ -16,8 +16,8 @@ struct PatternCandidates {
 
 /// Mean code evidence of a curve around a point, per colour of its family.
 std::vector<float> evidence_around(const Curve& curve, float at, std::size_t colors) {
-  constexpr int kReach =
-      12;  // points: chosen; the evidence of 25 tells colours apart where one's does not
+  // Chosen: the evidence of 25 points tells colours apart where one's does not.
+  constexpr int kReach = 12;
   std::vector<float> sum(colors, 0.F);
   const int n = static_cast<int>(curve.points.size());
   const int center = static_cast<int>(at);

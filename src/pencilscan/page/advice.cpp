@@ -1,7 +1,6 @@
 #include "pencilscan/page/advice.h"
 
 #include <array>
-#include <cmath>
 #include <map>
 
 #include "pencilscan/core/formatted.h"

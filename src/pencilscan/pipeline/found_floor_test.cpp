@@ -59,6 +59,7 @@ TEST(FoundFloor, IsWhatABallStandsOn) {
   EXPECT_NEAR(found->floor.point.z(), kHeightOfFloor, 0.05);
   EXPECT_GT(found->floor.normal.z(), 0.9999);
   EXPECT_GT(found->sides, 0.9);
+  EXPECT_GT(found->share, 0.5);  // places outside of the volume count, most of those on it
 }
 
 TEST(FoundFloor, IsNoneThatTheRigStates) {

@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <cmath>
 
 #include "pencilscan/core/formatted.h"
 #include "pencilscan/planning/conventions.h"

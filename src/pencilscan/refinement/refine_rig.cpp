@@ -269,19 +269,19 @@ class Adjustment {
     }
     for (const CrossingTrack& track : tracks_)
       residuals_.emplace_back(rig, track, options.line_sigma_px);
-    scale_ = std::max(kLeastResidualScale, scale_as_found());
+    find_scale();
   }
 
   /// The scale of the residuals shrinks as the devices find their places, and with it the bound
   /// beyond which a track loses its say.
   void settle() {
     for (int stage = 0; stage < options_.max_stages; ++stage) {
+      const double before = scale_;
       minimize(residuals_, tracks_, scales_, scale_, options_, parameters_);
-      const double next = std::max(kLeastResidualScale, scale_as_found());
-      const bool is_settled = next > 0.95 * scale_;
-      scale_ = next;
-      if (is_settled) break;
+      find_scale();
+      if (scale_ > 0.95 * before) break;
     }
+    told_ = information(residuals_, tracks_, scales_, scale_, options_, parameters_);
   }
 
   /// Settles again with priors as large as the crossings say that calibration errors are.
@@ -293,7 +293,7 @@ class Adjustment {
     std::vector<Eigen::Index> moved;
     for (const std::size_t d : options_.moved)
       for (Eigen::Index k = 0; k < 6; ++k) moved.push_back(6 * static_cast<Eigen::Index>(d) + k);
-    const double likely = likely_prior_scale(told(), found, moved);
+    const double likely = likely_prior_scale(told_, found, moved);
     if (likely == 1) return;
     const RigCorrection so_far = correction();
     scales_ = Scales(rig_, options_, likely);
@@ -312,11 +312,9 @@ class Adjustment {
   /// crossings keep their error, but no line of theirs is looked at here.
   [[nodiscard]] double expected_error_px() const { return error_px(identity()); }
   [[nodiscard]] double remaining_error_px() const {
-    return error_px(solve_symmetric(identity() + told(), identity()));
+    return error_px(solve_symmetric(identity() + told_, identity()));
   }
-  [[nodiscard]] double scale_as_found() const {
-    return residual_scale(residuals_, tracks_, scales_, parameters_);
-  }
+  [[nodiscard]] double scale_as_found() const { return found_scale_; }
   [[nodiscard]] const std::vector<CrossingTrack>& tracks() const { return tracks_; }
   [[nodiscard]] double mm_per_px(std::size_t device) const { return scales_.mm_per_px[device]; }
 
@@ -327,8 +325,9 @@ class Adjustment {
   [[nodiscard]] Eigen::MatrixXd identity() const {
     return Eigen::MatrixXd::Identity(size(), size());
   }
-  [[nodiscard]] Eigen::MatrixXd told() const {
-    return information(residuals_, tracks_, scales_, scale_, options_, parameters_);
+  void find_scale() {
+    found_scale_ = residual_scale(residuals_, tracks_, scales_, parameters_);
+    scale_ = std::max(kLeastResidualScale, found_scale_);
   }
   /// `covariance`: in units of the priors.
   [[nodiscard]] double error_px(const Eigen::MatrixXd& covariance) const {
@@ -343,7 +342,9 @@ class Adjustment {
   std::vector<Parameters> parameters_;
   std::vector<CrossingTrack> tracks_;  ///< with a residual where devices stand at the start
   std::vector<TrackResidual> residuals_;
-  double scale_ = 1;
+  double found_scale_ = 1;  ///< of the residuals
+  double scale_ = 1;        ///< that they are weighed with
+  Eigen::MatrixXd told_;    ///< by the tracks where all has settled, in units of the priors
 };
 
 }  // namespace
