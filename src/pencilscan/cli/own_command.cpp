@@ -1,6 +1,11 @@
 #include "pencilscan/cli/own_command.h"
 
+#include <elf.h>
+#include <link.h>
+
+#include <cstring>
 #include <fstream>
+#include <string_view>
 
 #include "pencilscan/core/child_process.h"
 #include "pencilscan/core/error.h"
@@ -22,6 +27,34 @@ std::string complaint_in(const fs::path& log) {
   for (std::string line; std::getline(file, line);)
     if (line.starts_with(own)) last = line.substr(own.size());
   return last;
+}
+
+/// What the linker made of all that it put into this program (--build-id, a note of ELF files);
+/// empty where it wrote none.
+std::string build_id() {
+  std::string id;
+  const auto visit = [](dl_phdr_info* info, std::size_t, void* result) {
+    constexpr std::string_view kName("GNU\0", 4);
+    const auto padded = [](std::size_t bytes) { return (bytes + 3) / 4 * 4; };
+    for (int i = 0; i < info->dlpi_phnum; ++i) {
+      const ElfW(Phdr)& part = info->dlpi_phdr[i];
+      if (part.p_type != PT_NOTE) continue;
+      const auto* note = reinterpret_cast<const char*>(info->dlpi_addr + part.p_vaddr);
+      const char* const end = note + part.p_memsz;
+      while (note + sizeof(ElfW(Nhdr)) <= end) {
+        ElfW(Nhdr) head;
+        std::memcpy(&head, note, sizeof head);
+        const char* const name = note + sizeof head;
+        const char* const text = name + padded(head.n_namesz);
+        if (head.n_type == NT_GNU_BUILD_ID && std::string_view(name, head.n_namesz) == kName)
+          static_cast<std::string*>(result)->assign(text, head.n_descsz);
+        note = text + padded(head.n_descsz);
+      }
+    }
+    return 1;  // the first object is the program
+  };
+  dl_iterate_phdr(visit, &id);
+  return id;
 }
 
 }  // namespace
@@ -48,6 +81,9 @@ nlohmann::ordered_json run_own_command(const OwnCommand& command,
   return nlohmann::ordered_json(read_json(command.json));
 }
 
-std::string own_hash() { return hex(hash_bytes(read_file("/proc/self/exe"))); }
+std::string own_hash() {
+  const std::string id = build_id();
+  return hex(hash_bytes(id.empty() ? read_file("/proc/self/exe") : id));
+}
 
 }  // namespace pencilscan::cli

@@ -23,7 +23,8 @@ struct OwnCommand {
 [[nodiscard]] nlohmann::ordered_json run_own_command(const OwnCommand& command,
                                                      const std::function<bool()>& go_on);
 
-/// Hash of this program's file: it tells one build from another.
+/// Hash of what the linker says that it made, or of this program's file: it tells one build from
+/// another.
 [[nodiscard]] std::string own_hash();
 
 }  // namespace pencilscan::cli

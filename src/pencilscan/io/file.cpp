@@ -185,6 +185,8 @@ std::string read_file(const std::filesystem::path& path) {
   if (!stream) throw InputError(path.string(), "", "", "cannot be opened: " + reason(errno));
   // In blocks: `<<` of a stream's buffer takes lack of memory for the end of the file.
   std::string bytes;
+  const std::uintmax_t size = std::filesystem::file_size(path, error);
+  if (!error) bytes.reserve(size);
   std::vector<char> block(std::size_t{1} << 16);
   while (stream.read(block.data(), static_cast<std::streamsize>(block.size())), stream.gcount() > 0)
     bytes.append(block.data(), static_cast<std::size_t>(stream.gcount()));
