@@ -4,6 +4,7 @@
 
 #include "pencilscan/calibration/calibrate_once.h"
 #include "pencilscan/calibration/mirrored.h"
+#include "pencilscan/calibration/scene_moves.h"
 #include "pencilscan/calibration/suspects.h"
 
 namespace pencilscan {
@@ -68,6 +69,9 @@ CalibrationResult calibrate(const CalibrationInput& input, const CalibrateOption
     });
     if (shows_all) best = std::move(without);
   }
+  // What explains a rig that contradicts itself explains this too.
+  if (find_contradictions(input, best).findings.empty())
+    best.scene_moves = moved_within_captures(input, best, options);
   return best;
 }
 

@@ -54,6 +54,15 @@ struct DeviceResiduals {
   double p95_px = 0;
 };
 
+/// The scene moved while a capture was taken: most between the pictures of two projectors.
+struct SceneMove {
+  std::size_t capture = 0;
+  std::size_t a = 0;  ///< device: a projector
+  std::size_t b = 0;
+  double shift = 0;       ///< of surface along the cameras' rays, median, rig units
+  double deviations = 0;  ///< the same over what single views let expect, median
+};
+
 /// Devices whose pictures are mirrored, and the shares of all correspondences that fit one rig.
 struct Mirroring {
   std::vector<std::size_t> devices;  ///< one; or all cameras, which says the same of all projectors
@@ -84,7 +93,8 @@ struct CalibrationResult {
   std::size_t views_dropped = 0;
   std::vector<DeviceResiduals> residuals;  ///< per device
   bool solved = false;
-  std::optional<Mirroring> mirrored;  ///< then nothing else of the result counts
+  std::optional<Mirroring> mirrored;   ///< then nothing else of the result counts
+  std::vector<SceneMove> scene_moves;  ///< at most one per capture
 };
 
 /// From correspondences, and corners of boards if any, to a rig (calibrate_once.h). Where pairs

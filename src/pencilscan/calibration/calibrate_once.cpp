@@ -29,8 +29,8 @@ constexpr unsigned kAll = kFocal | kCenter | bit(kK1) | bit(kK2) | bit(kP1) | bi
 class Calibration {
  public:
   Calibration(const CalibrationInput& input, const CalibrateOptions& options,
-              const Progress& progress)
-      : input_(input), options_(options), progress_(progress), rig_(input.rig) {
+              const Progress& progress, const CalibrationResult* start)
+      : input_(input), options_(options), progress_(progress), start_(start), rig_(input.rig) {
     known_ = focal_lengths_from_boards(input, rig_);
     result_.tolerance = options.tolerance;
     const bool is_exact = options.tolerance.focal == 0 && options.tolerance.center_px == 0;
@@ -47,7 +47,10 @@ class Calibration {
     drop_epipolar_outliers(input_.rig, result_.pairs, options_.least_inlier_share,
                            result_.problem.tracks);
     candidates_ = result_.problem.tracks;
-    if (!solve_with_given()) return finish(false);
+    if (start_ != nullptr)
+      go_on_from_start();
+    else if (!solve_with_given())
+      return finish(false);
     take_back_views();
     last_stage();
     return finish(true);
@@ -77,6 +80,15 @@ class Calibration {
   [[nodiscard]] bool is_any_given() const {
     return std::any_of(input_.known.begin(), input_.known.end(),
                        [](const GivenCalibration& k) { return k.K; });
+  }
+
+  void go_on_from_start() {
+    BundleProblem& problem = result_.problem;
+    problem.devices = start_->problem.devices;
+    problem.board_views = start_->problem.board_views;
+    problem.board_poses = start_->problem.board_poses;
+    result_.given = start_->given;
+    refine();
   }
 
   /// A structure and its adjustment; given values are off by the tolerance, or rough.
@@ -316,6 +328,7 @@ class Calibration {
   const CalibrationInput& input_;
   const CalibrateOptions& options_;
   const Progress& progress_;
+  const CalibrationResult* start_;
   Rig rig_;                            ///< with focal lengths that boards give
   std::vector<char> known_;            ///< per device: K is given, or from boards
   std::vector<Track> all_tracks_;      ///< but those held out
@@ -327,8 +340,8 @@ class Calibration {
 }  // namespace
 
 CalibrationResult calibrate_once(const CalibrationInput& input, const CalibrateOptions& options,
-                                 const Progress& progress) {
-  return Calibration(input, options, progress).run();
+                                 const Progress& progress, const CalibrationResult* start) {
+  return Calibration(input, options, progress, start).run();
 }
 
 }  // namespace pencilscan

@@ -201,6 +201,14 @@ nlohmann::ordered_json calibration_json(const CalibrationReport& report) {
                     {"point_sigma_p95", report.uncertainty.volume_p95}};
   json["scale"] = scale_json(report);
   json["loop"] = loop_json(report);
+  json["scene_moves"] = Json::array();
+  for (const SceneMove& move : result.scene_moves)
+    json["scene_moves"].push_back(
+        {{"capture", move.capture + 1},
+         {"between",
+          {device_at(report.input.rig, move.a).name, device_at(report.input.rig, move.b).name}},
+         {"shift", move.shift},
+         {"deviations", move.deviations}});
   json["color"] = color_json(report.input.rig, report.color);
   json["devices"] = Json::array();
   for (std::size_t d = 0; d < result.placed.size(); ++d)

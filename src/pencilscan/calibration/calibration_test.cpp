@@ -266,6 +266,39 @@ TEST(Verdict, NothingMovedWhereNothingDid) {
               Not(HasSubstr("has moved")));
 }
 
+/// The surface as the pictures of the last projectors show it, from `first` on: so far along the
+/// rays of the cameras.
+std::vector<Track> tracks_of_a_moved_scene(const Rig& truth, std::size_t first, double shift) {
+  BundleProblem problem;
+  for (std::size_t d = 0; d < device_count(truth); ++d) {
+    problem.devices.push_back(bundle_device(device_at(truth, d)));
+    problem.devices.back().present = true;
+  }
+  std::vector<Track> tracks = tracks_of(truth, {.count = 900});
+  for (Track& track : tracks) {
+    if (track.views[0].device >= truth.cameras.size()) continue;
+    const Vec3 point = *triangulate(problem, track, kLeastAngle);
+    const Vec3 eye = device_at(truth, track.views[0].device).center();
+    const Vec3 moved = point + shift * (point - eye).normalized();
+    for (TrackView& view : track.views)
+      if (view.device >= truth.cameras.size() + first)
+        view.pixel += *device_at(truth, view.device).project(moved) -
+                      *device_at(truth, view.device).project(point);
+  }
+  return tracks;
+}
+
+/// Each pair of a camera and a projector makes sense, and the adjustment drops what contradicts.
+TEST(Verdict, AnObjectThatMovedWhileACaptureWasTakenIsNamed) {
+  const Rig truth = ring(3, 3);
+  const std::string says =
+      "the object moved while --captures number 1 was taken: between the pictures of proj";
+  EXPECT_THAT(findings_of(truth, tracks_of_a_moved_scene(truth, 2, 1)),
+              AllOf(HasSubstr(says), HasSubstr("and those of proj2")));
+  EXPECT_THAT(findings_of(truth, tracks_of_a_moved_scene(truth, 2, 0)),
+              Not(HasSubstr("moved while")));
+}
+
 /// These draw cam2 to a wrong place, from where right pairs contradict.
 TEST(Verdict, SwappedFoldersAreNamedThoughTheyMisplaceADevice) {
   const Rig truth = ring(4, 4);

@@ -144,6 +144,15 @@ class Judge {
     }
   }
 
+  void add_scene_move(const SceneMove& move) {
+    add(Grade::kDoubtful,
+        "the object moved while --captures number " + std::to_string(move.capture + 1) +
+            " was taken: between the pictures of " + name(move.a) + " and those of " +
+            name(move.b) + " its surface shifts by " + formatted(move.shift) + " " +
+            unit_name(result_.rig) + " (median, along the cameras' rays)",
+        "fix the object, and take that capture again");
+  }
+
   void judge_pairs() {
     Contradictions contradictions = find_contradictions(input_, result_);
     std::vector<LowPair> low;
@@ -172,6 +181,7 @@ class Judge {
     if (contradictions.mover && senseless_.contains(*contradictions.mover))
       contradictions.findings.pop_back();
     add_all(contradictions.findings);
+    for (const SceneMove& move : result_.scene_moves) add_scene_move(move);
     for (const LowPair& l : low) {
       if (senseless_.contains(l.pair->camera) || senseless_.contains(l.pair->projector)) continue;
       add(Grade::kDoubtful,
