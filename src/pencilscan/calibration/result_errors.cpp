@@ -36,7 +36,7 @@ void measure_held_out(const CalibrationInput& input, const CalibrateOptions& opt
       ++count;
     }
   }
-  result.held_out_rms_px = std::sqrt(sum / static_cast<double>(std::max<std::size_t>(count, 1)));
+  result.held_out_rms_px = std::sqrt(sum / static_cast<double>(count));  // not a number without any
 }
 
 }  // namespace

@@ -34,10 +34,13 @@ RigidTransform own_frame(const BundleProblem& problem, std::size_t cameras) {
   return {rotation, -(rotation * origin)};
 }
 
-/// Centres of the devices that have a pose and were given one: as found and as given.
+/// Centres of the devices that have a pose and were given one: as found and as given; and the
+/// directions of their y and z axes, two columns per centre.
 struct GivenCenters {
   Eigen::Matrix3Xd found;
   Eigen::Matrix3Xd given;
+  Eigen::Matrix3Xd found_axes;
+  Eigen::Matrix3Xd given_axes;
 };
 
 GivenCenters given_centers(const CalibrationInput& input, const BundleProblem& problem) {
@@ -49,8 +52,21 @@ GivenCenters given_centers(const CalibrationInput& input, const BundleProblem& p
     centers.given.conservativeResize(Eigen::NoChange, at + 1);
     centers.found.col(at) = center_of(problem.devices[d]);
     centers.given.col(at) = device_at(input.rig, d).center();
+    centers.found_axes.conservativeResize(Eigen::NoChange, 2 * at + 2);
+    centers.given_axes.conservativeResize(Eigen::NoChange, 2 * at + 2);
+    centers.found_axes.rightCols<2>() = rotation_of(problem.devices[d]).bottomRows<2>().transpose();
+    centers.given_axes.rightCols<2>() =
+        device_at(input.rig, d).device_from_world.rotation.bottomRows<2>().transpose();
   }
   return centers;
+}
+
+/// Root mean squares about the middle along the principal axes, the largest first.
+Vec3 spread_of(const Eigen::Matrix3Xd& points) {
+  const Eigen::Matrix3Xd offsets = points.colwise() - points.rowwise().mean();
+  const SymmetricEigen axes = symmetric_eigen(
+      Eigen::MatrixXd(offsets * offsets.transpose() / static_cast<double>(points.cols())));
+  return Vec3(axes.values.reverse()).cwiseMax(0).cwiseSqrt();
 }
 
 struct Similarity {
@@ -58,8 +74,26 @@ struct Similarity {
   RigidTransform motion;
 };
 
+/// Centres with the points that lie on the axes of each, as far away as centres spread.
+Eigen::Matrix3Xd with_axes(const Eigen::Matrix3Xd& centers, const Eigen::Matrix3Xd& axes) {
+  const double spread = spread_of(centers)(0);
+  Eigen::Matrix3Xd all(3, centers.cols() + axes.cols());
+  all.leftCols(centers.cols()) = centers;
+  for (Eigen::Index i = 0; i < axes.cols(); ++i)
+    all.col(centers.cols() + i) = centers.col(i / 2) + spread * axes.col(i);
+  return all;
+}
+
+/// By the centres alone, since rough poses turn devices more than they misplace them; of devices in
+/// a line by their axes, too: centres leave them free to turn about it.
 Similarity similarity_of(const GivenCenters& centers) {
-  const Eigen::Matrix4d S = fit_similarity(centers.found, centers.given, true);
+  constexpr double kInALine = 0.05;  // across it over along it
+  const Vec3 spread = spread_of(centers.given);
+  const bool in_a_line = spread(1) < kInALine * spread(0);
+  const Eigen::Matrix4d S = in_a_line
+                                ? fit_similarity(with_axes(centers.found, centers.found_axes),
+                                                 with_axes(centers.given, centers.given_axes), true)
+                                : fit_similarity(centers.found, centers.given, true);
   const double scale = S.block<3, 3>(0, 0).col(0).norm();
   return {scale, {S.block<3, 3>(0, 0) / scale, S.block<3, 1>(0, 3)}};
 }

@@ -60,6 +60,22 @@ TEST_F(FrameOfAKnownRing, GivenPosesGiveFrameAndScale) {
   EXPECT_LT(miss(), kRoundingMm);
 }
 
+/// Centres in a line leave the rig free to turn about it: their axes tell.
+TEST_F(FrameOfAKnownRing, PosesOnABarGiveTheFrameToo) {
+  for (std::size_t d = 0; d < 3; ++d) {
+    RigidTransform& pose = device_at(truth_, d).device_from_world;
+    pose.translation = -(pose.rotation * Vec3(900, 250.0 * static_cast<double>(d), 100));
+  }
+  for (std::size_t d = 0; d < device_count(truth_); ++d) {
+    problem_.devices[d] = bundle_device(device_at(truth_, d));
+    problem_.devices[d].present = true;
+  }
+  move_solution(0.01, look_at({5, -3, 2}, {1, 1, 1}), problem_);
+  give_poses(3);
+  EXPECT_TRUE(fix_frame(input_, problem_).is_given);
+  EXPECT_LT(miss(), kRoundingMm);
+}
+
 TEST_F(FrameOfAKnownRing, ADistanceThatAgreesLeavesGivenMillimetres) {
   give_poses(3);
   measure(1.02);
