@@ -337,9 +337,8 @@ Vec3 node_normal(const Rig& rig, const DepthMap& map, std::size_t node) {
   const Camera& camera = rig.cameras[static_cast<std::size_t>(map.camera)];
   const DepthNode& n = map.nodes[node];
   const Vec2 m = camera.normalized_from_pixel(map.pixel(node));
-  // w = omega . (x, y, 1); the lens changes slopes by no more than it bends lines.
-  const Vec2 slope(static_cast<double>(n.wx) * camera.K(0, 0),
-                   static_cast<double>(n.wy) * camera.K(1, 1));
+  // w = omega . (x, y, 1).
+  const Vec2 slope = camera.pixel_slope(m).transpose() * Eigen::Vector2f(n.wx, n.wy).cast<double>();
   const Vec3 omega(slope[0], slope[1], static_cast<double>(n.w) - slope.dot(m));
   return -(camera.device_from_world.rotation.transpose() * omega.normalized());
 }

@@ -15,7 +15,7 @@ namespace {
 double incidence(const CameraLight& light, const Vec2& pixel, const Quadric& q, int half) {
   const Camera& camera = *light.camera;
   const Vec2 m = camera.normalized_from_pixel(pixel);
-  const Vec2 slope(q[1] / half * camera.K(0, 0), q[2] / half * camera.K(1, 1));
+  const Vec2 slope = camera.pixel_slope(m).transpose() * Vec2(q[1] / half, q[2] / half);
   const Vec3 normal = -Vec3(slope[0], slope[1], q[0] - slope.dot(m)).normalized();
   return -normal.dot(m.homogeneous().normalized());
 }

@@ -9,7 +9,7 @@ TangentView::TangentView(const Camera& camera, const Vec3& point, const Vec3& no
   const Vec3 local = camera.device_from_world * point;
   w = 1 / local.z();
   normalized = local.head<2>() * w;
-  jacobian = camera.K.topLeftCorner<2, 2>().inverse();
+  jacobian = camera.pixel_slope(normalized).inverse();
   // w = omega . (x, y, 1) on the plane, omega = n / (n . X).
   const Vec3 n = camera.device_from_world.rotation * normal;
   const Vec3 omega = n / n.dot(local);

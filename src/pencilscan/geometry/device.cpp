@@ -9,6 +9,8 @@ Vec3 Device::center() const { return device_from_world.inverse().translation; }
 std::optional<Vec2> Device::project(const Vec3& x_in_world) const {
   const Vec3 x = device_from_world * x_in_world;
   if (!(x.z() > 0)) return std::nullopt;
+  if (has_distortion() && !(distortion_slope(distortion, x.head<2>() / x.z()).determinant() > 0))
+    return std::nullopt;
   return pixel_from_device(x);
 }
 

@@ -23,7 +23,8 @@ struct Device {
   [[nodiscard]] double focal_px() const { return 0.5 * (K(0, 0) + K(1, 1)); }
   [[nodiscard]] Vec3 center() const;  ///< in world, mm
   [[nodiscard]] Vec3 forward() const { return device_from_world.rotation.row(2).transpose(); }
-  /// Pixel of a world point; nothing when the point is not in front of the device.
+  /// Pixel of a world point; nothing when the point is not in front of the device, or so far out
+  /// that the lens model turns back: its formula would show it among what lies further in.
   [[nodiscard]] std::optional<Vec2> project(const Vec3& x_in_world) const;
   /// Pixel of a point given in the device's own frame, z > 0.
   [[nodiscard]] Vec2 pixel_from_device(const Vec3& x_in_device) const;

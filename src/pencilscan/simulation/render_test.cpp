@@ -123,7 +123,10 @@ TEST(CameraTruth, NoLightBeyondWhereALensTurnsBack) {
   const SimulatedObject wall(make_box({10, 4000, 4000}, {-5, 0, 0}), flat_shading());
   EXPECT_GT(cv::countNonZero(camera_truth(rig, 0, wall).projectors[0].lit), 1000);
   rig.cameras[0].device_from_world = look_at({1000, 700, 0}, {0, 700, 0});
-  ASSERT_TRUE(rig.projectors[0].contains(*rig.projectors[0].project({0, 700, 0})));
+  const Projector& projector = rig.projectors[0];
+  const Vec3 far_out = projector.device_from_world * Vec3(0, 700, 0);
+  ASSERT_TRUE(projector.contains(projector.pixel_from_device(far_out))) << "by the formula";
+  EXPECT_FALSE(projector.project({0, 700, 0}));
   EXPECT_EQ(cv::countNonZero(camera_truth(rig, 0, wall).projectors[0].lit), 0);
   const std::vector<PanelLight> lights{uniform_light()};
   EXPECT_EQ(cv::norm(render_camera(rig, 0, wall, lights), cv::NORM_INF), 0);

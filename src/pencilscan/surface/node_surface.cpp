@@ -51,7 +51,8 @@ struct Place {
   float ray[2];     ///< of depth 1
   float ray2;       ///< its length squared
   float depth;
-  float focal[2];
+  float slope[2][2];    ///< pixels by normalised coordinates
+  float inverse[2][2];  ///< of slope
   float farthest;
   float inverse_width2;  ///< of the bell, nodes
   float reach2;          ///< squared, nodes
@@ -86,24 +87,30 @@ PENCILSCAN_CLONES void predict_row(const NodeRow& row, const Place& at, float ri
   const float dy = down * at.stride;
   IntLanes there = (w > 0) & (apart2 <= at.reach2);
   // At the node: omega . (x, y, 1) = w over normalised pixels, and -omega is normal to the surface.
-  const Lanes x0 = at.ray[0] - dx / at.focal[0];
-  const float y0 = at.ray[1] - dy / at.focal[1];
-  const Lanes gx = wx * at.focal[0];
-  const Lanes gy = wy * at.focal[1];
+  const Lanes away_x = at.inverse[0][0] * dx + at.inverse[0][1] * dy;
+  const Lanes away_y = at.inverse[1][0] * dx + at.inverse[1][1] * dy;
+  const Lanes x0 = at.ray[0] - away_x;
+  const Lanes y0 = at.ray[1] - away_y;
+  const Lanes gx = at.slope[0][0] * wx + at.slope[1][0] * wy;
+  const Lanes gy = at.slope[0][1] * wx + at.slope[1][1] * wy;
   const Lanes gz = w - x0 * gx - y0 * gy;
   const Lanes inverse2 = 1 / (gx * gx + gy * gy + gz * gz);
   // The way from the node to the place, and its part along the tangent plane.
   const Lanes depth = 1 / w;
   const Lanes beyond = at.depth - depth;
-  const Lanes from_x = at.ray[0] * beyond + depth * dx / at.focal[0];
-  const Lanes from_y = at.ray[1] * beyond + depth * dy / at.focal[1];
+  const Lanes from_x = at.ray[0] * beyond + depth * away_x;
+  const Lanes from_y = at.ray[1] * beyond + depth * away_y;
   const Lanes off = gx * from_x + gy * from_y + gz * beyond;
   const Lanes lift = off * inverse2;
   const Lanes along_z = beyond - lift * gz;
   const Lanes qx = from_x - lift * gx - x0 * along_z;
   const Lanes qy = from_y - lift * gy - y0 * along_z;
-  const Lanes hx = w * at.focal[0] * (wxx * at.focal[0] * qx + wxy * at.focal[1] * qy);
-  const Lanes hy = w * at.focal[1] * (wxy * at.focal[0] * qx + wyy * at.focal[1] * qy);
+  const Lanes px = at.slope[0][0] * qx + at.slope[0][1] * qy;
+  const Lanes py = at.slope[1][0] * qx + at.slope[1][1] * qy;
+  const Lanes bend_x = wxx * px + wxy * py;
+  const Lanes bend_y = wxy * px + wyy * py;
+  const Lanes hx = w * (at.slope[0][0] * bend_x + at.slope[1][0] * bend_y);
+  const Lanes hy = w * (at.slope[0][1] * bend_x + at.slope[1][1] * bend_y);
   const Lanes hz = -(x0 * hx + y0 * hy);
   const Lanes turn = (gx * hx + gy * hy + gz * hz) * inverse2;
   const Lanes x = gx + hx - turn * gx;
@@ -257,8 +264,14 @@ class NodeView {
     for (int k = 0; k < 2; ++k) at.ray[k] = static_cast<float>(ray[k]);
     at.ray2 = static_cast<float>(ray.squaredNorm());
     at.depth = static_cast<float>(local.z());
-    at.focal[0] = static_cast<float>(camera_->K(0, 0));
-    at.focal[1] = static_cast<float>(camera_->K(1, 1));
+    const Eigen::Matrix2d slope = camera_->pixel_slope(ray.head<2>());
+    const Eigen::Matrix2d inverse = slope.inverse();
+    for (int row = 0; row < 2; ++row) {
+      for (int column = 0; column < 2; ++column) {
+        at.slope[row][column] = static_cast<float>(slope(row, column));
+        at.inverse[row][column] = static_cast<float>(inverse(row, column));
+      }
+    }
     at.farthest = static_cast<float>(farthest_);
     at.inverse_width2 = static_cast<float>(inverse_width2_);
     at.reach2 = static_cast<float>(reach_ * reach_);
