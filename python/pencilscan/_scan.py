@@ -255,6 +255,7 @@ def evaluate(
         As in `reconstruct`.
     """
     check_threads(threads)
+    check_name("align", align)
     core, points, measured = None, b"", None
     if isinstance(result, Result):
         core = result._core

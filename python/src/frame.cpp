@@ -221,12 +221,16 @@ LabelsPtr labels_of_arrays(const Column<int>& projector, const Column<int>& patt
   check(line, "line");
   check(confidence, "confidence");
   check(plane, "plane");
-  const auto narrow = [](int value) {  // what does not fit is refused with the rig at hand
-    return static_cast<std::int16_t>(std::clamp(value, -1, 32767));
+  // What is too large is refused with the rig at hand.
+  const auto narrow = [](int value, const char* field) {
+    if (value < -1)
+      throw InputError("labels", field, std::to_string(value), "must be an index, or -1: none");
+    return static_cast<std::int16_t>(std::min(value, 32767));
   };
   for (py::ssize_t i = 0; i < count; ++i)
-    labels->values.push_back({narrow(projector.at(i)), narrow(pattern.at(i)), line.at(i),
-                              confidence.at(i), plane.at(i)});
+    labels->values.push_back({narrow(projector.at(i), "projector"),
+                              narrow(pattern.at(i), "pattern"), line.at(i), confidence.at(i),
+                              plane.at(i)});
   return labels;
 }
 

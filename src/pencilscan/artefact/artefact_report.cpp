@@ -106,7 +106,7 @@ std::string histogram_svg(const Histogram& histogram) {
            number(kHeight - h, 1) + "' width='" + number(step - 1, 1) + "' height='" +
            number(h, 1) + "' fill='#5b83a5'/>";
   }
-  const std::string end = number(histogram.half_range, 2);
+  const std::string end = formatted(histogram.half_range);
   svg += "<text x='2' y='176' font-size='11'>-" + end +
          " mm</text><text x='160' y='176' font-size='11' text-anchor='middle'>0</text>"
          "<text x='318' y='176' font-size='11' text-anchor='end'>" +

@@ -307,8 +307,7 @@ Uncertainty uncertainty(const BundleProblem& problem, const BundleOptions& adjus
     if (problem.devices[d].present && result.size_and_centers.size() > 0)
       result.devices[d].position = center_deviation(problem.devices[d], d, result.size_and_centers);
     for (std::size_t i = 0; i < kIntrinsics; ++i) {
-      double prior = problem.devices[d].prior_sigma[i];
-      if (i == kFy) prior *= problem.devices[d].inner[kFx];
+      const double prior = problem.devices[d].prior_sigma[i];
       // fy moves with fx: its prior says nothing about it alone.
       result.devices[d].is_prior[i] =
           i != kFy && result.devices[d].inner[i] > 0 && result.devices[d].inner[i] > 0.6 * prior;

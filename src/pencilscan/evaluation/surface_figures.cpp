@@ -209,9 +209,9 @@ SurfaceFigures surface_figures(const TruthScene& truth, const TriangleMesh& meas
     for (const double d : distances) precise.add(d < threshold);
     const double recall = found.value();
     const double precision = precise.count > 0 ? precise.value() : 0;
-    const double sum = recall + precision;
+    const double sum = recall + precision;  // not a number where nothing is measurable
     figures.completeness.push_back({threshold, recall, found_one.value(), found_two.value(),
-                                    precision, sum > 0 ? 2 * recall * precision / sum : 0});
+                                    precision, sum == 0 ? 0 : 2 * recall * precision / sum});
   }
   return figures;
 }

@@ -111,10 +111,12 @@ class OpencvReader {
   }
 
   /// k1 k2 p1 p2 [k3 [k4 k5 k6 [s1 s2 s3 s4]]].
+  /// An empty list is a lens without distortion.
   void read_distortion(const cv::FileNode& node, ExchangedDevice& d) const {
+    if (node.isSeq() && node.empty()) return;
     const Eigen::MatrixXd D = matrix(node);
     const Eigen::Index count = D.size();
-    constexpr std::array<Eigen::Index, 6> kCounts{0, 4, 5, 8, 12, 14};
+    constexpr std::array<Eigen::Index, 5> kCounts{4, 5, 8, 12, 14};
     if ((D.rows() != 1 && D.cols() != 1) ||
         std::find(kCounts.begin(), kCounts.end(), count) == kCounts.end())
       fail(node.name(), std::to_string(count) + " numbers",
@@ -150,9 +152,11 @@ class OpencvReader {
       return result;
     }
     if (R.rows() != 3 || R.cols() != 3 ||
-        (R * R.transpose() - Eigen::MatrixXd::Identity(3, 3)).norm() > kRotationTolerance ||
+        (R * R.transpose() - Eigen::MatrixXd::Identity(3, 3)).cwiseAbs().maxCoeff() >
+            kRotationTolerance ||
         Mat3(R).determinant() < 0)
-      fail(rotation.name(), "", "must be a rotation: 3x3 with |R R' - I| <= 1e-4, or 3 numbers");
+      fail(rotation.name(), "",
+           "must be a rotation: 3x3 with entries of |R R' - I| <= 1e-4, or 3 numbers");
     result.rotation = R;
     return result;
   }

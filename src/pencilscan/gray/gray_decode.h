@@ -14,7 +14,7 @@ namespace pencilscan {
 enum class PixelState : std::uint8_t {
   kValid,
   kUnlit,         ///< white - black does not stand out of the noise
-  kSaturated,     ///< a pattern and its inverse both reach the end of the range
+  kSaturated,     ///< black reaches the end of the range: no pattern is darker
   kAmbiguous,     ///< several coarse bits lie within the noise: indirect light, or motion
   kBlurred,       ///< the fine bits lie within the noise: defocus, or a panel too fine here
   kOffPanel,      ///< the code is no column or row of the panel

@@ -96,14 +96,18 @@ std::optional<std::string> pose_convention_warning(const Rig& rig) {
        "R and t are camera-to-world and devices look along -z with y up (OpenGL, Blender)",
        "write R' and -R't, then change the sign of their last two rows"},
   });
+  double share = 0;
+  const Reading* best = nullptr;
   for (const Reading& reading : kReadings) {
-    const double share = share_that_looks(rig, reading.meant);
-    if (share < kNearlyAll) continue;
-    return "only " + formatted(100 * stated, "%.0f") + " % of the devices look at one place; if " +
-           reading.words + ", " + formatted(100 * share, "%.0f") +
-           " % do. X_device = R X_world + t is what the rig states: " + reading.remedy;
+    const double looking = share_that_looks(rig, reading.meant);
+    if (looking < kNearlyAll || looking <= share) continue;
+    share = looking;
+    best = &reading;
   }
-  return std::nullopt;
+  if (best == nullptr) return std::nullopt;
+  return "only " + formatted(100 * stated, "%.0f") + " % of the devices look at one place; if " +
+         best->words + ", " + formatted(100 * share, "%.0f") +
+         " % do. X_device = R X_world + t is what the rig states: " + best->remedy;
 }
 
 std::optional<std::string> intrinsics_convention_warning(const Rig& rig) {

@@ -16,7 +16,7 @@
 namespace pencilscan {
 namespace {
 
-/// |R R' - I| (Frobenius) above this is no rotation.
+/// Of an entry of |R R' - I|: above this it is no rotation.
 constexpr double kRotationTolerance = 1e-4;
 constexpr int kLargestImage = 1 << 16;     ///< px a side
 constexpr int kLongestPeriod = 1 << 20;    ///< symbols of a de Bruijn sequence
@@ -44,8 +44,9 @@ Mat3 parse_camera_matrix(const JsonField& field) {
 
 Mat3 parse_rotation(const JsonField& field) {
   const Mat3 R = field.matrix3();
-  const double error = (R * R.transpose() - Mat3::Identity()).norm();
-  if (error > kRotationTolerance) field.fail("must be a rotation: |R R' - I| must be <= 1e-4");
+  const double error = (R * R.transpose() - Mat3::Identity()).cwiseAbs().maxCoeff();
+  if (error > kRotationTolerance)
+    field.fail("must be a rotation: the entries of |R R' - I| must be <= 1e-4");
   if (R.determinant() < 0) field.fail("must be a rotation, is a reflection: det R must be 1");
   return R;
 }
