@@ -82,7 +82,7 @@ SequenceEvent event_of(std::span<const FrameRow> rows, const SequenceDevices& de
   SequenceEvent event = event_from(rows, found, bare_name(devices, found.figure->device));
   event.text =
       name_of(devices, found.figure->device) + ": " + quantity(kind) + from_to(kind, change);
-  const std::string cause = usual_cause(kind, up, false, lines_too);
+  const std::string cause = usual_cause(kind, {.up = up, .lines_too = lines_too});
   if (!cause.empty()) event.text += " (" + cause + ")";
   if (found.named) event.text += "; " + quantity("labelled") + from_to("labelled", *found.named);
   return event;
@@ -97,11 +97,13 @@ SequenceEvent event_of_all(std::span<const FrameRow> rows, const SequenceDevices
   const bool lines_too = kind == "level" && up && lines_got_light(rows, devices, first);
   middle.change.at = first;
   middle.change.end = end_of_most(together, rows.size());
+  const bool is_spread =
+      kind == "light" && light_is_spread(rows, first, middle.change.after / middle.change.before);
   SequenceEvent event = event_from(rows, middle, "");
-  event.text = std::to_string(together.size()) +
-               (kind == "light" ? " projectors: " : " cameras: ") + quantity(kind) +
-               from_to(kind, middle.change) + " (" + usual_cause(kind, up, true, lines_too) + ")" +
-               named_with(together, devices);
+  event.text =
+      std::to_string(together.size()) + (kind == "light" ? " projectors: " : " cameras: ") +
+      quantity(kind) + from_to(kind, middle.change) + " (" +
+      usual_cause(kind, {up, true, lines_too, is_spread}) + ")" + named_with(together, devices);
   return event;
 }
 

@@ -28,11 +28,14 @@ std::string quantity(const std::string& kind) {
   return "its crossing lines miss each other by (px) ";
 }
 
-std::string usual_cause(const std::string& kind, bool up, bool all, bool lines_too) {
+std::string usual_cause(const std::string& kind, const CauseClues& clues) {
+  const auto [up, all, lines_too, is_spread] = clues;
   if (kind == "width")
     return up ? (all ? "motion, or a screen out of focus" : "out of focus") : "sharper";
   if (kind == "height")
     return up ? "aperture or exposure" : "aperture, exposure, or something before it";
+  if (kind == "light" && is_spread)
+    return "pictures are as bright as before: focus, or in a lit room the projectors' light";
   if (kind == "light" && all) return "the projectors' light, or the exposure of all cameras";
   if (kind == "light") return up ? "brighter" : "dimmer, or something before it";
   if (kind == "level" && lines_too) return "more light, the projectors' too";

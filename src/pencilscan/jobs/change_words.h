@@ -24,7 +24,12 @@ inline constexpr const char* kShift = "shift";
 [[nodiscard]] std::string quantity(const std::string& kind);
 
 /// What a change of one figure of one device, or of that figure in all cameras, usually comes from.
-/// `lines_too`: the light on lines rose as well.
-[[nodiscard]] std::string usual_cause(const std::string& kind, bool up, bool all, bool lines_too);
+struct CauseClues {
+  bool up = false;
+  bool all = false;        ///< devices of the kind
+  bool lines_too = false;  ///< the light on lines rose as well
+  bool is_spread = false;  ///< the light on lines fell, and pictures stay as bright
+};
+[[nodiscard]] std::string usual_cause(const std::string& kind, const CauseClues& clues);
 
 }  // namespace pencilscan

@@ -93,9 +93,9 @@ std::optional<std::string> not_run_again(const SequenceSummary& summary) {
   for (const Hole& hole : summary.holes)
     if (!hole.may_fill) names.push_back(summary.rows[hole.row].name);
   if (names.empty()) return std::nullopt;
-  return "frames that failed for their pictures are not run again: " +
+  return "frames that failed for their pictures, or whose report is damaged, are not run again: " +
          name_list(names, kNamedFrames) +
-         "; where these were repaired since, give the command that made the sequence once more "
+         "; where pictures were repaired since, give the command that made the sequence once more "
          "with --overwrite: it makes anew what depends on them, and keeps the rest";
 }
 

@@ -421,6 +421,26 @@ TEST_F(Watch, ALensThatCreepsOutOfFocusIsNamed) {
 }
 
 // Wider lines are lower: that is no aperture.
+// Out of focus, all lines lose height and the pictures keep their light.
+TEST_F(Watch, LightThatIsSpreadInAllCamerasIsNotCalledLess) {
+  for (const double level : {1.0, 0.3}) {
+    from(200, [&](FrameRow& row) {
+      for (CameraRow& camera : row.cameras) {
+        if (level == 1)
+          for (double& height : camera.height_of_projector) height *= 0.3;
+        else
+          camera.image_level *= level;
+      }
+    });
+    const auto found = events();
+    const auto light = std::find_if(found.begin(), found.end(), [](const SequenceEvent& event) {
+      return event.kind == "light";
+    });
+    ASSERT_NE(light, found.end());
+    EXPECT_THAT(light->text, level == 1 ? HasSubstr("pictures are as bright as before: focus")
+                                        : HasSubstr("the projectors' light, or the exposure"));
+  }
+}
 TEST_F(Watch, LightOfALensThatGoesOutOfFocusIsSpread) {
   for (std::size_t k = 200; k < kFrames; ++k) {
     const double wider = 1 + 0.5 * std::min(1.0, static_cast<double>(k - 200) / 44);

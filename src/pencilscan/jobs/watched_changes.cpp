@@ -4,6 +4,7 @@
 #include <cmath>
 #include <iterator>
 #include <tuple>
+#include <utility>
 
 #include "pencilscan/core/median.h"
 #include "pencilscan/jobs/change_words.h"
@@ -148,6 +149,20 @@ std::pair<double, double> long_before_and_within(std::span<const FrameRow> rows,
   double before = median_of_done(std::make_reverse_iterator(at), rows.rend(), kReference, reading);
   if (!std::isfinite(before)) before = median_of_done(end, rows.end(), kReference, reading);
   return {before, median_of_done(at, end, kReference, reading)};
+}
+
+bool light_is_spread(std::span<const FrameRow> rows, std::size_t at, double share) {
+  constexpr double kBrightAsBefore = 0.25;  // of what the lines lose, in logarithms
+  if (!(share > 0 && share < 1)) return false;
+  std::vector<double> changes;
+  for (std::size_t c = 0; c < rows[0].cameras.size(); ++c) {
+    const auto [before, after] = before_and_after(
+        rows, at, kFramesOfChange,
+        [c](const FrameRow& row) { return finite_log(row.cameras[c].image_level); });
+    if (std::isfinite(after - before)) changes.push_back(after - before);
+  }
+  return !changes.empty() &&
+         lower_quantile(std::move(changes), 0.5) > kBrightAsBefore * std::log(share);
 }
 
 bool lines_got_light(std::span<const FrameRow> rows, const SequenceDevices& devices,

@@ -70,5 +70,8 @@ struct FoundChange {
 /// from the projectors.
 [[nodiscard]] bool lines_got_light(std::span<const FrameRow> rows, const SequenceDevices& devices,
                                    std::size_t at);
+/// True where the pictures of all cameras stay about as bright at row `at`, though the light on
+/// lines falls to `share`: out of focus it is spread, not less.
+[[nodiscard]] bool light_is_spread(std::span<const FrameRow> rows, std::size_t at, double share);
 
 }  // namespace pencilscan

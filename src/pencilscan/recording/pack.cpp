@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "pencilscan/core/error.h"
+#include "pencilscan/core/formatted.h"
 #include "pencilscan/core/name_list.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/io/file.h"
@@ -110,7 +111,14 @@ void refuse_what_would_stay(const Recording& recording, const FrameSets& sets,
 }  // namespace
 
 std::vector<std::string> left_out_warnings(const Recording& recording, const FrameSets& sets) {
+  constexpr double kLeastPeriodNs = 1e5;  // no camera takes 10,000 pictures a second of a whole rig
   std::vector<std::string> warnings;
+  if (sets.period_ns > 0 && sets.period_ns < kLeastPeriodNs)
+    warnings.push_back(
+        "time stamps lie " + formatted(sets.period_ns) + " ns apart, which is " +
+        formatted(1e9 / sets.period_ns) +
+        " pictures a second: they must be nanoseconds (milliseconds times 1,000,000, microseconds "
+        "times 1,000)");
   if (!sets.no_frame.empty()) {
     std::vector<std::string> names;
     for (const std::size_t number : sets.no_frame) names.push_back(six_digits(number));

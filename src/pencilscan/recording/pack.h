@@ -44,7 +44,7 @@ PackReport unpack_recording(const Recording& recording, const FrameSets& sets,
                             const std::filesystem::path& out, const Progress& progress = {});
 
 /// Says which rows or moments are no frames (FrameSets::no_frame), and which pictures are in no
-/// frame, a sentence a camera (CameraClock::left_out).
+/// frame, a sentence a camera (CameraClock::left_out); and that time stamps are in another unit.
 [[nodiscard]] std::vector<std::string> left_out_warnings(const Recording& recording,
                                                          const FrameSets& sets);
 

@@ -279,16 +279,37 @@ TEST_F(Pack, PicturesThatAreInNoFrameAreSaid) {
         put(six_digits(k) + "/" + camera + ".png", CV_8UC1, static_cast<int>(k));
     }
   }
-  // cam1 dropped the moment 200; nothing tells whether its last picture is of the last moment.
+  // cam1 dropped the moment 2 ms; nothing tells whether its last picture is of the last moment.
   write_text(frames() / "timestamps.csv",
-             "frame,cam0,cam1,cam2\n000000,1000,1000,1000\n000001,1100,1100,1100\n"
-             "000002,1200,1300,1200\n000003,1300,1400,1300\n000004,1400,,1400\n"
-             "000005,1500,,1500\n");
+             "frame,cam0,cam1,cam2\n000000,0,0,0\n000001,1000000,1000000,1000000\n"
+             "000002,2000000,3000000,2000000\n000003,3000000,4000000,3000000\n"
+             "000004,4000000,,4000000\n000005,5000000,,5000000\n");
   pack_recording(frames(), packed());
   const Recording recording = Recording::open(packed());
   EXPECT_THAT(
       unpack_recording(recording, group_frames(recording), temporary_.path() / "out").warnings,
       ElementsAre(AllOf(HasSubstr("camera cam1"), HasSubstr("1 (000004)"))));
+}
+
+TEST_F(Pack, TimesInAnotherUnitAreNamed) {
+  for (std::size_t k = 0; k < 4; ++k) put(six_digits(k) + "/cam0.png", CV_8UC1, 1);
+  for (const auto& [step, is_named] : {std::pair(40, true), {40'000, true}, {40'000'000, false}}) {
+    std::string table = "frame,cam0\n";
+    for (int k = 0; k < 4; ++k)
+      table += six_digits(static_cast<std::size_t>(k)) + "," + std::to_string(k * step) + "\n";
+    write_text(frames() / "timestamps.csv", table + " \r\n");
+    PackOptions options;
+    options.overwrite = true;
+    pack_recording(frames(), packed(), options);
+    const Recording recording = Recording::open(packed());
+    const auto warnings = left_out_warnings(recording, group_frames(recording));
+    EXPECT_EQ(is_named ? 1U : 0U, warnings.size()) << step;
+    for (const std::string& warning : warnings)
+      EXPECT_THAT(warning, HasSubstr("they must be nanoseconds"));
+  }
+  write_text(frames() / "timestamps.csv", "frame,cam0\n000000,1,2\n");
+  EXPECT_THAT(error_of([&] { pack_recording(frames(), packed() / "more"); }),
+              HasSubstr("no more cells than line 1: 2"));
 }
 
 TEST_F(Pack, ProgressEndsAtTheEnd) {

@@ -56,14 +56,19 @@ TimeTable read_time_table(const std::filesystem::path& file,
   const std::vector<std::string> header = read_header(file, line, cameras);
   for (int number = 2; std::getline(lines, line); ++number) {
     const std::vector<std::string> cells = words(line);
-    if (cells.empty()) continue;
+    const auto is_filled = [](const std::string& cell) { return !cell.empty(); };
+    if (std::none_of(cells.begin(), cells.end(), is_filled)) continue;
+    if (cells.size() > header.size()) {
+      throw InputError(file.string(), "line " + std::to_string(number), cells[header.size()],
+                       "must have no more cells than line 1: " + std::to_string(header.size()));
+    }
     const auto [first, is_new] = line_of.emplace(cells[0], number);
     if (!is_new) {
       throw InputError(
           file.string(), "line " + std::to_string(number), cells[0],
           "must stand once; it stands in line " + std::to_string(first->second) + " as well");
     }
-    for (std::size_t c = 1; c < cells.size() && c < header.size(); ++c) {
+    for (std::size_t c = 1; c < cells.size(); ++c) {
       std::int64_t time = kUnknownTime;
       const char* const end = cells[c].data() + cells[c].size();
       const auto [last, fault] = std::from_chars(cells[c].data(), end, time);
