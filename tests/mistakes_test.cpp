@@ -1,6 +1,7 @@
 // What newcomers get wrong at the keyboard: each mistake ends in one line on stderr that names the
 // wrong word and says what to do, with exit code 2, and nothing is written or replaced.
 
+#include <cmath>
 #include <vector>
 
 #include "program.h"
@@ -32,6 +33,20 @@ class Newcomer : public ProgramTest {
       for (int y = 0; y <= 60; ++y)
         points += std::to_string(2 * x) + " " + std::to_string(2 * y) + " 0." +
                   std::to_string((7 * x + 5 * y) % 10) + "\n";
+    return points;
+  }
+  /// The same of a ball.
+  static std::string ball_of_80_mm() {
+    std::string points =
+        "ply\nformat ascii 1.0\nelement vertex 1000\nproperty float x\n"
+        "property float y\nproperty float z\nend_header\n";
+    for (int i = 0; i < 1000; ++i) {
+      const double z = (i + 0.5) / 500 - 1;
+      const double across = std::sqrt(1 - z * z);
+      points += std::to_string(40 * across * std::cos(2.4 * i)) + " " +
+                std::to_string(40 * across * std::sin(2.4 * i)) + " " + std::to_string(40 * z) +
+                "\n";
+    }
     return points;
   }
   /// A rig of two small cameras and projectors before that mesh, and what simulates it.
@@ -436,6 +451,11 @@ TEST_F(Newcomer, IsToldOfArtefactsOfAnotherSize) {
   const Outcome ball = run("artefact sphere plate.ply --diameter 80");
   EXPECT_EQ(ball.code, 1);
   EXPECT_THAT(ball.error, HasSubstr("plate.ply: no sphere fits 4941 points"));
+  write("ball.ply", ball_of_80_mm());
+  const Outcome two = run("artefact sphere ball.ply plate.ply --diameter 80");
+  EXPECT_EQ(two.code, 1);
+  EXPECT_THAT(two.output, HasSubstr("ball.ply")) << "its figures are printed all the same";
+  EXPECT_THAT(two.error, HasSubstr("warning: plate.ply has no result: no sphere fits"));
 }
 
 TEST_F(Newcomer, IsToldOfPositionsWithoutAResult) {

@@ -138,12 +138,26 @@ void print_lacking(const std::vector<LackingPosition>& lacking) {
     std::printf("  %s: %s\n", position.folder.c_str(), position.why.c_str());
 }
 
-/// Of all positions that were asked for. StageError where not one has a result.
-void require_a_result(const std::vector<fs::path>& files,
-                      const std::vector<LackingPosition>& lacking) {
-  if (!files.empty()) return;
-  throw StageError("no position has a result; " + lacking.front().folder.string() + ": " +
-                   lacking.front().why);
+/// A position that cannot be measured has no result. StageError where not one has.
+void measure_all(const ArtefactCommand& command, const std::vector<fs::path>& files,
+                 ArtefactTest& test) {
+  std::size_t measured = 0;
+  for (const fs::path& file : files) {
+    try {
+      measure(command, file, test);
+      ++measured;
+    } catch (const StageError& error) {
+      std::string why = error.what();
+      const std::string source = file.string() + ": ";
+      if (why.starts_with(source)) why.erase(0, source.size());
+      test.lacking.push_back({file, why});
+    }
+  }
+  if (measured == 0)
+    throw StageError("no position has a result; " + test.lacking.front().folder.string() + ": " +
+                     test.lacking.front().why);
+  for (const LackingPosition& position : test.lacking)
+    warn_of(position.folder.string() + " has no result: " + position.why);
 }
 
 constexpr const char* kLegend = R"(
@@ -187,10 +201,8 @@ void run_artefact(ArtefactCommand command) {
     files.insert(files.end(), found.files.begin(), found.files.end());
     test.lacking.insert(test.lacking.end(), found.lacking.begin(), found.lacking.end());
   }
-  require_a_result(files, test.lacking);
-  for (const LackingPosition& position : test.lacking)
-    warn_of(position.folder.string() + " has no result: " + position.why);
-  for (const fs::path& file : files) measure(command, file, test);
+  const std::size_t positions = files.size() + test.lacking.size();
+  measure_all(command, files, test);
   const nlohmann::ordered_json json = artefact_json(test);
   print_table(test);
   print_worst(json["worst"]);
@@ -201,8 +213,7 @@ void run_artefact(ArtefactCommand command) {
   if (!command.report_path.empty())
     write_text(command.report_path, artefact_html(test, "pencilscan " PENCILSCAN_VERSION));
   if (!test.lacking.empty()) {
-    throw StageError(std::to_string(test.lacking.size()) + " of " +
-                     std::to_string(files.size() + test.lacking.size()) +
+    throw StageError(std::to_string(test.lacking.size()) + " of " + std::to_string(positions) +
                      " positions have no result: the figures are those of the others");
   }
 }
@@ -210,6 +221,54 @@ void run_artefact(ArtefactCommand command) {
 CLI::Option* add_positive(CLI::App& command, const char* flag, std::optional<double>& value,
                           const char* text) {
   return command.add_option(flag, value, text)->check(above_zero());
+}
+
+/// What was calibrated of the artefact, and what else is in the picture.
+void add_size_options(CLI::App& command, ArtefactCommand& options) {
+  ArtefactOptions& sizes = options.options;
+  if (options.artefact != Artefact::kPlate) {
+    CLI::Option* diameter =
+        command
+            .add_option("--diameter", sizes.diameter_mm, "Calibrated diameter of the ball(s), mm")
+            ->check(above_zero());
+    if (options.artefact == Artefact::kBallBar) diameter->required();
+  }
+  if (options.artefact == Artefact::kSphere) {
+    command
+        .add_option("--stem", options.stem,
+                    "Leaves a stem or stand out: x y z of its direction from the ball's centre, "
+                    "and half the angle of the cone around it in degrees, as 0 0 -1 30")
+        ->expected(4)
+        ->check(any_number<double>());
+  }
+  if (options.artefact == Artefact::kBallBar) {
+    add_positive(command, "--length", sizes.length_mm,
+                 "Calibrated distance of the balls' centres, mm");
+    command
+        .add_option("--bar-diameter", sizes.bar_diameter_mm,
+                    "Of the bar between the balls, mm: points around it are left out")
+        ->check(above_zero());
+  }
+  if (options.artefact == Artefact::kPlate) {
+    CLI::Option* length = add_positive(command, "--length", sizes.plate_length_mm,
+                                       "Of the plate, mm: with --width for the coverage");
+    CLI::Option* width = add_positive(command, "--width", sizes.plate_width_mm,
+                                      "Of the plate, mm: with --length for the coverage");
+    length->check(told_where_not(
+        "--length", [width] { return width->count() > 0; }, "needs --width"));
+    width->check(told_where_not(
+        "--width", [length] { return length->count() > 0; }, "needs --length"));
+    CLI::Option* thickness =
+        add_positive(command, "--thickness", sizes.plate_thickness_mm,
+                     "Of the plate, mm, where more than one face was measured: takes the face that "
+                     "has most points");
+    command
+        .add_option("--border", sizes.border_mm,
+                    "Points closer than this to the rim are left out, mm")
+        ->check(zero_or_more())
+        ->capture_default_str()
+        ->needs(thickness);
+  }
 }
 
 std::shared_ptr<ArtefactCommand> add_artefact(CLI::App& group, Artefact artefact, const char* name,
@@ -222,50 +281,7 @@ std::shared_ptr<ArtefactCommand> add_artefact(CLI::App& group, Artefact artefact
                    "One position each: a PLY file of points or a mesh, from any program, or a "
                    "frame's results; an output folder is a position per frame")
       ->required();
-  ArtefactOptions& sizes = options->options;
-  if (artefact != Artefact::kPlate) {
-    CLI::Option* diameter =
-        command
-            ->add_option("--diameter", sizes.diameter_mm, "Calibrated diameter of the ball(s), mm")
-            ->check(above_zero());
-    if (artefact == Artefact::kBallBar) diameter->required();
-  }
-  if (artefact == Artefact::kSphere) {
-    command
-        ->add_option("--stem", options->stem,
-                     "Leaves a stem or stand out: x y z of its direction from the ball's centre, "
-                     "and half the angle of the cone around it in degrees, as 0 0 -1 30")
-        ->expected(4)
-        ->check(any_number<double>());
-  }
-  if (artefact == Artefact::kBallBar) {
-    add_positive(*command, "--length", sizes.length_mm,
-                 "Calibrated distance of the balls' centres, mm");
-    command
-        ->add_option("--bar-diameter", sizes.bar_diameter_mm,
-                     "Of the bar between the balls, mm: points around it are left out")
-        ->check(above_zero());
-  }
-  if (artefact == Artefact::kPlate) {
-    CLI::Option* length = add_positive(*command, "--length", sizes.plate_length_mm,
-                                       "Of the plate, mm: with --width for the coverage");
-    CLI::Option* width = add_positive(*command, "--width", sizes.plate_width_mm,
-                                      "Of the plate, mm: with --length for the coverage");
-    length->check(told_where_not(
-        "--length", [width] { return width->count() > 0; }, "needs --width"));
-    width->check(told_where_not(
-        "--width", [length] { return length->count() > 0; }, "needs --length"));
-    CLI::Option* thickness =
-        add_positive(*command, "--thickness", sizes.plate_thickness_mm,
-                     "Of the plate, mm, where more than one face was measured: takes the face that "
-                     "has most points");
-    command
-        ->add_option("--border", sizes.border_mm,
-                     "Points closer than this to the rim are left out, mm")
-        ->check(zero_or_more())
-        ->capture_default_str()
-        ->needs(thickness);
-  }
+  add_size_options(*command, *options);
   command
       ->add_option("--region", options->region,
                    "x y z radius, mm: only what lies in this sphere is the artefact")
