@@ -28,16 +28,11 @@ export class Figures {
   private async load(): Promise<void> {
     const {app} = this;
     const {result, source} = app;
-    const found = source.index.results[result];
     byId('figures').replaceChildren();
     byId('warnings').replaceChildren();
-    if (!found) return;
-    let details: Details = {};
-    try {
-      details = await source.details(result);
-    } catch (error) {
-      found.missing.push({what: 'details', why: String(error), kind: 'unreadable'});
-    }
+    if (!source.index.results[result]) return;
+    const details = await source.details(result).catch((error: unknown): Details =>
+      ({doubts: [{what: 'details', why: String(error), kind: 'unreadable'}]}));
     if (app.result !== result) return;
     this.warnings(details);
     byId('figures').append(this.tiles(details), this.charts(details), ...this.tables(details));

@@ -55,7 +55,8 @@ export class FrameStrip {
     place.dataset.wanted = 'yes';
     const url = await this.app.source.imageUrl(i, 'thumb').catch(() => '');
     if (!url) return;
-    if (place.dataset.wanted) place.append(h('img', {src: url, alt: ''}));
+    // Who left and came back meanwhile has asked twice.
+    if (place.dataset.wanted && !place.childElementCount) place.append(h('img', {src: url, alt: ''}));
     else URL.revokeObjectURL(url);
   }
 

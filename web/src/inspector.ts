@@ -9,7 +9,7 @@ const kSide = 88; // CSS px of a crop
 
 export class Inspector {
   private readonly root = byId('inspector');
-  private wanted = 0;
+  private shown = 0; // times
 
   constructor(private readonly app: App) {
     app.on('selection', () => this.show());
@@ -19,6 +19,7 @@ export class Inspector {
   private show(): void {
     const {app} = this;
     const {selection} = app;
+    ++this.shown;
     this.root.replaceChildren();
     this.root.classList.toggle('empty', !selection);
     if (!selection) {
@@ -90,7 +91,7 @@ export class Inspector {
   /** The surroundings of the point in every camera that looks there. */
   private async crops(): Promise<void> {
     const {app} = this;
-    const mine = ++this.wanted;
+    const mine = this.shown;
     const row = h('div', {class: 'crops', role: 'group', 'aria-label': 'The point in the cameras'});
     this.root.append(row);
     const {result} = app;
@@ -100,7 +101,7 @@ export class Inspector {
       const seen = app.sees(c, ...at);
       if (!seen || !app.source.has(result, `image/${c}`)) continue;
       const image = await app.source.image(result, `image/${c}`).catch(() => null);
-      if (mine !== this.wanted || !image) return;
+      if (mine !== this.shown || !image) return;
       const ratio = Math.min(devicePixelRatio, 2);
       const canvas = h('canvas', {width: kSide * ratio, height: kSide * ratio});
       const context = canvas.getContext('2d')!;

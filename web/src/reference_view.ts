@@ -10,6 +10,7 @@ export class ReferenceView {
   /** Say which half is which. */
   readonly halves = [h('span', {class: 'half left', hidden: true}), h('span', {class: 'half right', hidden: true})];
   mesh: Mesh | null = null;
+  private compared = new WeakSet<Mesh>(); // with `mesh`
 
   constructor(private readonly app: App) {}
 
@@ -20,6 +21,7 @@ export class ReferenceView {
     const mesh = wanted && await app.source.mesh(wanted.result, 'mesh').catch(() => null);
     if (app.reference !== wanted) return false;
     this.mesh = mesh;
+    this.compared = new WeakSet();
     return true;
   }
 
@@ -31,7 +33,9 @@ export class ReferenceView {
 
   /** Measures a mesh against the reference, once. */
   compare(mesh: Mesh): void {
-    if (this.mesh) mesh.difference ??= signedDistances(mesh, this.mesh);
+    if (!this.mesh || this.compared.has(mesh)) return;
+    mesh.difference = signedDistances(mesh, this.mesh);
+    this.compared.add(mesh);
   }
 
   /** The other frame beside this one, in the same colours. */

@@ -15,7 +15,8 @@ export class Timeline {
   private readonly root = byId('timeline');
   private readonly film: Film;
   private readonly strip: FrameStrip;
-  private playing = false;
+  private playing = 0; // number of the run that plays; 0: none
+  private runs = 0;
   private at = 0; // the result in the picture
   private wanted = -1; // by scrubbing, while its mesh is read
   private sequence: Sequence | null = null;
@@ -118,7 +119,7 @@ export class Timeline {
   }
 
   private stop(): void {
-    this.playing = false;
+    this.playing = 0;
     this.play.textContent = '▶ Play';
     this.rate.textContent = '';
   }
@@ -129,23 +130,23 @@ export class Timeline {
       this.app.show(this.at); // with all that belongs to it
       return;
     }
-    this.playing = true;
+    this.playing = ++this.runs;
     this.play.textContent = '▮▮ Pause';
     this.at = this.app.result;
-    await this.run();
+    await this.run(this.playing);
   }
 
-  private async run(): Promise<void> {
+  private async run(number: number): Promise<void> {
     const count = this.app.source.index.results.length;
     const moments: number[] = []; // when the last frames were drawn, ms
     let due = performance.now();
-    while (this.playing) {
+    while (this.playing === number) {
       if (this.at + 1 >= count && !this.loop.checked) return void this.toggle();
       const next = (this.at + 1) % count;
       const mesh = await this.film.get(next, Array.from({length: 8}, (_, k) => (next + 1 + k) % count));
       due = Math.max(due + 1000 / Number(this.speed.value), performance.now() - 200);
       await new Promise((done) => setTimeout(done, Math.max(0, due - performance.now())));
-      if (!this.playing) return;
+      if (this.playing !== number) return;
       this.at = next;
       if (mesh) this.viewer.play(mesh);
       this.tell(next);

@@ -30,7 +30,8 @@ function rgbOf(name: string): Rgb {
 
 export class Viewer {
   private picture: Picture3d | null = null;
-  private surface: Surface = 'mesh';
+  private surface: Surface = 'mesh'; // in the picture
+  private wanted = {surface: 'mesh' as Surface, points: false}; // whatever a result has
   private mode: ColorMode = 'shading';
   private tool: Tool = 'select';
   private meshes: Record<'mesh' | 'measured', Mesh | null> = {mesh: null, measured: null};
@@ -45,7 +46,10 @@ export class Viewer {
   }});
   private readonly viewSelect = h('select', {id: 'view-from', onchange: () => this.lookFrom()});
   private readonly showPoints = h('input', {type: 'checkbox', id: 'show-points',
-    onchange: () => this.drawPoints()});
+    onchange: () => {
+      this.wanted.points = this.showPoints.checked;
+      this.drawPoints();
+    }});
   private readonly showDevices = h('input', {type: 'checkbox', id: 'show-devices', checked: true,
     onchange: () => this.drawDevices()});
   private readonly aids = new SpaceAids(h('label', {class: 'check'}, this.showDevices, 'Devices'));
@@ -66,7 +70,7 @@ export class Viewer {
     {value: 'measured', text: 'Measured', title: 'mesh_measured.ply: only what was measured'},
     {value: 'none', text: 'None'},
   ], 'mesh', (value) => {
-    this.surface = value;
+    this.wanted.surface = this.surface = value;
     void this.drawSurface();
   });
   private readonly toolChoice = choice<Tool>('Tool', [
@@ -150,9 +154,10 @@ export class Viewer {
     this.drawDevices();
     this.measuring.reset();
     const has = (part: string) => app.source.has(app.result, part);
-    if (!has('mesh') && has('measured')) this.surface = 'measured';
-    if (!has('mesh') && !has('measured')) this.surface = 'none';
-    if (this.surface === 'none' && has('points')) this.showPoints.checked = true;
+    const {surface} = this.wanted;
+    const other = has('measured') ? 'measured' : 'none';
+    this.surface = surface === 'none' || has('mesh') ? surface : other;
+    this.showPoints.checked = this.wanted.points || (this.surface === 'none' && has('points'));
     this.surfaceChoice.set(this.surface);
     this.say(has('mesh') || has('measured') || has('points') ? '' : 'This result holds no shape.');
     await this.drawSurface();
@@ -200,21 +205,20 @@ export class Viewer {
     if (!picture) return;
     const part = this.surface;
     const {result} = app;
+    let fault = `There is no ${part === 'mesh' ? 'closed' : 'measured'} surface in this result.`;
     if (part !== 'none' && !this.meshes[part] && app.source.has(result, part)) {
-      try {
-        const mesh = await app.source.mesh(result, part);
-        if (app.result !== result) return;
-        this.meshes[part] = mesh;
-      } catch (error) {
-        this.say(`The surface cannot be shown: ${String(error)}`);
-      }
+      const mesh = await app.source.mesh(result, part).catch((error: unknown) => {
+        fault = `The surface cannot be shown: ${String(error)}`;
+        return null;
+      });
+      if (app.result !== result) return;
+      this.meshes[part] = mesh;
       if (this.surface !== part) return;
     }
     const mesh = this.currentMesh();
     picture.setMesh(mesh);
     if (mesh && this.shown !== result) this.frame(mesh.position);
-    if (!mesh && this.surface !== 'none') this.say(`There is no ${part === 'mesh' ? 'closed' : 'measured'} surface in this result.`);
-    else if (mesh) this.say('');
+    if (mesh || part !== 'none') this.say(mesh ? '' : fault);
     this.fillColorModes();
     this.recolor();
   }
@@ -291,9 +295,9 @@ export class Viewer {
     const ofPoints = ['camera', 'projector', 'line'].includes(this.mode) ||
       (this.mode === 'sigma' && !mesh?.sigma) || (this.mode === 'confidence' && !mesh?.confidence) ||
       (this.mode === 'distance' && !mesh?.distance);
-    if (ofPoints) this.showPoints.checked = true;
+    if (ofPoints) this.wanted.points = this.showPoints.checked = true;
     if (this.mode === 'hole' && this.surface !== 'mesh') {
-      this.surface = 'mesh';
+      this.wanted.surface = this.surface = 'mesh';
       this.surfaceChoice.set('mesh');
       void this.drawSurface();
     }
@@ -381,7 +385,6 @@ export class Viewer {
 
   private async referenceChosen(): Promise<void> {
     if (!(await this.reference.read())) return;
-    for (const mesh of [this.meshes.mesh, this.meshes.measured]) delete mesh?.difference;
     if (this.app.reference && !this.reference.mesh) this.say('The frame to compare with has no surface.');
     this.mode = this.reference.modeFor(this.mode);
     this.fillColorModes();

@@ -1,38 +1,11 @@
-// The row of frames, without a browser: what carries a mark. node --test web/test
+// The row of frames, without a browser: what carries a mark, and thumbnails. node --test web/test
 import assert from 'node:assert/strict';
-import {mkdtempSync, rmSync} from 'node:fs';
-import {tmpdir} from 'node:os';
-import {dirname, join} from 'node:path';
 import {test} from 'node:test';
-import {fileURLToPath, pathToFileURL} from 'node:url';
-import {buildSync} from 'esbuild';
+import {later, load, settled} from './elements.mjs';
 
-/** Stands for an element; text is that of all children. */
-class Element {
-  constructor(tag) {
-    Object.assign(this, {tag, children: [], attributes: {}, dataset: {}});
-  }
-  append(...children) { this.children.push(...children.filter((child) => child !== null)); }
-  setAttribute(name, value) { this.attributes[name] = value; }
-  addEventListener() {}
-  querySelector() { return null; }
-  get text() { return this.children.map((child) => child.text ?? String(child)).join(''); }
-}
-
-async function strip(results) {
-  const folder = mkdtempSync(join(tmpdir(), 'pencilscan_strip_'));
-  try {
-    const outfile = join(folder, 'strip.mjs');
-    const source = join(dirname(fileURLToPath(import.meta.url)), '../src/frame_strip.ts');
-    buildSync({entryPoints: [source], bundle: true, format: 'esm', outfile});
-    globalThis.Node = Element;
-    globalThis.document = {createElement: (tag) => new Element(tag)};
-    globalThis.IntersectionObserver = class { observe() {} };
-    const {FrameStrip} = await import(pathToFileURL(outfile).href);
-    return new FrameStrip({source: {index: {results}}});
-  } finally {
-    rmSync(folder, {recursive: true});
-  }
+async function strip(results, source = {}) {
+  const {FrameStrip} = await load('frame_strip.ts');
+  return new FrameStrip({source: {index: {results}, ...source}});
 }
 
 const frame = (name, more = {}) => ({name, run: '', detail: 'full', parts: ['thumb'], missing: [], summary: {points: 9}, ...more});
@@ -50,4 +23,23 @@ test('a page that opens later than at the first frame says why', async () => {
   const shapes = [frame('000000', {detail: 'shape'}), frame('000001')];
   assert.match((await strip(shapes)).note.text, /opened at the first of them/);
   assert.doesNotMatch((await strip([...shapes].reverse())).note.text, /opened/);
+});
+
+test('a thumbnail that leaves and comes back while it is read is there once', async (t) => {
+  const asked = [];
+  t.mock.method(URL, 'revokeObjectURL', () => {});
+  const frames = await strip([frame('000000')], {imageUrl: () => {
+    asked.push(later());
+    return asked.at(-1).promise;
+  }});
+  const place = frames.element.querySelector('.thumb');
+  void frames.fill(0, place);
+  frames.empty(place);
+  void frames.fill(0, place);
+  asked.forEach(({resolve}, k) => resolve(`blob:${k}`));
+  await settled();
+  assert.equal(place.childElementCount, 1);
+  assert.deepEqual(URL.revokeObjectURL.mock.calls.map((call) => call.arguments[0]), ['blob:1']);
+  frames.empty(place);
+  assert.equal(place.childElementCount, 0);
 });
