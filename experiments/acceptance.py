@@ -9,6 +9,7 @@ user would, and `pencilscan artefact` measures its points, and beside them its m
 
 import json
 import math
+import sys
 
 import numpy as np
 
@@ -181,6 +182,8 @@ def by_speed(args, rows):
 if __name__ == "__main__":
     arguments = common.arguments("acceptance", __doc__, positions=(POSITIONS, 1), exposure_ms=(1.0, 1.0),
                                  sensors=("rgb,raw", "rgb,raw"))
+    if arguments.positions > POSITIONS:
+        sys.exit(f"acceptance: --positions {arguments.positions}: at most {POSITIONS}")
     results = common.Rows(arguments.out / "results.csv",
                           ["artefact", "sensor", "motion", "position", "surface"], VALUES, arguments.resume)
     run = common.Program(arguments)

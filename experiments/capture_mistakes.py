@@ -17,6 +17,7 @@ import shapes
 import numpy as np
 
 SEED = 5
+MOVE = [0.6, 0.8, 0]  # mm
 COLUMN_BITS, ROW_BITS = 10, 9
 
 
@@ -31,17 +32,51 @@ def heap(seed):
     return shapes.joined(parts)
 
 
+def simulated(program, rig, capture, mesh, out):
+    path = common.write_rig(out.with_suffix(".json"), rig)
+    common.write_ply(out.with_suffix(".ply"), *mesh)
+    program("simulate", "--overwrite", "--rig", path, "--mesh", out.with_suffix(".ply"), "--out", out, "--gray-code", "--noise",
+            "low", "--seed", SEED + capture)
+
+
 def rendered(program, folder, scale):
-    """The right captures, and the devices as their user describes them; `scale`: of the pixels' number along an axis."""
+    """The right captures, and their rig; `scale`: of the pixels' number along an axis."""
     sizes = {"camera-width": 640, "camera-height": 480, "camera-focal-px": 1150,
              "projector-width": 640, "projector-height": 512, "projector-focal-px": 1215}
     program("rig", "ring", "--overwrite", "--out", folder / "ring.json", "--cameras", 3, "--projectors", 3, "--arc-deg", 100,
             *[word for name, size in sizes.items() for word in ("--" + name, int(scale * size))])
-    for capture in range(3):
-        common.write_ply(folder / "heap.ply", *heap(SEED + capture))
-        program("simulate", "--overwrite", "--rig", folder / "ring.json", "--mesh", folder / "heap.ply", "--out",
-                folder / f"right{capture}", "--gray-code", "--noise", "low", "--seed", SEED + capture)
     rig = json.loads((folder / "ring.json").read_text())
+    for capture in range(3):
+        simulated(program, rig, capture, heap(SEED + capture), folder / f"right{capture}")
+    return rig
+
+
+def with_projector(rig, name):
+    """The rig with this projector alone."""
+    return {**rig, "projectors": [p for p in rig["projectors"] if p["name"] == name]}
+
+
+def in_mirror(rig, mesh):
+    """Rig and mesh the other way round: what devices show and see is mirrored, since their centres are in the middle."""
+    across = np.diag([-1.0, 1.0, 1.0])
+    turned = {kind: [{**d, "R": (across @ d["R"] @ across).tolist(), "t": (across @ d["t"]).tolist()} for d in rig[kind]]
+              for kind in ("cameras", "projectors")}
+    vertices, triangles = mesh
+    return {**rig, **turned}, (vertices @ across, triangles[:, ::-1])
+
+
+def rendered_wrong(program, folder, rig):
+    """Captures that no change of the right ones makes."""
+    for capture in range(3):
+        mirrored, mesh = in_mirror(with_projector(rig, "proj1"), heap(SEED + capture))
+        simulated(program, mirrored, capture, mesh, folder / f"mirrored{capture}")
+    vertices, triangles = heap(SEED + 1)
+    simulated(program, with_projector(rig, "proj2"), 1, (vertices + MOVE, triangles), folder / "moved1")
+
+
+def described(rig):
+    """The devices as their user describes them."""
+    rig = json.loads(json.dumps(rig))
     for camera in rig["cameras"]:
         for key in ("distortion", "R", "t"):
             del camera[key]
@@ -55,11 +90,11 @@ def rendered(program, folder, scale):
 class Captures:
     """A copy of the right ones, and the devices, to be spoilt."""
 
-    def __init__(self, folder, right, devices):
-        self.folder, self.devices = folder, json.loads(json.dumps(devices))
+    def __init__(self, folder, rendered, devices):
+        self.folder, self.rendered, self.devices = folder, rendered, devices
         shutil.rmtree(folder, ignore_errors=True)
         for capture in range(3):
-            shutil.copytree(right / f"right{capture}/captures", folder / f"pose{capture}")
+            shutil.copytree(rendered / f"right{capture}/captures", folder / f"pose{capture}")
 
     def pairs(self, capture=None, projector=None, camera=None):
         for pair in sorted(self.folder.glob("pose*/*/*")):
@@ -80,6 +115,11 @@ class Captures:
             for i, path in enumerate(paths):
                 path.write_bytes(contents[file_of(i, len(paths))])
 
+    def take(self, scene, capture, projector):
+        """The pictures of a projector are those of another scene."""
+        shutil.copytree(self.rendered / scene / "captures" / projector, self.folder / f"pose{capture}" / projector,
+                        dirs_exist_ok=True)
+
     def exchange(self, one, other, capture):
         for a, b in zip(self.pairs(capture, **one), self.pairs(capture, **other)):
             os.rename(a, self.folder / "aside")
@@ -88,8 +128,10 @@ class Captures:
 
 
 def mirrored_projector(captures):
-    """The first column bit the other way round: the panel's columns from right to left."""
-    captures.reorder(lambda i, count: {2: 3, 3: 2}.get(i, i), projector="proj1")
+    """The scene in a mirror, in mirrored pictures: only the panel's columns go from right to left."""
+    for capture in range(3):
+        captures.take(f"mirrored{capture}", capture, "proj1")
+    captures.change(lambda x: x[:, ::-1], projector="proj1")
 
 
 def rows_first(captures, **which):
@@ -121,6 +163,7 @@ MISTAKES = {
     "two cameras' folders exchanged in one capture": lambda c: c.exchange({"camera": "cam0"}, {"camera": "cam1"}, 1),
     "all captures are the first": lambda c: [shutil.copytree(c.folder / "pose0", c.folder / f"pose{k}", dirs_exist_ok=True)
                                              for k in (1, 2)],
+    "the object moved by 1 mm while one capture was taken": lambda c: c.take("moved1", 1, "proj2"),
     "a picture is missing": lambda c: (c.folder / "pose1/proj1/cam1/017.png").unlink(),
     "a twentieth of the exposure": lambda c: c.change(lambda x: (x * 0.05).astype(x.dtype)),
     "three times the exposure": lambda c: c.change(lambda x: np.clip(x * 3.0, 0, 255).astype(x.dtype)),
@@ -132,7 +175,8 @@ MISTAKES = {
 }
 SMALL = ["none", "each picture is one late", "K in millimetres"]
 NAMED = {"each picture is one late": "late", "a camera's pictures are mirrored": "are mirrored",
-         "two cameras' folders exchanged in one capture": "are swapped", "all captures are the first": "the same pictures"}
+         "two cameras' folders exchanged in one capture": "are swapped", "all captures are the first": "the same pictures",
+         "the object moved by 1 mm while one capture was taken": "moved while"}
 
 
 def judged(args, program, captures):
@@ -156,12 +200,14 @@ def main():
     args = common.arguments("capture_mistakes", __doc__)
     program = common.Program(args)
     rows = common.Rows(args.out / "results.csv", ["mistake"], ["verdict", "reason"], args.resume)
-    devices = rendered(program, args.out, 0.5 if args.small else 1)
+    rig = rendered(program, args.out, 0.5 if args.small else 1)
+    if not args.small:
+        rendered_wrong(program, args.out, rig)
     for name, spoil in MISTAKES.items():
         if rows.has(mistake=name) or (args.small and name not in SMALL):
             continue
         common.progress(f"capture_mistakes: {name}")
-        captures = Captures(args.out / "spoilt", args.out, devices)
+        captures = Captures(args.out / "spoilt", args.out, described(rig))
         spoil(captures)
         verdict, reason = judged(args, program, captures)
         rows.add(mistake=name, verdict=verdict, reason=reason)
@@ -175,4 +221,5 @@ def main():
             raise SystemExit(f"capture_mistakes: {name}: not named")
 
 
-main()
+if __name__ == "__main__":
+    main()

@@ -1,17 +1,25 @@
 #!/usr/bin/python3
 """What the experiments compute themselves, against what is known exactly."""
 
+import argparse
+import contextlib
+import inspect
+import io
 import os
 import tempfile
 import unittest
 from pathlib import Path
+from unittest import mock
 
 import numpy as np
 
 import acceptance
+import capture_mistakes
 import common
 import fig7_hand
 import heldout
+import knocked
+import lateral_color
 import shapes
 import solids
 import statues
@@ -186,11 +194,46 @@ class HeldOutTest(unittest.TestCase):
     def test_sure_points_are_judged_by_what_they_say(self):
         figures = {"right_by_confidence": [{"confidence": 0.9, "right": 0.5, "points": 100},
                                            {"confidence": 0.9995, "right": 0.998, "points": 1000}]}
-        wrong, said = heldout.confident_wrong(figures)
+        wrong, said, points = heldout.confident_wrong(figures)
         self.assertAlmostEqual(wrong, 0.002)
         self.assertAlmostEqual(said, 0.0005)
-        self.assertFalse(heldout.in_bounds({"sure_wrong": wrong, "sure_said": said}, "sure_wrong",
-                                           heldout.sure_bound))
+        self.assertFalse(self.are_sure_in_bounds(wrong, said, points))
+
+    def test_one_wrong_sure_point_and_none_at_all_are_within_bounds(self):
+        figures = {"right_by_confidence": [{"confidence": 0.9997, "right": 0.998, "points": 500}]}
+        self.assertTrue(self.are_sure_in_bounds(*heldout.confident_wrong(figures)))
+        self.assertTrue(self.are_sure_in_bounds(*heldout.confident_wrong({})))
+        self.assertFalse(self.are_sure_in_bounds("", "", ""))
+
+    def are_sure_in_bounds(self, wrong, said, points):
+        row = {"sure_wrong": wrong, "sure_said": said, "sure_points": points}
+        return all(heldout.in_bounds(row, key, bound) for key, *_, bound in heldout.COLUMNS if key in row)
+
+    def test_a_scaled_scene_is_compared_with_what_the_unscaled_one_gave(self):
+        keys = ["label_error", *heldout.SCALE_INVARIANT]
+        row = dict.fromkeys(keys, 0.5)
+        self.assertEqual(heldout.missed_by_scaling(row, row), [])
+        self.assertEqual(heldout.missed_by_scaling({**row, "label_error": 0.5003}, row), ["label_error"])
+        self.assertEqual(heldout.missed_by_scaling(row, {**row, "sigma_below_1": ""}), ["sigma_below_1"])
+        self.assertEqual(heldout.missed_by_scaling(row, {**row, "sigma_below_1": 0.51}), ["sigma_below_1"])
+
+    def test_a_scaled_scene_whose_unscaled_one_failed_has_no_reference(self):
+        with tempfile.TemporaryDirectory() as folder:
+            rows = common.Rows(Path(folder) / "r.csv", ["scene", "seed", "scale"], ["kind", *[c[0] for c in heldout.COLUMNS]])
+            rows.add(scene="bust", seed=1, scale=1, kind="plain")
+            rows.add(scene="bust", seed=1, scale=0.01, kind="plain", **{c[0]: 0.5 for c in heldout.COLUMNS})
+            with contextlib.redirect_stdout(io.StringIO()) as table:
+                heldout.table(argparse.Namespace(out=Path(folder), split="held"), rows)
+        self.assertIn("1 missed", table.getvalue())
+
+    def test_a_scene_is_rendered_anew_once_the_code_of_an_object_changed(self):
+        scene = heldout.SPLITS["fit"]["horse"]
+        before = heldout.fingerprint(scene, 1)
+        self.assertEqual(heldout.fingerprint(scene, 1), before)
+        for changed in (heldout.objects, heldout.statues, heldout.solids, heldout.shapes):
+            source = inspect.getsource
+            with mock.patch("inspect.getsource", lambda of: source(of) + "#" * (of is changed)):
+                self.assertNotEqual(heldout.fingerprint(scene, 1), before, changed.__name__)
 
     def test_edges_of_one_and_of_four_facets_are_found(self):
         with tempfile.TemporaryDirectory() as folder:
@@ -209,6 +252,42 @@ class HeldOutTest(unittest.TestCase):
         self.assertAlmostEqual(np.linalg.norm(vertices - [10, 0, 0], axis=1).max(), 0.95 * 170, places=6)
         vertices, _ = heldout.placed(heldout.SPLITS["held"]["person"], 1, {"center": [0, 0, 0], "radius": 950})
         self.assertAlmostEqual(np.ptp(vertices[:, 2]), 1702, delta=15)
+
+
+class KnockedTest(unittest.TestCase):
+    def test_a_projector_that_is_knocked_by_nothing_is_rolled_all_the_same(self):
+        rig = table1_cube.fig6_rig()
+        wrong, name = knocked.knocked(rig, "projectors", 0, 5, 1)
+        for before, after in zip(rig["projectors"], wrong["projectors"]):
+            turn = np.asarray(after["R"]) @ np.asarray(before["R"]).T
+            angle = np.degrees(np.arccos(np.clip((np.trace(turn) - 1) / 2, -1, 1)))
+            self.assertAlmostEqual(angle, 5 if before["name"] == name else 0, places=5)
+            np.testing.assert_allclose(common.center_of(after), common.center_of(before), atol=1e-9)
+        self.assertEqual(knocked.knocked(rig, "cameras", 0, "", 1)[0], rig)
+
+
+class MirrorTest(unittest.TestCase):
+    def test_every_device_shows_and_sees_the_mirrored_picture(self):
+        rig = table1_cube.fig6_rig()
+        vertices, triangles = shapes.cube(100)
+        mirrored, (turned, _) = capture_mistakes.in_mirror(rig, (vertices, triangles))
+        for kind in ("cameras", "projectors"):
+            for before, after in zip(rig[kind], mirrored[kind]):
+                self.assertAlmostEqual(np.linalg.det(after["R"]), 1)
+                expected = common.project(before, vertices) * [-1, 1] + [before["width"] - 1, 0]
+                np.testing.assert_allclose(common.project(after, turned), expected, atol=1e-9)
+
+
+class LateralColorTest(unittest.TestCase):
+    def test_scenes_of_another_rig_mesh_or_noise_are_other_ones(self):
+        with tempfile.TemporaryDirectory() as folder:
+            rig, mesh = (Path(folder) / name for name in ("rig.json", "mesh.ply"))
+            origins = []
+            for rig_text, mesh_text, noise in (("a", "b", "low"), ("c", "b", "low"), ("a", "d", "low"), ("a", "b", "medium")):
+                rig.write_text(rig_text)
+                mesh.write_text(mesh_text)
+                origins.append(lateral_color.origin(rig, mesh, ["--noise", noise]))
+        self.assertEqual(len(set(origins)), 4)
 
 
 class AcceptanceTest(unittest.TestCase):

@@ -146,7 +146,7 @@ def placed(scene, seed, volume):
 def fingerprint(scene, seed):
     """Of everything that a rendered scene depends on but the simulator."""
     maker = MAKERS[scene.object]
-    code = "".join(inspect.getsource(m) for m in (maker, placed, solids, shapes))
+    code = "".join(inspect.getsource(m) for m in (maker, placed, objects, statues, solids, shapes))
     text = json.dumps([dataclasses.asdict(scene), [str(o) for o in rig_options(scene)], seed, code])
     return hashlib.sha256(text.encode()).hexdigest()
 
@@ -224,11 +224,11 @@ def open_edges(path):
 
 
 def confident_wrong(figures):
-    """Of the points with confidence >= .999: the share that is wrong, what they say themselves."""
+    """Of the points with confidence >= .999: the share that is wrong, what they say themselves, their number."""
     sums = [(b["points"], b["points"] * (1 - b["right"]), b["points"] * (1 - b["confidence"]))
             for b in figures.get("right_by_confidence", []) if b["confidence"] >= 0.999]
     total, wrong, said = (sum(s[k] for s in sums) for k in range(3))
-    return (wrong / total, said / total) if total else (None, None)
+    return wrong / max(1, total), said / max(1, total), total
 
 
 def measure(args, program, folder, rig_path, frames, work, factor=1.0):
@@ -254,7 +254,7 @@ def measure(args, program, folder, rig_path, frames, work, factor=1.0):
     if figures is None:
         return {}
     figures["cpu_s"] = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-    figures["sure_wrong"], figures["sure_said"] = confident_wrong(figures)
+    figures["sure_wrong"], figures["sure_said"], figures["sure_points"] = confident_wrong(figures)
     if (result / "mesh.ply").exists():
         figures["open_edges"] = open_edges(result / "mesh.ply")
     (work / "figures.json").write_text(json.dumps(figures, indent=1))
@@ -274,8 +274,8 @@ def least(key):
 
 
 def sure_bound(row):
-    """Three times what the points say; one wrong point of so few is no verdict."""
-    return (-math.inf, 3 * row["sure_said"] if row["sure_said"] != "" else math.inf)
+    """Three times what the points say; one wrong point of so few is no verdict. Shares are rounded."""
+    return (-math.inf, max(3 * row["sure_said"], 1.5 / max(1, row["sure_points"])))
 
 
 ONE, TWO, RANK = (0.62, 0.74), (0.92, 0.98), (0.4, math.inf)
@@ -299,6 +299,7 @@ COLUMNS = [
     ("completeness_1mm", "complete", 1, 3, ANY),
     ("sure_wrong", "sure: wrong, %", 100, 3, sure_bound),
     ("sure_said", "said, %", 100, 3, ANY),
+    ("sure_points", "of points", 1, 0, ANY),
     ("open_edges", "edges not of 2 facets", 1, 0, (-math.inf, 0)),
     ("cpu_s", "CPU s", 1, 0, ANY),
 ]
@@ -309,8 +310,10 @@ SCALE_INVARIANT = ["distance_median_mm", "distance_p90_mm", "mesh_distance_media
 
 
 def in_bounds(row, key, bound):
+    if row[key] == "":
+        return False
     low, high = bound(row) if callable(bound) else bound
-    return row[key] != "" and low <= row[key] <= high
+    return low <= row[key] <= high
 
 
 def missed(row):
@@ -318,10 +321,14 @@ def missed(row):
 
 
 def missed_by_scaling(row, reference):
-    wrong = [] if row["label_error"] != "" and abs(row["label_error"] - reference["label_error"]) <= 2e-4 \
-        else ["label_error"]
-    return wrong + [key for key in SCALE_INVARIANT
-                    if row[key] == "" or abs(row[key] - reference[key]) > 0.01 * abs(reference[key])]
+    """Figures that are not those of the unscaled scene, or that one of both lacks."""
+    def differs(key, absolute=0.0, relative=0.0):
+        if "" in (row[key], reference[key]):
+            return True
+        return abs(row[key] - reference[key]) > absolute + relative * abs(reference[key])
+
+    wrong = ["label_error"] if differs("label_error", absolute=2e-4) else []
+    return wrong + [key for key in SCALE_INVARIANT if differs(key, relative=0.01)]
 
 
 def table(args, rows):
@@ -331,7 +338,8 @@ def table(args, rows):
         if row["scale"] == 1:
             wrong = missed(row)
         else:
-            reference = rows.select(scene=row["scene"], seed=row["seed"], scale=1)
+            unscaled = rows.select(scene=row["scene"], seed=row["seed"], scale=1)
+            reference = [other for other in unscaled if other["label_error"] != ""]
             wrong = missed_by_scaling(row, reference[0]) if reference else ["no reference"]
         cells = []
         for key, _, factor, digits, bound in COLUMNS:

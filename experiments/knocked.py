@@ -16,7 +16,7 @@ import common
 import heldout
 
 SCENES = ["bust", "dragon_p10", "bust_four"]
-AMOUNTS = [0, 5, 10, 20, 40, 80]  # px
+AMOUNTS = [0, 5, 10, 20, 40, 80]  # px; 0: a projector is rolled only
 ROLLS = {"cameras": [""], "projectors": [0, 5]}  # degrees about the optical axis; "": as the turn has it
 COLUMNS = ["device", "verdict", "names_it", "others_named", "left_px", "refused", "label_error", "line_recall"]
 
@@ -61,7 +61,7 @@ def knocked(rig, kind, amount, roll_deg, seed):
         b = small / way(moved(0, small), before, probe) * amount / 3
         a = 1e-5 / way(moved(1e-5, 0), before, probe) * amount
         a *= amount / way(moved(a, b), before, probe)
-        d.update(moved(a, b, roll))
+    d.update(moved(a, b, roll))
     return result, d["name"]
 
 

@@ -7,6 +7,7 @@ state the truth, and that state what `calibrate` found in one Gray-code capture 
 volume, K and poses of the cameras given).
 """
 
+import hashlib
 import json
 import shutil
 
@@ -47,13 +48,18 @@ def errors(truth, report):
     """Estimated displacements against the truth, px and deviations."""
     off, z = [], []
     for d, found in zip(truth["cameras"] + truth["projectors"], report["color"]["registration"]["devices"]):
-        for color, sign in (("red", 1), ("blue", -1), ("green", 0)):
+        for color in ("red", "blue", "green"):
             true = d["color_registration"].get(color, {"shift_px": [0, 0], "scale": 1})
             e = np.subtract(found[color]["shift_px"], true["shift_px"])
             off.extend(e)
             z.extend(e / np.asarray(found[color]["shift_sigma_px"]))
             z.append((found[color]["scale"] - true["scale"]) / found[color]["scale_sigma"])
     return np.abs(off), np.abs(z)
+
+
+def origin(rig, mesh, options):
+    """Tells scenes apart by all that they are rendered from but the simulator."""
+    return hashlib.sha256(rig.read_bytes() + mesh.read_bytes() + repr(options).encode()).hexdigest()
 
 
 def main():
@@ -66,11 +72,12 @@ def main():
     common.write_rig(args.out / "truth.json", truth)
 
     def render(name, rig, mesh, *more):
-        out = args.out / name
-        if not (out / "done").exists():
+        out, options = args.out / name, ["--noise", args.noise, *more]
+        wanted = origin(rig, mesh, options)
+        if not (out / "done").exists() or (out / "done").read_text() != wanted:
             shutil.rmtree(out, ignore_errors=True)
-            program("simulate", "--rig", rig, "--mesh", mesh, "--noise", args.noise, "--out", out, *more)
-            (out / "done").write_text("")
+            program("simulate", "--rig", rig, "--mesh", mesh, "--out", out, *options)
+            (out / "done").write_text(wanted)
         return out
 
     bunny = (common.BUNNY, "--up", "y", "--fit")

@@ -122,9 +122,11 @@ def main():
                  (("line_recall", found), ("label_error", labelled), ("said_wrong", labelled))]
         cameras = len(SEVERAL.get(setting, (0,)))
         lines = setting if cameras == 1 else f"{SEVERAL_USE}, {setting}"
-        table.append([cameras, lines, f"{share[0]:.3f}", f"{100 * share[1]:.2f}", f"{100 * share[2]:.2f}"])
+        failed = np.count_nonzero(found == 0)
+        table.append([cameras, lines, f"{share[0]:.3f}", f"{100 * share[1]:.2f}", f"{100 * share[2]:.2f}", failed])
     common.print_table(args.out / "table.md", "One projector",
-                       ["cameras", "lines", "line recall", "label error, %", "as confidences say, %"], table)
+                       ["cameras", "lines", "line recall", "label error, %", "as confidences say, %", "objects that failed"],
+                       table)
 
 
 if __name__ == "__main__":

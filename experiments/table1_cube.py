@@ -180,8 +180,7 @@ def run(args):
             rig = common.with_calibration_error(true_rig, px, seed=draw)
             measure(args, program, rows, true_rig, scene, f"calibration {px} px", draw, rig, methods)
         if calibrated and draw <= few:
-            measure(args, program, rows, true_rig, scene, "calibrated", draw, calibrated,
-                    METHODS[:4] if draw <= few else METHODS[:3])
+            measure(args, program, rows, true_rig, scene, "calibrated", draw, calibrated, METHODS[:4])
         for noise_px in args.line_noise if draw <= few else []:
             program(*simulate, "--out", scene, "--seed", draw)
             add_line_noise(scene / "frames/000000", noise_px, seed=draw)
