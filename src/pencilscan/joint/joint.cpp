@@ -263,6 +263,32 @@ void write_decisions(const LabelledPieces& pieces, const std::vector<Decision>& 
   }
 }
 
+/// Labels that no other camera confirms leave before pieces' labels meet in tables.
+void forget_unseen_labels(const JointOptions& options, OtherViews& others,
+                          std::vector<LabelledPieces>& pieces) {
+  std::vector<std::vector<std::vector<int>>> new_index(pieces.size());
+  parallel_for(pieces.size(), [&](std::size_t g) {
+    const std::vector<PieceBeliefs> no_beliefs(pieces.size());
+    new_index[g] = forget_unseen(others.costs(g, no_beliefs), options, pieces[g]);
+  });
+  others.forget(new_index);
+}
+
+Labeling written(const Rig& rig, std::span<const GridGraph> graphs,
+                 const std::vector<LabelledPieces>& pieces,
+                 const std::vector<std::vector<Decision>>& decisions, const JointOptions& options) {
+  Labeling labeling;
+  labeling.runs.resize(rig.cameras.size());
+  labeling.tentative.resize(rig.cameras.size());
+  labeling.undecided.resize(rig.cameras.size());
+  for (std::size_t g = 0; g < graphs.size(); ++g) {
+    const auto camera = static_cast<std::size_t>(graphs[g].camera);
+    write_decisions(pieces[g], decisions[g], options, labeling.runs[camera],
+                    labeling.tentative[camera], labeling.undecided[camera]);
+  }
+  return labeling;
+}
+
 }  // namespace
 
 float JointOptions::disagreement_cost() const {
@@ -277,12 +303,7 @@ Labeling solve_joint(const Rig& rig, const std::vector<ColorFamily>& families,
   });
   add_darkness(rig, graphs, pieces);
   OtherViews others(rig, graphs, pieces);
-  std::vector<std::vector<std::vector<int>>> new_index(graphs.size());
-  parallel_for(graphs.size(), [&](std::size_t g) {
-    const std::vector<PieceBeliefs> no_beliefs(graphs.size());
-    new_index[g] = forget_unseen(others.costs(g, no_beliefs), options, pieces[g]);
-  });
-  others.forget(new_index);
+  forget_unseen_labels(options, others, pieces);
   std::vector<std::optional<Surroundings>> surroundings(graphs.size());
   std::vector<PairwiseEnergy> energies(graphs.size());
   std::vector<std::vector<NextPiece>> beside(graphs.size());
@@ -330,16 +351,7 @@ Labeling solve_joint(const Rig& rig, const std::vector<ColorFamily>& families,
     }
     leave_ghosts_before_room(camera, pieces[g], space, options, decisions[g]);
   });
-  Labeling labeling;
-  labeling.runs.resize(rig.cameras.size());
-  labeling.tentative.resize(rig.cameras.size());
-  labeling.undecided.resize(rig.cameras.size());
-  for (std::size_t g = 0; g < graphs.size(); ++g) {
-    const auto camera = static_cast<std::size_t>(graphs[g].camera);
-    write_decisions(pieces[g], decisions[g], options, labeling.runs[camera],
-                    labeling.tentative[camera], labeling.undecided[camera]);
-  }
-  return labeling;
+  return written(rig, graphs, pieces, decisions, options);
 }
 
 }  // namespace pencilscan

@@ -110,6 +110,57 @@ std::optional<std::pair<int, int>> exchanged_pair(
   return std::pair(static_cast<int>(a), static_cast<int>(b));
 }
 
+/// Cameras of which too few curves got a name, and the shares of the others that have enough.
+struct Suspects {
+  std::vector<Suspect> cameras;
+  std::vector<double> of_others;
+};
+
+Suspects suspects_of(const Rig& rig, const Frame& frame, const Labeling& labeling) {
+  Suspects found;
+  for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
+    const TellingPoints points = telling_points(labeling, c);
+    if (frame.images[c].empty() || !points.are_enough()) continue;
+    const double share = points.named_share();
+    if (share >= kFewNamed) {
+      found.of_others.push_back(share);
+      continue;
+    }
+    Suspect suspect;
+    suspect.camera = c;
+    suspect.share = share;
+    found.cameras.push_back(std::move(suspect));
+  }
+  return found;
+}
+
+/// What each picture would have to be, in whose place, to get names as the others do; `usual`: the
+/// share of the others.
+void try_remedies(const PictureTrial& trial, double usual, std::vector<Suspect>& suspects) {
+  const auto consider = [&](Suspect& s, const PictureFinding& finding, const TellingPoints& of) {
+    const double named = of.named_share();
+    if (!of.are_enough() || named <= s.best_named || named < kFarMore * s.alone ||
+        named < kFarLess * usual)
+      return;
+    s.best = finding;
+    s.best_named = named;
+  };
+  for (Suspect& s : suspects) {
+    for (const Remedy& remedy : remedies()) {
+      if (s.shown.fits() && remedy.fault != PictureFault::kRedBlueExchanged) continue;
+      consider(s, {remedy.fault, static_cast<int>(s.camera), -1},
+               trial.telling_points(s.camera, remedy.undo(s.light)));
+    }
+    for (const Suspect& other : suspects) {
+      if (s.shown.fits() || other.camera == s.camera || other.light.size() != s.light.size())
+        continue;
+      consider(
+          s, {PictureFault::kExchanged, static_cast<int>(s.camera), static_cast<int>(other.camera)},
+          trial.telling_points(other.camera, s.light));
+    }
+  }
+}
+
 }  // namespace
 
 std::string describe(const Rig& rig, const PictureFinding& finding) {
@@ -162,26 +213,12 @@ std::string describe(const Rig& rig, const PictureFinding& finding) {
 std::vector<PictureFinding> misplaced_pictures(const Rig& rig, const Frame& frame,
                                                const PointResult& found,
                                                const PointOptions& options) {
-  std::vector<double> of_others;
-  std::vector<Suspect> suspects;
-  for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
-    const TellingPoints points = telling_points(found.labeling, c);
-    if (frame.images[c].empty() || !points.are_enough()) continue;
-    const double share = points.named_share();
-    if (share >= kFewNamed) {
-      of_others.push_back(share);
-      continue;
-    }
-    Suspect suspect;
-    suspect.camera = c;
-    suspect.share = share;
-    suspects.push_back(std::move(suspect));
-  }
+  Suspects asked = suspects_of(rig, frame, found.labeling);
+  std::vector<Suspect>& suspects = asked.cameras;
   if (suspects.empty()) return {};
   const auto points = points_by_camera(rig, some_points(rig, found));
-  const std::size_t others = of_others.size();
-  const double usual = others == 0 ? 2 * kFewNamed : upper_median(std::move(of_others));
-
+  const std::size_t others = asked.of_others.size();
+  const double usual = others == 0 ? 2 * kFewNamed : upper_median(std::move(asked.of_others));
   const PictureTrial trial(rig, options);
   parallel_for(suspects.size(), [&](std::size_t i) {
     Suspect& s = suspects[i];
@@ -190,28 +227,7 @@ std::vector<PictureFinding> misplaced_pictures(const Rig& rig, const Frame& fram
     s.alone = trial.telling_points(s.camera, s.light).named_share();
     s.shown = shown_lines(rig, found.families, found.graphs[s.camera], points);
   });
-  const auto consider = [&](Suspect& s, const PictureFinding& finding, const TellingPoints& of) {
-    const double named = of.named_share();
-    if (!of.are_enough() || named <= s.best_named || named < kFarMore * s.alone ||
-        named < kFarLess * usual)
-      return;
-    s.best = finding;
-    s.best_named = named;
-  };
-  for (Suspect& s : suspects) {
-    for (const Remedy& remedy : remedies()) {
-      if (s.shown.fits() && remedy.fault != PictureFault::kRedBlueExchanged) continue;
-      consider(s, {remedy.fault, static_cast<int>(s.camera), -1},
-               trial.telling_points(s.camera, remedy.undo(s.light)));
-    }
-    for (const Suspect& other : suspects) {
-      if (s.shown.fits() || other.camera == s.camera || other.light.size() != s.light.size())
-        continue;
-      consider(
-          s, {PictureFault::kExchanged, static_cast<int>(s.camera), static_cast<int>(other.camera)},
-          trial.telling_points(other.camera, s.light));
-    }
-  }
+  try_remedies(trial, usual, suspects);
   const ViewAgreement agreement(rig, points);
   const auto is_contradicted = [&](std::size_t c) {
     const PairAgreement said = agreement.with_others(c);

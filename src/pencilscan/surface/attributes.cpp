@@ -78,71 +78,115 @@ SurfaceEvidence mean(const SurfaceEvidence& a, const SurfaceEvidence& b) {
   return evidence;
 }
 
+constexpr double kOutsideReach = 0.4;  ///< of the reach, beyond the last line
+
+/// Samples around the vertices of a mesh.
+class SamplesAround {
+ public:
+  SamplesAround(std::span<const SurfaceSample> samples, double reach_spacings, double spacing,
+                const TriangleMesh& mesh)
+      : samples_(samples),
+        mesh_(mesh),
+        normals_(vertex_normals(mesh)),
+        spacing_(spacing),
+        reach_(reach_of(samples, reach_spacings)),
+        radius_(reach_spacings * kMaxStretch * spacing),
+        near_radius_(std::min(
+            radius_, samples.empty() ? radius_ : *std::max_element(reach_.begin(), reach_.end()))),
+        weighty_radius_(
+            std::min(std::max(kOutsideReach * near_radius_, 2 * spacing), near_radius_)),
+        grid_(positions_of(samples), weighty_radius_) {}
+
+  /// Farther samples weigh nothing to speak of, and matter only where none lies well within its
+  /// reach.
+  [[nodiscard]] Surroundings of(std::size_t v) const {
+    Surroundings a = within(weighty_radius_, v);
+    if (a.best > kOutsideReach) a = within(near_radius_, v);
+    if (a.nearest == radius_) a = within(radius_, v);
+    return a;
+  }
+
+ private:
+  static constexpr double kMaxStretch = 2.5;  ///< of the spacing on a grazed surface
+
+  static std::vector<double> reach_of(std::span<const SurfaceSample> samples,
+                                      double reach_spacings) {
+    std::vector<double> reach;
+    reach.reserve(samples.size());
+    for (const SurfaceSample& s : samples) {
+      const double tilt = s.sheet_normal.dot(s.normal);
+      const double stretch = 1 / std::sqrt(std::max(1 - tilt * tilt, 1e-6));
+      reach.push_back(reach_spacings * s.spacing * std::min(stretch, kMaxStretch));
+    }
+    return reach;
+  }
+  static std::vector<Vec3> positions_of(std::span<const SurfaceSample> samples) {
+    std::vector<Vec3> positions;
+    positions.reserve(samples.size());
+    for (const SurfaceSample& s : samples) positions.push_back(s.position);
+    return positions;
+  }
+
+  [[nodiscard]] Surroundings within(double distance, std::size_t v) const {
+    Surroundings a;
+    a.nearest = radius_;
+    grid_.for_each_within(mesh_.vertices[v], distance,
+                          [&](std::size_t i, double d2) { add(i, d2, v, a); });
+    return a;
+  }
+
+  void add(std::size_t i, double d2, std::size_t v, Surroundings& a) const {
+    const SurfaceSample& s = samples_[i];
+    const Vec3& normal = normals_[v];
+    const Vec3 d = s.position - mesh_.vertices[v];
+    const double cosine = s.normal.dot(normal);
+    if (cosine < 0.5 || std::abs(d.dot(normal)) > 0.5 * spacing_) return;
+    a.faced = std::max(a.faced, s.to_camera.dot(normal));
+    const double distance = std::sqrt(d2);
+    a.nearest = std::min(a.nearest, distance);
+    if (distance > reach_[i]) return;
+    a.best = std::min(a.best, distance / reach_[i]);
+    a.pull += d;
+    a.pull_length += distance;
+    const double across = s.sigma * std::max(std::abs(s.to_camera.dot(s.normal)), 0.2);
+    const double w = std::exp(-2 * d2 / (spacing_ * spacing_));
+    a.weight += w;
+    a.information += w / std::max(across * across, 1e-9);
+    a.confidence += w * s.confidence;
+    // 2 (1 - cos) is the angle squared. Of a quadric the chord is square to the mean normal.
+    a.bend += w * 2 * (1 - cosine) * s.spacing;
+    const double off = 0.5 * d.dot(s.normal + normal);
+    a.scatter2 += w * off * off;
+    if (!a.seen[s.camera]) ++a.cameras;
+    a.seen[s.camera] = true;
+  }
+
+  std::span<const SurfaceSample> samples_;
+  const TriangleMesh& mesh_;
+  std::vector<Vec3> normals_;
+  double spacing_;
+  std::vector<double> reach_;  ///< per sample, mm
+  double radius_;              ///< mm: as far as any sample may reach
+  double near_radius_;         ///< as far as one of these does
+  double weighty_radius_;
+  PointGrid grid_;
+};
+
 }  // namespace
 
 std::vector<SurfaceEvidence> attribute_vertices(std::span<const SurfaceSample> samples,
                                                 double reach_spacings, double spacing,
                                                 TriangleMesh& mesh,
                                                 std::span<const std::array<int, 2>> middles) {
-  constexpr double kMaxStretch = 2.5;    // of the spacing on a grazed surface
-  constexpr double kOutsideReach = 0.4;  // of the reach, beyond the last line
   // What turns away farther from all cameras around was only continued from beside it.
   const double least_faced = DepthOptions{}.min_cosine;
-  const double radius = reach_spacings * kMaxStretch * spacing;
-  std::vector<Vec3> positions;
-  positions.reserve(samples.size());
-  for (const SurfaceSample& s : samples) positions.push_back(s.position);
-  std::vector<double> reach;
-  for (const SurfaceSample& s : samples) {
-    const double tilt = s.sheet_normal.dot(s.normal);
-    const double stretch = 1 / std::sqrt(std::max(1 - tilt * tilt, 1e-6));
-    reach.push_back(reach_spacings * s.spacing * std::min(stretch, kMaxStretch));
-  }
-  const double near_radius =
-      std::min(radius, samples.empty() ? radius : *std::max_element(reach.begin(), reach.end()));
-  // Farther samples weigh nothing to speak of and matter only where none lies well within its
-  // reach.
-  const double weighty_radius =
-      std::min(std::max(kOutsideReach * near_radius, 2 * spacing), near_radius);
-  const PointGrid grid(positions, weighty_radius);
-  const std::vector<Vec3> normals = vertex_normals(mesh);
+  const SamplesAround around(samples, reach_spacings, spacing, mesh);
   std::vector<char> fringe(mesh.vertices.size(), 0);
   mesh.sigma.assign(mesh.vertices.size(), 0.0F);
   mesh.confidence.assign(mesh.vertices.size(), 0.0F);
-  const auto around = [&](std::size_t v, double within) {
-    Surroundings a;
-    a.nearest = radius;
-    grid.for_each_within(mesh.vertices[v], within, [&](std::size_t i, double d2) {
-      const SurfaceSample& s = samples[i];
-      const Vec3 d = s.position - mesh.vertices[v];
-      const double cosine = s.normal.dot(normals[v]);
-      if (cosine < 0.5 || std::abs(d.dot(normals[v])) > 0.5 * spacing) return;
-      a.faced = std::max(a.faced, s.to_camera.dot(normals[v]));
-      const double distance = std::sqrt(d2);
-      a.nearest = std::min(a.nearest, distance);
-      if (distance > reach[i]) return;
-      a.best = std::min(a.best, distance / reach[i]);
-      a.pull += d;
-      a.pull_length += distance;
-      const double across = s.sigma * std::max(std::abs(s.to_camera.dot(s.normal)), 0.2);
-      const double w = std::exp(-2 * d2 / (spacing * spacing));
-      a.weight += w;
-      a.information += w / std::max(across * across, 1e-9);
-      a.confidence += w * s.confidence;
-      // 2 (1 - cos) is the angle squared. Of a quadric the chord is square to the mean normal.
-      a.bend += w * 2 * (1 - cosine) * s.spacing;
-      const double off = 0.5 * d.dot(s.normal + normals[v]);
-      a.scatter2 += w * off * off;
-      if (!a.seen[s.camera]) ++a.cameras;
-      a.seen[s.camera] = true;
-    });
-    return a;
-  };
   std::vector<SurfaceEvidence> evidence(mesh.vertices.size());
   const auto look = [&](std::size_t v) {
-    Surroundings a = around(v, weighty_radius);
-    if (a.best > kOutsideReach) a = around(v, near_radius);
-    if (a.nearest == radius) a = around(v, radius);
+    const Surroundings a = around.of(v);
     // Samples that fill a half plane pull with 2 / pi of their summed distance.
     fringe[v] = a.pull.norm() > 0.55 * a.pull_length && a.best > kOutsideReach;
     double sigma = a.nearest;  // a guess where no sample reaches: at least so far off
