@@ -54,7 +54,8 @@ CalibrationResult calibrate(const CalibrationInput& input, const CalibrateOption
   // A device that moved between captures has several places. One capture of one device is left out
   // at a time; the rig that results counts where it shows clearly that all of these had moved.
   std::vector<CaptureMove> moved;
-  std::optional<CaptureMove> next = find_contradictions(input, best).moves.likeliest;
+  Contradictions contradictions = find_contradictions(input, best);
+  std::optional<CaptureMove> next = contradictions.moves.likeliest;
   while (next && moved.size() < kMostMoves) {
     moved.push_back(*next);
     const CalibrationInput rest = without_moved(input, moved);
@@ -62,15 +63,17 @@ CalibrationResult calibrate(const CalibrationInput& input, const CalibrateOption
     CalibrationResult without = solve_without_wrong_pairs(rest, options, progress);
     if (!places_as_many(best, without)) break;
     without.pairs = best.pairs;
-    const std::vector<CaptureMove> clear = find_contradictions(input, without).moves.clear;
+    Contradictions of_all = find_contradictions(input, without);
     next = find_contradictions(rest, without).moves.likeliest;
     const bool shows_all = std::all_of(moved.begin(), moved.end(), [&](const CaptureMove& m) {
-      return has_moved(clear, m.device, m.capture);
+      return has_moved(of_all.moves.clear, m.device, m.capture);
     });
-    if (shows_all) best = std::move(without);
+    if (!shows_all) continue;
+    best = std::move(without);
+    contradictions = std::move(of_all);
   }
   // What explains a rig that contradicts itself explains this too.
-  if (find_contradictions(input, best).findings.empty())
+  if (contradictions.findings.empty())
     best.scene_moves = moved_within_captures(input, best, options);
   return best;
 }

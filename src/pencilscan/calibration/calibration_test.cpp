@@ -24,10 +24,7 @@ using namespace sample;
 
 double projection_error(const Rig& truth, const Rig& found) {
   BundleProblem problem;
-  for (std::size_t d = 0; d < device_count(found); ++d) {
-    problem.devices.push_back(bundle_device(device_at(found, d)));
-    problem.devices.back().present = true;
-  }
+  problem.devices = placed_devices(found);
   return sample::projection_error(truth, problem);
 }
 
@@ -270,10 +267,7 @@ TEST(Verdict, NothingMovedWhereNothingDid) {
 /// rays of the cameras.
 std::vector<Track> tracks_of_a_moved_scene(const Rig& truth, std::size_t first, double shift) {
   BundleProblem problem;
-  for (std::size_t d = 0; d < device_count(truth); ++d) {
-    problem.devices.push_back(bundle_device(device_at(truth, d)));
-    problem.devices.back().present = true;
-  }
+  problem.devices = placed_devices(truth);
   std::vector<Track> tracks = tracks_of(truth, {.count = 900});
   for (Track& track : tracks) {
     if (track.views[0].device >= truth.cameras.size()) continue;

@@ -20,10 +20,7 @@ class FrameOfAKnownRing : public testing::Test {
   FrameOfAKnownRing() {
     input_.rig = truth_;
     input_.known.resize(device_count(truth_));
-    for (std::size_t d = 0; d < device_count(truth_); ++d) {
-      problem_.devices.push_back(bundle_device(device_at(truth_, d)));
-      problem_.devices.back().present = true;
-    }
+    problem_.devices = sample::placed_devices(truth_);
     move_solution(0.01, look_at({5, -3, 2}, {1, 1, 1}), problem_);
   }
 
@@ -66,10 +63,7 @@ TEST_F(FrameOfAKnownRing, PosesOnABarGiveTheFrameToo) {
     RigidTransform& pose = device_at(truth_, d).device_from_world;
     pose.translation = -(pose.rotation * Vec3(900, 250.0 * static_cast<double>(d), 100));
   }
-  for (std::size_t d = 0; d < device_count(truth_); ++d) {
-    problem_.devices[d] = bundle_device(device_at(truth_, d));
-    problem_.devices[d].present = true;
-  }
+  problem_.devices = sample::placed_devices(truth_);
   move_solution(0.01, look_at({5, -3, 2}, {1, 1, 1}), problem_);
   give_poses(3);
   EXPECT_TRUE(fix_frame(input_, problem_).is_given);

@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "pencilscan/bundle/bundle_device.h"
 #include "pencilscan/bundle/sample_tracks.h"
 #include "pencilscan/bundle/triangulation.h"
 #include "pencilscan/calibration/calibrate.h"
@@ -36,6 +37,16 @@ inline std::vector<Track> with_exchanged(const std::vector<Track>& tracks, const
     if (rest.views.size() > 1) mixed.push_back(rest);
   }
   return mixed;
+}
+
+/// All devices of a rig, where it has them.
+inline std::vector<BundleDevice> placed_devices(const Rig& rig) {
+  std::vector<BundleDevice> devices;
+  for (std::size_t d = 0; d < device_count(rig); ++d) {
+    devices.push_back(bundle_device(device_at(rig, d)));
+    devices.back().present = true;
+  }
+  return devices;
 }
 
 inline CalibrationInput input_of(const Rig& truth, std::vector<Track> tracks, bool cameras_known) {

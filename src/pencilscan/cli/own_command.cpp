@@ -29,27 +29,34 @@ std::string complaint_in(const fs::path& log) {
   return last;
 }
 
-/// What the linker made of all that it put into this program (--build-id, a note of ELF files);
-/// empty where it wrote none.
+/// The build ID among notes of an ELF file, each a head, a name and a text; empty: there is none.
+std::string build_id_in(std::string_view notes) {
+  constexpr std::string_view kName("GNU\0", 4);
+  const auto padded = [](std::size_t bytes) { return (bytes + 3) / 4 * 4; };
+  ElfW(Nhdr) head;
+  while (notes.size() >= sizeof head) {
+    std::memcpy(&head, notes.data(), sizeof head);
+    const std::size_t text = sizeof head + padded(head.n_namesz);
+    const std::size_t end = text + padded(head.n_descsz);
+    if (end > notes.size()) break;
+    if (head.n_type == NT_GNU_BUILD_ID && notes.substr(sizeof head, head.n_namesz) == kName)
+      return std::string(notes.substr(text, head.n_descsz));
+    notes.remove_prefix(end);
+  }
+  return {};
+}
+
+/// What the linker made of all that it put into this program (--build-id); empty where it wrote
+/// none.
 std::string build_id() {
   std::string id;
   const auto visit = [](dl_phdr_info* info, std::size_t, void* result) {
-    constexpr std::string_view kName("GNU\0", 4);
-    const auto padded = [](std::size_t bytes) { return (bytes + 3) / 4 * 4; };
-    for (int i = 0; i < info->dlpi_phnum; ++i) {
+    auto& found = *static_cast<std::string*>(result);
+    for (int i = 0; i < info->dlpi_phnum && found.empty(); ++i) {
       const ElfW(Phdr)& part = info->dlpi_phdr[i];
-      if (part.p_type != PT_NOTE) continue;
-      const auto* note = reinterpret_cast<const char*>(info->dlpi_addr + part.p_vaddr);
-      const char* const end = note + part.p_memsz;
-      while (note + sizeof(ElfW(Nhdr)) <= end) {
-        ElfW(Nhdr) head;
-        std::memcpy(&head, note, sizeof head);
-        const char* const name = note + sizeof head;
-        const char* const text = name + padded(head.n_namesz);
-        if (head.n_type == NT_GNU_BUILD_ID && std::string_view(name, head.n_namesz) == kName)
-          static_cast<std::string*>(result)->assign(text, head.n_descsz);
-        note = text + padded(head.n_descsz);
-      }
+      if (part.p_type == PT_NOTE)
+        found = build_id_in(
+            {reinterpret_cast<const char*>(info->dlpi_addr + part.p_vaddr), part.p_memsz});
     }
     return 1;  // the first object is the program
   };

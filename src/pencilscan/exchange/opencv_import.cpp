@@ -10,12 +10,12 @@
 #include "pencilscan/core/byte_order_mark.h"
 #include "pencilscan/core/error.h"
 #include "pencilscan/exchange/opencv_file.h"
+#include "pencilscan/geometry/rotation.h"
 #include "pencilscan/io/file.h"
 
 namespace pencilscan {
 namespace {
 
-constexpr double kRotationTolerance = 1e-4;
 constexpr int kLargestSide = 1 << 16;  ///< px
 
 /// True where the first key of a YAML text stands at the beginning of its line. Of a text that is
@@ -151,9 +151,7 @@ class OpencvReader {
       cv::cv2eigen(full, result.rotation);
       return result;
     }
-    if (R.rows() != 3 || R.cols() != 3 ||
-        (R * R.transpose() - Eigen::MatrixXd::Identity(3, 3)).cwiseAbs().maxCoeff() >
-            kRotationTolerance ||
+    if (R.rows() != 3 || R.cols() != 3 || rotation_error(R) > kRotationTolerance ||
         Mat3(R).determinant() < 0)
       fail(rotation.name(), "",
            "must be a rotation: 3x3 with entries of |R R' - I| <= 1e-4, or 3 numbers");

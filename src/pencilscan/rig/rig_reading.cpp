@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "pencilscan/geometry/rotation.h"
 #include "pencilscan/io/file.h"
 #include "pencilscan/io/json_text.h"
 #include "pencilscan/pattern/de_bruijn.h"
@@ -16,8 +17,6 @@
 namespace pencilscan {
 namespace {
 
-/// Of an entry of |R R' - I|: above this it is no rotation.
-constexpr double kRotationTolerance = 1e-4;
 constexpr int kLargestImage = 1 << 16;     ///< px a side
 constexpr int kLongestPeriod = 1 << 20;    ///< symbols of a de Bruijn sequence
 constexpr std::size_t kMostDevices = 256;  ///< points.ply numbers them in one byte
@@ -44,8 +43,7 @@ Mat3 parse_camera_matrix(const JsonField& field) {
 
 Mat3 parse_rotation(const JsonField& field) {
   const Mat3 R = field.matrix3();
-  const double error = (R * R.transpose() - Mat3::Identity()).cwiseAbs().maxCoeff();
-  if (error > kRotationTolerance)
+  if (rotation_error(R) > kRotationTolerance)
     field.fail("must be a rotation: the entries of |R R' - I| must be <= 1e-4");
   if (R.determinant() < 0) field.fail("must be a rotation, is a reflection: det R must be 1");
   return R;
