@@ -4,6 +4,7 @@
 #include <atomic>
 #include <map>
 #include <mutex>
+#include <optional>
 #include <nlohmann/json.hpp>
 #include <system_error>
 #include <utility>
@@ -106,6 +107,20 @@ void refuse_what_would_stay(const Recording& recording, const FrameSets& sets,
       if (!is_replaced) refuse(file);
     }
   }
+}
+
+std::string table_of_times(const Recording& recording, const FrameSets& sets) {
+  std::string table = "frame";
+  for (const RecordedCamera& camera : recording.cameras()) table += "," + camera.name;
+  for (const FrameSet& set : sets.sets) {
+    table += "\n" + six_digits(set.number);
+    for (std::size_t c = 0; c < recording.cameras().size(); ++c) {
+      const auto row = set.rows[c];
+      const std::int64_t time = row ? recording.timestamp_ns(*row, c) : kUnknownTime;
+      table += "," + (time == kUnknownTime ? std::string() : std::to_string(time));
+    }
+  }
+  return table + "\n";
 }
 
 }  // namespace
@@ -221,6 +236,11 @@ PackReport unpack_recording(const Recording& recording, const FrameSets& sets, c
                             const Progress& progress) {
   refuse_as_output("--frames", recording.folder(), out);
   refuse_what_would_stay(recording, sets, out);
+  // Fewer frames, without their times, would be a sequence like any other: a new folder appears whole.
+  std::optional<ReplacingFolder> making;
+  if (!fs::exists(out)) making.emplace(out);
+  const fs::path folder = making ? making->path() : out;
+  fs::create_directories(folder);
   PackReport report;
   report.frames = sets.sets.size();
   for (const RecordedCamera& camera : recording.cameras()) report.cameras.push_back(camera.name);
@@ -230,12 +250,12 @@ PackReport unpack_recording(const Recording& recording, const FrameSets& sets, c
   const std::size_t cameras = recording.cameras().size();
   parallel_for(sets.sets.size(), [&](std::size_t k) {
     const std::string name = six_digits(sets.sets[k].number);
-    fs::create_directories(out / name);
+    fs::create_directories(folder / name);
     for (std::size_t c = 0; c < cameras; ++c) {
       const auto row = sets.sets[k].rows[c];
       const cv::Mat image = row ? recording.read(*row, c) : cv::Mat();
       if (image.empty()) continue;
-      write_image(out / name / (recording.cameras()[c].name + ".png"), image,
+      write_image(folder / name / (recording.cameras()[c].name + ".png"), image,
                   recording.cameras()[c].bit_depth);
       ++pictures;
     }
@@ -248,18 +268,8 @@ PackReport unpack_recording(const Recording& recording, const FrameSets& sets, c
   report.warnings = left_out_warnings(recording, sets);
   for (std::string& warning : lost_warnings(recording, lost_pictures(recording, sets)))
     report.warnings.push_back(std::move(warning));
-  if (!has_times(recording, sets)) return report;
-  std::string table = "frame";
-  for (const RecordedCamera& camera : recording.cameras()) table += "," + camera.name;
-  for (const FrameSet& set : sets.sets) {
-    table += "\n" + six_digits(set.number);
-    for (std::size_t c = 0; c < cameras; ++c) {
-      const auto row = set.rows[c];
-      const std::int64_t time = row ? recording.timestamp_ns(*row, c) : kUnknownTime;
-      table += "," + (time == kUnknownTime ? std::string() : std::to_string(time));
-    }
-  }
-  write_text(out / kTimesFile, table + "\n");
+  if (has_times(recording, sets)) write_text(folder / kTimesFile, table_of_times(recording, sets));
+  if (making) making->publish();
   return report;
 }
 

@@ -220,6 +220,18 @@ TEST_F(Pack, PicturesThatWouldStayAmongUnpackedOnesAreNamed) {
               HasSubstr("timestamps.csv: must not stay"));
 }
 
+TEST_F(Pack, ANewFolderOfFramesAppearsWhole) {
+  put("000000/cam0.png", CV_8UC1, 3);
+  put("000001/cam0.png", CV_8UC1, 4);
+  pack_recording(frames(), packed());
+  const Recording recording = Recording::open(packed());
+  const FrameSets sets = group_frames(recording);
+  write_text(recording.picture_file(1, 0), "no picture");
+  const fs::path out = temporary_.path() / "out";
+  EXPECT_NE(error_of([&] { unpack_recording(recording, sets, out); }), "");
+  EXPECT_FALSE(fs::exists(out));
+}
+
 TEST_F(Pack, NothingIsUnpackedIntoTheRecording) {
   put("000000/cam0.png", CV_8UC1, 3);
   pack_recording(frames(), packed());
