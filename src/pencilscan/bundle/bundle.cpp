@@ -18,18 +18,30 @@ namespace pencilscan {
 namespace {
 
 /// (p - p0) / sigma per inner parameter, fy's on fy / fx.
-struct PriorCost {
-  std::array<double, kIntrinsics> value;
-  std::array<double, kIntrinsics> weight;  ///< 1 / sigma; 0 for none
+class PriorCost final : public ceres::SizedCostFunction<kIntrinsics, kIntrinsics> {
+ public:
+  using Values = std::array<double, kIntrinsics>;
+  /// weight: 1 / sigma; 0 for none.
+  PriorCost(const Values& value, const Values& weight) : value_(value), weight_(weight) {}
 
-  template <typename T>
-  bool operator()(const T* inner, T* residual) const {
-    for (std::size_t i = 0; i < kIntrinsics; ++i) {
-      const T p = i == kFy ? inner[kFy] / inner[kFx] : inner[i];
-      residual[i] = (p - T(value[i])) * T(weight[i]);
-    }
+  bool Evaluate(const double* const* parameters, double* residual,
+                double** jacobians) const override {
+    const double* inner = parameters[0];
+    for (std::size_t i = 0; i < kIntrinsics; ++i)
+      residual[i] = ((i == kFy ? inner[kFy] / inner[kFx] : inner[i]) - value_[i]) * weight_[i];
+    if (jacobians == nullptr || jacobians[0] == nullptr) return true;
+    Eigen::Map<Eigen::Matrix<double, kIntrinsics, kIntrinsics, Eigen::RowMajor>> by(jacobians[0]);
+    by.setZero();
+    for (std::size_t i = 0; i < kIntrinsics; ++i)
+      by(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(i)) = weight_[i];
+    by(kFy, kFy) = weight_[kFy] / inner[kFx];
+    by(kFy, kFx) = -weight_[kFy] * inner[kFy] / (inner[kFx] * inner[kFx]);
     return true;
   }
+
+ private:
+  Values value_;
+  Values weight_;
 };
 
 double prior_weight(double sigma) { return sigma > 0 && std::isfinite(sigma) ? 1 / sigma : 0; }
@@ -66,12 +78,10 @@ class ProblemBuilder {
   }
 
   void add_boards() {
-    using Cost = ceres::AutoDiffCostFunction<BoardCost, 2, 6, kIntrinsics, 6>;
     for (const BoardView& seen : from_.board_views) {
       BundleDevice& device = from_.devices[seen.view.device];
       if (!device.present) continue;
-      auto* cost = new Cost(
-          new BoardCost{{seen.view.pixel, sigma(seen.view), device.held}, seen.position_mm});
+      auto* cost = new BoardCost(seen.view.pixel, sigma(seen.view), device.held, seen.position_mm);
       add(cost, loss_.get(), seen.view.device, from_.board_poses[seen.board].data());
       ordering_->AddElementToGroup(from_.board_poses[seen.board].data(), 1);
     }
@@ -152,25 +162,22 @@ class ProblemBuilder {
   }
 
   void add_track(std::size_t t) {
-    using Cost = ceres::AutoDiffCostFunction<ReprojectionCost, 2, 6, kIntrinsics, 3>;
     for (const TrackView& view : from_.tracks[t].views) {
       const BundleDevice& device = from_.devices[view.device];
       if (!device.present) continue;
       const bool is_hub = &view == from_.tracks[t].views.data();
       const double deviation = is_hub ? view.sigma_px : sigma(view);
       // The hub's pixel is no measurement but the place where the others were taken.
-      add(new Cost(new ReprojectionCost{view.pixel, deviation, device.held}),
+      add(new ReprojectionCost(view.pixel, deviation, device.held),
           is_hub ? nullptr : track_loss_.get(), view.device, from_.points[t].data());
     }
     ordering_->AddElementToGroup(from_.points[t].data(), 0);
   }
 
   void add_prior(BundleDevice& device) {
-    using Cost = ceres::AutoDiffCostFunction<PriorCost, kIntrinsics, kIntrinsics>;
-    auto* prior = new PriorCost{device.prior, {}};
-    for (std::size_t i = 0; i < kIntrinsics; ++i)
-      prior->weight[i] = prior_weight(device.prior_sigma[i]);
-    problem_->AddResidualBlock(new Cost(prior), nullptr, device.inner.data());
+    PriorCost::Values weight{};
+    for (std::size_t i = 0; i < kIntrinsics; ++i) weight[i] = prior_weight(device.prior_sigma[i]);
+    problem_->AddResidualBlock(new PriorCost(device.prior, weight), nullptr, device.inner.data());
   }
 
   BundleProblem& from_;
@@ -215,17 +222,14 @@ std::size_t present_devices(const BundleProblem& problem) {
 
 std::optional<Vec2> view_error(const BundleDevice& device, const Vec3& point,
                                const TrackView& view) {
-  Vec2 pixel;
-  if (!project_point(device.pose.data(), device.inner.data(), device.held, point.data(),
-                     pixel.data()))
-    return std::nullopt;
-  return pixel - view.pixel;
+  const auto pixel = shown_pixel(device.pose.data(), device.inner.data(), device.held, point);
+  if (!pixel) return std::nullopt;
+  return *pixel - view.pixel;
 }
 
 ViewLinearization linearize(const BundleDevice& device, const Vec3& point, const TrackView& view,
                             double extra_sigma_px) {
-  const ceres::AutoDiffCostFunction<ReprojectionCost, 2, 6, kIntrinsics, 3> cost(
-      new ReprojectionCost{view.pixel, std::hypot(view.sigma_px, extra_sigma_px), device.held});
+  const ReprojectionCost cost(view.pixel, std::hypot(view.sigma_px, extra_sigma_px), device.held);
   ViewLinearization result;
   const std::array<const double*, 3> parameters{device.pose.data(), device.inner.data(),
                                                 point.data()};

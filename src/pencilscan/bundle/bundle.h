@@ -73,7 +73,7 @@ void for_each_residual(const BundleProblem& problem, Visit visit) {
 [[nodiscard]] std::size_t present_devices(const BundleProblem& problem);
 
 /// Residual and its derivatives of one view, whitened: d / d pose (2 x 6), inner (2 x 9) and point
-/// (2 x 3), by automatic differentiation of the same code that adjust() uses.
+/// (2 x 3), of the cost that adjust() uses (reprojection.h).
 struct ViewLinearization {
   Vec2 residual = Vec2::Zero();
   Eigen::Matrix<double, 2, 6, Eigen::RowMajor> pose;

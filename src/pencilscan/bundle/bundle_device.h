@@ -40,12 +40,11 @@ void set_device(const BundleDevice& from, Device& device);
 /// device_from_world.
 void set_pose(BundleDevice& device, const Mat3& rotation, const Vec3& translation);
 
-/// The lens of inner parameters and a denominator; T is double or a Ceres jet.
-template <typename T>
-[[nodiscard]] std::array<T, Distortion::kCoefficients> lens_coefficients(
-    const T* inner, const std::array<double, 3>& denominator) {
-  return {inner[kK1], inner[kK2],        inner[kP1],        inner[kP2],
-          inner[kK3], T(denominator[0]), T(denominator[1]), T(denominator[2])};
+/// The lens of inner parameters and a denominator.
+[[nodiscard]] inline std::array<double, Distortion::kCoefficients> lens_coefficients(
+    const double* inner, const std::array<double, 3>& denominator) {
+  return {inner[kK1], inner[kK2],     inner[kP1],     inner[kP2],
+          inner[kK3], denominator[0], denominator[1], denominator[2]};
 }
 
 [[nodiscard]] Mat3 K_of(const BundleDevice& device);

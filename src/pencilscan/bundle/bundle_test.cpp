@@ -4,7 +4,9 @@
 
 #include <cmath>
 #include <limits>
+#include <utility>
 
+#include "pencilscan/bundle/reprojection.h"
 #include "pencilscan/bundle/sample_tracks.h"
 #include "pencilscan/bundle/triangulation.h"
 #include "pencilscan/bundle/uncertainty.h"
@@ -42,6 +44,56 @@ TEST(Reprojection, JacobianMatchesFiniteDifferences) {
     if (i < 6) analytic = at.pose.col(i);
     if (i >= 6 && i < 15) analytic = at.inner.col(i - 6);
     EXPECT_LT((numeric - analytic).norm(), kTolerance * (1 + analytic.norm())) << i;
+  }
+}
+
+/// Largest deviation of the derivatives of a cost from central differences, relative to their size.
+double derivative_error(const ceres::CostFunction& cost,
+                        std::vector<std::vector<double>> parameters) {
+  const auto evaluate = [&](double** jacobians) {
+    std::vector<const double*> at;
+    for (const auto& block : parameters) at.push_back(block.data());
+    Vec2 residual;
+    EXPECT_TRUE(cost.Evaluate(at.data(), residual.data(), jacobians));
+    return residual;
+  };
+  std::vector<std::vector<double>> rows;
+  std::vector<double*> jacobians;
+  for (const auto& block : parameters) rows.emplace_back(2 * block.size());
+  for (auto& block : rows) jacobians.push_back(block.data());
+  evaluate(jacobians.data());
+  double worst = 0;
+  for (std::size_t b = 0; b < parameters.size(); ++b) {
+    for (std::size_t i = 0; i < parameters[b].size(); ++i) {
+      const double step = 1e-6 * std::max(1.0, std::abs(parameters[b][i]));
+      const auto moved = [&](double by) {
+        const double value = std::exchange(parameters[b][i], parameters[b][i] + by);
+        const Vec2 residual = evaluate(nullptr);
+        parameters[b][i] = value;
+        return residual;
+      };
+      const Vec2 numeric = (moved(step) - moved(-step)) / (2 * step);
+      const Vec2 exact(rows[b][i], rows[b][parameters[b].size() + i]);
+      worst = std::max(worst, (numeric - exact).norm() / (1 + exact.norm()));
+    }
+  }
+  return worst;
+}
+
+TEST(Reprojection, DerivativesAreExactForAnyTurnAndLens) {
+  const HeldInner held{{0.03, -0.02, 0.01}, 4.0};
+  const std::vector<double> inner{900, 910, 320, 240, -0.2, 0.05, 0.01, -0.02, 0.03};
+  for (const double angle : {0.0, 1e-9, 1e-4, 0.5, 3.1}) {
+    const Vec3 axis = angle * Vec3(0.1, -0.2, 0.9).normalized();
+    const std::vector<double> pose{axis.x(), axis.y(), axis.z(), 20, -10, 800};
+    const std::vector<double> board{0.3 - angle, 0.1, -0.2, 5, 6, -30};
+    EXPECT_LT(
+        derivative_error(ReprojectionCost({300, 200}, 0.5, held), {pose, inner, {40, -60, 30}}),
+        1e-5)
+        << angle;
+    EXPECT_LT(derivative_error(BoardCost({300, 200}, 0.5, held, {70, -40}), {pose, inner, board}),
+              1e-5)
+        << angle;
   }
 }
 

@@ -1,56 +1,66 @@
 #pragma once
 
-#include <ceres/rotation.h>
+#include <ceres/sized_cost_function.h>
 
-#include "pencilscan/bundle/bundle.h"
+#include <optional>
+
+#include "pencilscan/bundle/bundle_device.h"
 
 namespace pencilscan {
 
-/// Pixel of a point in world; T is double or a Ceres jet. False at or behind the pinhole, where
-/// there is no sensible pixel.
-template <typename T>
-bool project_point(const T* pose, const T* inner, const HeldInner& held, const T* point, T* pixel) {
-  T x[3];
-  ceres::AngleAxisRotatePoint(pose, point, x);
-  for (int i = 0; i < 3; ++i) x[i] += pose[3 + i];
-  if (!(x[2] > T(1e-6))) return false;
-  const auto k = lens_coefficients(inner, held.denominator);
-  T shown[2];
-  distort_coordinates(k.data(), T(x[0] / x[2]), T(x[1] / x[2]), shown);
-  pixel[0] = inner[kFx] * shown[0] + T(held.skew) * shown[1] + inner[kCx];
-  pixel[1] = inner[kFy] * shown[1] + inner[kCy];
-  return true;
-}
+/// A point that a pose (angle-axis, then translation) moves, and how it changes with the pose and
+/// with the point that is moved.
+struct MovedPoint {
+  Vec3 point;
+  Eigen::Matrix<double, 3, 6> by_pose;
+  Mat3 by_point;
+};
+[[nodiscard]] MovedPoint moved_point(const double* pose, const Vec3& point);
 
-/// (pi(X) - u) / sigma.
-struct ReprojectionCost {
+/// Where a device shows a point, px. Nothing at or behind the pinhole, where there is no sensible
+/// pixel.
+[[nodiscard]] std::optional<Vec2> shown_pixel(const double* pose, const double* inner,
+                                              const HeldInner& held, const Vec3& point);
+
+/// The same, and how it changes with the pose, with the inner parameters and with the point.
+struct ShownPoint {
   Vec2 pixel;
-  double sigma;
-  HeldInner held;  ///< of the device
-
-  template <typename T>
-  bool operator()(const T* pose, const T* inner, const T* point, T* residual) const {
-    T projected[2];
-    if (!project_point(pose, inner, held, point, projected)) return false;
-    residual[0] = (projected[0] - T(pixel.x())) / T(sigma);
-    residual[1] = (projected[1] - T(pixel.y())) / T(sigma);
-    return true;
-  }
+  Eigen::Matrix<double, 2, 6, Eigen::RowMajor> by_pose;
+  Eigen::Matrix<double, 2, kIntrinsics, Eigen::RowMajor> by_inner;
+  Eigen::Matrix<double, 2, 3, Eigen::RowMajor> by_point;
 };
 
-/// The same for a point of a board.
-struct BoardCost {
-  ReprojectionCost reprojection;
-  Vec2 position;
+[[nodiscard]] std::optional<ShownPoint> shown_point(const double* pose, const double* inner,
+                                                    const HeldInner& held, const Vec3& point);
 
-  template <typename T>
-  bool operator()(const T* pose, const T* inner, const T* board, T* residual) const {
-    const T on_board[3] = {T(position.x()), T(position.y()), T(0)};
-    T point[3];
-    ceres::AngleAxisRotatePoint(board, on_board, point);
-    for (int i = 0; i < 3; ++i) point[i] += board[3 + i];
-    return reprojection(pose, inner, point, residual);
-  }
+/// (pi(X) - u) / sigma over pose, inner parameters and point.
+class ReprojectionCost final : public ceres::SizedCostFunction<2, 6, kIntrinsics, 3> {
+ public:
+  /// sigma: px. held: of the device.
+  ReprojectionCost(const Vec2& pixel, double sigma, const HeldInner& held)
+      : pixel_(pixel), sigma_(sigma), held_(held) {}
+  bool Evaluate(const double* const* parameters, double* residual,
+                double** jacobians) const override;
+
+ private:
+  Vec2 pixel_;
+  double sigma_;
+  HeldInner held_;
+};
+
+/// The same for a point of a board, over pose, inner parameters and the board's pose.
+class BoardCost final : public ceres::SizedCostFunction<2, 6, kIntrinsics, 6> {
+ public:
+  BoardCost(const Vec2& pixel, double sigma, const HeldInner& held, const Vec2& position)
+      : pixel_(pixel), sigma_(sigma), held_(held), position_(position) {}
+  bool Evaluate(const double* const* parameters, double* residual,
+                double** jacobians) const override;
+
+ private:
+  Vec2 pixel_;
+  double sigma_;
+  HeldInner held_;
+  Vec2 position_;  ///< on the board
 };
 
 }  // namespace pencilscan

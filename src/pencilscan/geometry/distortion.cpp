@@ -3,9 +3,14 @@
 namespace pencilscan {
 
 Vec2 distort(const Distortion& distortion, const Vec2& normalized) {
-  Vec2 shown;
-  distort_coordinates(distortion.k.data(), normalized.x(), normalized.y(), shown.data());
-  return shown;
+  const auto [k1, k2, p1, p2, k3, k4, k5, k6] = distortion.k;
+  const double x = normalized.x();
+  const double y = normalized.y();
+  const double r2 = x * x + y * y;
+  const double radial =
+      (1 + r2 * (k1 + r2 * (k2 + r2 * k3))) / (1 + r2 * (k4 + r2 * (k5 + r2 * k6)));
+  return {x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x),
+          y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y};
 }
 
 Eigen::Matrix2d distortion_slope(const Distortion& distortion, const Vec2& normalized) {
@@ -24,6 +29,24 @@ Eigen::Matrix2d distortion_slope(const Distortion& distortion, const Vec2& norma
   slope(0, 1) = slope(1, 0) = 2 * x * y * radial_slope + 2 * p1 * x + 2 * p2 * y;
   slope(1, 1) = radial + 2 * y * y * radial_slope + 6 * p1 * y + 2 * p2 * x;
   return slope;
+}
+
+Eigen::Matrix<double, 2, Distortion::kBrown> distortion_by_brown(const Distortion& distortion,
+                                                                 const Vec2& normalized) {
+  using D = Distortion;
+  const double x = normalized.x();
+  const double y = normalized.y();
+  const double r2 = x * x + y * y;
+  const double below =
+      1 + r2 * (distortion[D::kK4] + r2 * (distortion[D::kK5] + r2 * distortion[D::kK6]));
+  const Vec2 radial = normalized * (r2 / below);
+  Eigen::Matrix<double, 2, D::kBrown> by;
+  by.col(D::kK1) = radial;
+  by.col(D::kK2) = radial * r2;
+  by.col(D::kK3) = radial * (r2 * r2);
+  by.col(D::kP1) = Vec2(2 * x * y, r2 + 2 * y * y);
+  by.col(D::kP2) = Vec2(r2 + 2 * x * x, 2 * x * y);
+  return by;
 }
 
 Vec2 undistort(const Distortion& distortion, const Vec2& distorted) {

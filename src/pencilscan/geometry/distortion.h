@@ -8,11 +8,6 @@
 
 namespace pencilscan {
 
-/// distort() below for numbers and for Ceres' jets: normalised coordinates (x, y) as the lens shows
-/// them, in `shown[0]` and `shown[1]`. `k`: kCoefficients of Distortion, in its order.
-template <typename T>
-void distort_coordinates(const T* k, const T& x, const T& y, T* shown);
-
 /// Lens distortion by OpenCV's rational model ("Camera Calibration and 3D Reconstruction"), on
 /// normalised coordinates (x, y), r^2 = x^2 + y^2:
 /// x' = x (1 + k1 r^2 + k2 r^4 + k3 r^6) / (1 + k4 r^2 + k5 r^4 + k6 r^6)
@@ -43,17 +38,11 @@ struct Distortion {
 [[nodiscard]] Eigen::Matrix2d distortion_slope(const Distortion& distortion,
                                                const Vec2& normalized);
 
+/// Derivative of distort() by the coefficients before the denominator's.
+[[nodiscard]] Eigen::Matrix<double, 2, Distortion::kBrown> distortion_by_brown(
+    const Distortion& distortion, const Vec2& normalized);
+
 /// Inverse of distort() by Newton's method, to 1e-12 in normalised units where it converges.
 [[nodiscard]] Vec2 undistort(const Distortion& distortion, const Vec2& distorted);
-
-template <typename T>
-void distort_coordinates(const T* k, const T& x, const T& y, T* shown) {
-  using D = Distortion;
-  const T r2 = x * x + y * y;
-  const T radial = (T(1) + r2 * (k[D::kK1] + r2 * (k[D::kK2] + r2 * k[D::kK3]))) /
-                   (T(1) + r2 * (k[D::kK4] + r2 * (k[D::kK5] + r2 * k[D::kK6])));
-  shown[0] = x * radial + T(2) * k[D::kP1] * x * y + k[D::kP2] * (r2 + T(2) * x * x);
-  shown[1] = y * radial + k[D::kP1] * (r2 + T(2) * y * y) + T(2) * k[D::kP2] * x * y;
-}
 
 }  // namespace pencilscan
