@@ -172,6 +172,36 @@ TEST(GrayStack, ValuesOfASensorFillItsRange) {
   }
 }
 
+TEST(GrayStack, WithoutInversesPatternsAreComparedAsLight) {
+  const TemporaryFolder folder("gray_gamma");
+  Rig rig;
+  rig.cameras.emplace_back();
+  rig.cameras[0].name = "cam0";
+  rig.cameras[0].width = rig.cameras[0].height = kSize;
+  rig.cameras[0].gamma = 2.2;
+  rig.projectors.emplace_back();
+  rig.projectors[0].name = "proj0";
+  rig.projectors[0].width = kPanelWidth;
+  rig.projectors[0].height = kPanelHeight;
+  const Scene light{.noise = 0, .inverses = false, .rounded = false};
+  Scene stored = light;
+  stored.gamma = 2.2;
+  const std::size_t count = gray_code_sequence(kPanelWidth, kPanelHeight, false).size();
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::string number = std::to_string(1000 + i).substr(1) + ".png";
+    write_image(folder.path() / "proj0/cam0" / number, images_of(stored)(i), 16);
+  }
+  const auto pairs = list_captures(folder.path(), rig);
+  ASSERT_EQ(pairs.size(), 1U);
+  const GrayStack stack = read_gray_stack(pairs[0], rig);
+  const GrayStack expected = make_gray_stack(kPanelWidth, kPanelHeight, false, images_of(light));
+  for (std::size_t axis = 0; axis < 2; ++axis)
+    for (std::size_t bit = 0; bit < stack.difference[axis].size(); ++bit)
+      EXPECT_LT(cv::norm(stack.difference[axis][bit], expected.difference[axis][bit], cv::NORM_INF),
+                1e-3)
+          << axis << " " << bit;
+}
+
 TEST(GrayDecode, UnlitPixelsSayWhy) {
   const DecodedView view = decoded({});
   EXPECT_EQ(static_cast<PixelState>(view.state(1, 1)), PixelState::kUnlit);
@@ -318,6 +348,30 @@ TEST(ImageOrder, WrongOrdersAreNamed) {
               testing::HasSubstr("one before"));
   EXPECT_THAT(explanation([&](std::size_t i) { return right(i < 2 ? 1 : i - 2); }),
               testing::HasSubstr("two before"));
+}
+
+TEST(ImageOrder, WrongOrdersWithoutInversesAreNamed) {
+  // An odd number of pictures: none has a file to change places with.
+  const std::size_t count = gray_code_sequence(kPanelWidth, kPanelHeight, false).size();
+  ASSERT_EQ(count % 2, 1U);
+  const GrayImageSource right = images_of({.inverses = false});
+  const auto explanation = [&](const auto& file) {
+    const GrayImageSource source = [&](std::size_t i) {
+      EXPECT_LT(file(i), count);
+      return right(file(i));
+    };
+    const DecodedView view =
+        decode_gray_stack(make_gray_stack(kPanelWidth, kPanelHeight, false, source));
+    const GrayImageSource checked = [&](std::size_t i) {
+      EXPECT_LT(i, count);
+      return source(std::min(i, count - 1));
+    };
+    return explain_wrong_order(kPanelWidth, kPanelHeight, false, checked, view);
+  };
+  EXPECT_EQ(explanation([&](std::size_t i) { return count - 1 - i; }),
+            "the files are in reverse order");
+  EXPECT_EQ(explanation([](std::size_t i) { return i < 2 ? 1 - i : i; }),
+            "black comes before white");
 }
 
 /// A panel of 8 column bits and 7 row bits: pictures 2 to 17 and 18 to 31.

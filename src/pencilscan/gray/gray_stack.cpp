@@ -167,7 +167,11 @@ std::vector<CapturePair> list_captures(const fs::path& captures, const Rig& rig)
 }
 
 cv::Mat read_gray_image(const CapturePair& pair, const Rig& rig, std::size_t image) {
-  const cv::Mat color = read_color_image(pair, pair.files[image], rig.cameras[pair.camera]);
+  const Camera& camera = rig.cameras[pair.camera];
+  cv::Mat color = read_color_image(pair, pair.files[image], camera);
+  // A pattern and its inverse are equally bright at an edge whatever the gamma; that a pattern
+  // alone is halfway between black and white there is true of light only.
+  if (!pair.inverses) color = linearized(color, camera.gamma);
   cv::Mat grey;
   cv::transform(color, grey, cv::Matx13f(1.F / 3, 1.F / 3, 1.F / 3));
   return grey;

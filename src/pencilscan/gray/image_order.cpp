@@ -52,7 +52,9 @@ constexpr std::array<WrongOrder, 8> kWrongOrders{{
     {"black comes before white",
      [](std::size_t i, std::size_t, std::size_t, std::size_t) { return i < 2 ? 1 - i : i; }},
     {"black comes before white and each inverse before its pattern",
-     [](std::size_t i, std::size_t, std::size_t, std::size_t) { return i ^ 1U; }},
+     [](std::size_t i, std::size_t, std::size_t, std::size_t step) {
+       return i < 2 ? 1 - i : step == 2 ? swap_pair(i) : i;
+     }},
     {"the files are in reverse order",
      [](std::size_t i, std::size_t count, std::size_t, std::size_t) { return count - 1 - i; }},
     {"each picture shows what was projected one before: the camera or the projector is late",

@@ -141,7 +141,8 @@ double smooth_share(const DecodedView& view, int step_px, const LocalMapOptions&
 
 std::optional<LocalMap> LocalMap::fit(const DecodedView& view, int u, int v,
                                       const LocalMapOptions& options) {
-  if (!view.valid(u, v)) return std::nullopt;
+  if (u < 0 || v < 0 || u >= view.state.cols || v >= view.state.rows || !view.valid(u, v))
+    return std::nullopt;
   LocalMap map;
   map.center_ = Vec2(u, v);
   for (std::size_t axis = 0; axis < 2; ++axis) {

@@ -24,8 +24,8 @@ struct LocalMapOptions {
 /// smooth surface passes within a few hundredths of a pixel.
 class LocalMap {
  public:
-  /// Nothing when the pixel has no code, the crossings are too few or one-sided, or no smooth
-  /// surface explains them (a depth edge).
+  /// Nothing when the pixel has no code or lies outside of the picture, the crossings are too few
+  /// or one-sided, or no smooth surface explains them (a depth edge).
   [[nodiscard]] static std::optional<LocalMap> fit(const DecodedView& view, int u, int v,
                                                    const LocalMapOptions& options = {});
 
