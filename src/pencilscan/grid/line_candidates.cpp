@@ -36,9 +36,10 @@ std::vector<LineCandidate> line_candidates(const Rig& rig, const Camera& camera,
   const auto axis = static_cast<Eigen::Index>(pattern.axis);
   const double a = pattern.coordinate((*near)[axis]);
   const double b = pattern.coordinate((*far)[axis]);
-  const int first = std::max(0, static_cast<int>(std::ceil(std::min(a, b))));
-  const int last =
-      std::min(projector.line_count(pattern) - 1, static_cast<int>(std::floor(std::max(a, b))));
+  // Near the projector's horizon they are beyond any int: cut before they become one.
+  const double count = projector.line_count(pattern);
+  const int first = static_cast<int>(std::clamp(std::ceil(std::min(a, b)), 0.0, count));
+  const int last = static_cast<int>(std::clamp(std::floor(std::max(a, b)), -1.0, count - 1));
   for (int line = first; line <= last; ++line) {
     const auto depth = ray.depth(pattern.position_px(line), pattern.axis);
     if (!depth || *depth < range.near || *depth > range.far) continue;

@@ -65,6 +65,8 @@ cv::Mat decoded_picture(std::string_view bytes, int flags) {
   } catch (const cv::Exception&) {
     return {};
   }
+  // What is damaged behind its header decodes to nothing, of three channels all the same.
+  if (picture.empty()) return {};
   // Of other depths OpenCV changes no colours.
   if (picture.depth() != CV_8U && picture.depth() != CV_16U && picture.depth() != CV_32F)
     return picture;

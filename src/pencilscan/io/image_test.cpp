@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <fstream>
 #include <numbers>
 #include <opencv2/core.hpp>
 
@@ -63,6 +64,19 @@ TEST_F(Io, FloatTiffRoundTripIsExactAndGreyIsReplicated) {
   cv::Mat channel;
   cv::extractChannel(back, channel, 2);
   EXPECT_EQ(max_difference(channel, grey), 0);
+}
+
+TEST_F(Io, AnImageThatIsDamagedBehindItsHeaderIsRejectedByItsName) {
+  cv::Mat noise(200, 300, CV_8UC3);
+  cv::randu(noise, 0, 255);
+  write_image(folder_ / "n.png", noise);
+  const auto size = static_cast<std::streamoff>(fs::file_size(folder_ / "n.png"));
+  std::fstream file(folder_ / "n.png", std::ios::binary | std::ios::in | std::ios::out);
+  file.seekp(size / 2);
+  file << std::string(2000, '\0');
+  file.close();
+  EXPECT_THAT(error_of([&] { return read_image(folder_ / "n.png"); }),
+              ::testing::HasSubstr("n.png"));
 }
 
 TEST_F(Io, TruncatedImagesAreRejectedAtEveryLength) {

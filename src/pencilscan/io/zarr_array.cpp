@@ -93,7 +93,9 @@ ZarrType type_of(const fs::path& file, const json& object) {
 double fill_of(const json& value) {
   if (value.is_number()) return value.get<double>();
   if (value.is_boolean()) return value.get<bool>() ? 1 : 0;
-  return value == "NaN" ? std::numeric_limits<double>::quiet_NaN() : 0;
+  if (value == "NaN") return std::numeric_limits<double>::quiet_NaN();
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  return value == "Infinity" ? kInfinity : value == "-Infinity" ? -kInfinity : 0;
 }
 
 /// True for a number that becomes an element without leaving the type's range.
@@ -108,7 +110,7 @@ bool holds(ZarrType type, double value) {
     case ZarrType::kInt64:
       return std::abs(value) <= 9e18;
     case ZarrType::kFloat32:
-      return !(std::abs(value) > std::numeric_limits<float>::max());
+      return std::isinf(value) || !(std::abs(value) > std::numeric_limits<float>::max());
   }
   return false;
 }

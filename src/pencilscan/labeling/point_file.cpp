@@ -6,6 +6,7 @@
 #include <string>
 
 #include "pencilscan/core/error.h"
+#include "pencilscan/core/formatted.h"
 #include "pencilscan/io/curve_file.h"
 #include "pencilscan/io/file.h"
 #include "pencilscan/io/little_endian.h"
@@ -79,6 +80,16 @@ class Columns {
     }
     return static_cast<float>(values[i]);
   }
+  /// Of a number of 0 to `most`.
+  [[nodiscard]] float within(const char* name, const std::vector<double>& values, std::size_t i,
+                             double most) const {
+    if (!(values[i] >= 0 && values[i] <= most)) {
+      throw InputError(path_, field(name, i), std::to_string(values[i]),
+                       std::isfinite(most) ? "must be from 0 to " + formatted(most)
+                                           : std::string("must be at least 0"));
+    }
+    return static_cast<float>(values[i]);
+  }
 
  private:
   static std::string field(const char* name, std::size_t i) {
@@ -138,6 +149,7 @@ std::vector<MeasuredPoint> read_points(const std::filesystem::path& path) {
   const auto* sigma = columns.optional("sigma");
   const auto* confidence = columns.optional("confidence");
   const auto* plane = columns.optional("plane");
+  constexpr double kAnySize = std::numeric_limits<double>::infinity();
   std::vector<MeasuredPoint> points(vertices->count);
   for (std::size_t i = 0; i < points.size(); ++i) {
     MeasuredPoint& point = points[i];
@@ -150,8 +162,8 @@ std::vector<MeasuredPoint> read_points(const std::filesystem::path& path) {
     point.projector = columns.index<std::uint8_t>("projector", projector, i);
     point.line = columns.index<std::uint16_t>("line", line, i);
     if (pattern != nullptr) point.pattern = columns.index<std::uint8_t>("pattern", *pattern, i);
-    point.sigma = sigma != nullptr ? static_cast<float>((*sigma)[i]) : 0.0F;
-    point.confidence = confidence != nullptr ? static_cast<float>((*confidence)[i]) : 1.0F;
+    if (sigma != nullptr) point.sigma = columns.within("sigma", *sigma, i, kAnySize);
+    point.confidence = confidence != nullptr ? columns.within("confidence", *confidence, i, 1) : 1;
     point.plane =
         plane != nullptr ? columns.finite("plane", *plane, i) : static_cast<float>(point.line);
   }

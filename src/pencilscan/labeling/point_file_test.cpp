@@ -110,5 +110,20 @@ TEST_F(PointFile, BrokenPointFilesAreRejected) {
               ::testing::HasSubstr("y: the vertices must have this property"));
 }
 
+TEST_F(PointFile, SigmaAndConfidenceAreNumbersOfTheirRange) {
+  const std::string header =
+      "ply\nformat ascii 1.0\nelement vertex 1\n"
+      "property float x\nproperty float y\nproperty float z\nproperty float u\n"
+      "property float v\nproperty uchar camera\nproperty uchar projector\nproperty int line\n"
+      "property float sigma\nproperty float confidence\nend_header\n1 2 3 4 5 0 0 7 ";
+  EXPECT_EQ(error_of(put("right.ply", header + "0.01 1\n")), "");
+  EXPECT_THAT(error_of(put("nan.ply", header + "nan 1\n")),
+              ::testing::HasSubstr("vertex[0].sigma"));
+  EXPECT_THAT(error_of(put("below.ply", header + "-0.01 1\n")),
+              ::testing::HasSubstr("vertex[0].sigma"));
+  EXPECT_THAT(error_of(put("above.ply", header + "0.01 1.5\n")),
+              ::testing::HasSubstr("vertex[0].confidence"));
+}
+
 }  // namespace
 }  // namespace pencilscan

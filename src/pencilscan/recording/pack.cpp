@@ -2,10 +2,11 @@
 
 #include <algorithm>
 #include <atomic>
+#include <functional>
 #include <map>
 #include <mutex>
-#include <optional>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <system_error>
 #include <utility>
 
@@ -61,6 +62,23 @@ cv::Mat read_like(const RecordedCamera& camera, const fs::path& file) {
                          " as the camera's first one");
   }
   return image;
+}
+
+/// Of a camera whose time stamps do not grow from row to row: digits or rows were changed, and its
+/// pictures would be put beside those of other moments.
+std::optional<std::string> disorder_warning(const std::string& camera,
+                                            const std::vector<std::int64_t>& times_ns,
+                                            const std::function<std::string(std::size_t)>& name) {
+  std::vector<std::string> rows;
+  std::int64_t before = kUnknownTime;
+  for (std::size_t row = 0; row < times_ns.size(); ++row) {
+    if (times_ns[row] == kUnknownTime) continue;
+    if (before != kUnknownTime && times_ns[row] <= before) rows.push_back(name(row));
+    before = times_ns[row];
+  }
+  if (rows.empty()) return std::nullopt;
+  return "time stamps of camera " + camera + " that do not come after the one before, at " +
+         counted_names(rows) + ": its pictures go to frames of other moments there";
 }
 
 /// True where unpacking writes times.
@@ -125,7 +143,7 @@ std::string table_of_times(const Recording& recording, const FrameSets& sets) {
 
 }  // namespace
 
-std::vector<std::string> left_out_warnings(const Recording& recording, const FrameSets& sets) {
+std::vector<std::string> recording_warnings(const Recording& recording, const FrameSets& sets) {
   constexpr double kLeastPeriodNs = 1e5;  // no camera takes 10,000 pictures a second of a whole rig
   std::vector<std::string> warnings;
   if (sets.period_ns > 0 && sets.period_ns < kLeastPeriodNs)
@@ -142,6 +160,11 @@ std::vector<std::string> left_out_warnings(const Recording& recording, const Fra
         " of the recording that have no picture, and are no frames: " + counted_names(names));
   }
   for (std::size_t c = 0; c < sets.clocks.size(); ++c) {
+    std::vector<std::int64_t> times;
+    for (std::size_t row = 0; row < recording.row_count(); ++row)
+      times.push_back(recording.timestamp_ns(row, c));
+    auto disorder = disorder_warning(recording.cameras()[c].name, times, six_digits);
+    if (disorder) warnings.push_back(std::move(*disorder));
     std::vector<std::string> rows;
     for (const std::size_t row : sets.clocks[c].left_out) rows.push_back(six_digits(row));
     if (rows.empty()) continue;
@@ -177,6 +200,14 @@ PackReport pack_recording(const fs::path& frames, const fs::path& out, const Pac
   if (!times_file.empty()) {
     times = read_time_table(times_file, report.cameras);
     report.warnings = unmatched_times(times_file, times, found);
+    for (const std::string& camera : report.cameras) {
+      std::vector<std::int64_t> of_camera;
+      for (const std::string& frame : found.names)
+        of_camera.push_back(time_of(times, frame, camera));
+      auto disorder =
+          disorder_warning(camera, of_camera, [&](std::size_t row) { return found.names[row]; });
+      if (disorder) report.warnings.push_back(std::move(*disorder));
+    }
   }
   if (!found.without_picture.empty())
     report.warnings.push_back(
@@ -236,7 +267,8 @@ PackReport unpack_recording(const Recording& recording, const FrameSets& sets, c
                             const Progress& progress) {
   refuse_as_output("--frames", recording.folder(), out);
   refuse_what_would_stay(recording, sets, out);
-  // Fewer frames, without their times, would be a sequence like any other: a new folder appears whole.
+  // Fewer frames, without their times, would be a sequence like any other: a new folder appears
+  // whole.
   std::optional<ReplacingFolder> making;
   if (!fs::exists(out)) making.emplace(out);
   const fs::path folder = making ? making->path() : out;
@@ -265,7 +297,7 @@ PackReport unpack_recording(const Recording& recording, const FrameSets& sets, c
   });
   report.pictures = pictures;
   report.missing = report.frames * cameras - report.pictures;
-  report.warnings = left_out_warnings(recording, sets);
+  report.warnings = recording_warnings(recording, sets);
   for (std::string& warning : lost_warnings(recording, lost_pictures(recording, sets)))
     report.warnings.push_back(std::move(warning));
   if (has_times(recording, sets)) write_text(folder / kTimesFile, table_of_times(recording, sets));

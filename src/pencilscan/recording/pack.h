@@ -44,9 +44,10 @@ PackReport unpack_recording(const Recording& recording, const FrameSets& sets,
                             const std::filesystem::path& out, const Progress& progress = {});
 
 /// Says which rows or moments are no frames (FrameSets::no_frame), and which pictures are in no
-/// frame, a sentence a camera (CameraClock::left_out); and that time stamps are in another unit.
-[[nodiscard]] std::vector<std::string> left_out_warnings(const Recording& recording,
-                                                         const FrameSets& sets);
+/// frame, a sentence a camera (CameraClock::left_out); that time stamps are in another unit, and
+/// where they do not grow.
+[[nodiscard]] std::vector<std::string> recording_warnings(const Recording& recording,
+                                                          const FrameSets& sets);
 
 /// Per camera the numbers of the sets whose picture of it was lost: it was recorded, and its file
 /// is no longer there.

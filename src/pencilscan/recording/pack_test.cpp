@@ -314,7 +314,7 @@ TEST_F(Pack, TimesInAnotherUnitAreNamed) {
     options.overwrite = true;
     pack_recording(frames(), packed(), options);
     const Recording recording = Recording::open(packed());
-    const auto warnings = left_out_warnings(recording, group_frames(recording));
+    const auto warnings = recording_warnings(recording, group_frames(recording));
     EXPECT_EQ(is_named ? 1U : 0U, warnings.size()) << step;
     for (const std::string& warning : warnings)
       EXPECT_THAT(warning, HasSubstr("they must be nanoseconds"));
@@ -322,6 +322,21 @@ TEST_F(Pack, TimesInAnotherUnitAreNamed) {
   write_text(frames() / "timestamps.csv", "frame,cam0\n000000,1,2\n");
   EXPECT_THAT(error_of([&] { pack_recording(frames(), packed() / "more"); }),
               HasSubstr("no more cells than line 1: 2"));
+}
+
+TEST_F(Pack, TimesThatDoNotGrowAreNamed) {
+  std::string table = "frame,cam0\n";
+  for (std::size_t k = 0; k < 6; ++k) {
+    put(six_digits(k) + "/cam0.png", CV_8UC1, 1);
+    // Of the fourth a digit was lost.
+    table += six_digits(k) + "," + std::to_string(k == 3 ? 12'000'000 : k * 40'000'000) + "\n";
+  }
+  write_text(frames() / "timestamps.csv", table);
+  const auto names_it =
+      ElementsAre(HasSubstr("camera cam0 that do not come after the one before, at 1 (000003)"));
+  EXPECT_THAT(pack_recording(frames(), packed()).warnings, names_it);
+  const Recording recording = Recording::open(packed());
+  EXPECT_THAT(recording_warnings(recording, group_frames(recording)), names_it);
 }
 
 TEST_F(Pack, ProgressEndsAtTheEnd) {

@@ -209,7 +209,9 @@ Silhouette silhouette(int camera, const cv::Mat& image, double reach_px) {
   for (int v = 0; v < image.rows; ++v) {
     for (int u = 0; u < image.cols; ++u) {
       const auto& rgb = image.at<cv::Vec3f>(v, u);
-      const float value = std::isfinite(rgb[0]) ? std::max({rgb[0], rgb[1], rgb[2]}) : 1.F;
+      // Of whatever channel is no number, the sum is none either.
+      const bool is_light = std::isfinite(rgb[0] + rgb[1] + rgb[2]);
+      const float value = is_light ? std::max({rgb[0], rgb[1], rgb[2]}) : 1.F;
       brightest.at<float>(v, u) = value;
       if (v % 4 == 0 && u % 4 == 0) values.push_back(value);
     }
