@@ -9,14 +9,16 @@ namespace {
 constexpr std::int64_t kBlockNs = 500'000'000;  ///< some pictures each
 constexpr std::size_t kBlocks = 120;            ///< a minute: temperature moves a crystal slower
 constexpr std::size_t kLeastClockBlocks = 4;    ///< for a line
+/// Least arrivals of blocks differ by less: a picture of each would have to wait a whole block.
+constexpr std::int64_t kMostWaitNs = kBlockNs;
+constexpr double kMostDrift = 1e-3;                 ///< ten times what crystals are sold with
 constexpr std::int64_t kLeastSpan = 3'000'000'000;  ///< ns: jitter of 1 ms is then 300 ppm at most
 
 }  // namespace
 
 void ClockFit::add(std::int64_t timestamp_ns, std::int64_t arrival_ns) {
   const std::int64_t offset = arrival_ns - timestamp_ns;
-  // A clock that was set anew tells nothing about the time before.
-  if (!blocks_.empty() && timestamp_ns < blocks_.back().begin_ns) {
+  if (!blocks_.empty() && was_set(timestamp_ns, offset)) {
     blocks_.clear();
     line_.reset();
   }
@@ -28,6 +30,16 @@ void ClockFit::add(std::int64_t timestamp_ns, std::int64_t arrival_ns) {
     blocks_.back().timestamp_ns = timestamp_ns;
     blocks_.back().offset_ns = offset;
   }
+}
+
+/// A clock that was set anew tells nothing about the time before: back, or so far on that pictures
+/// would now arrive before they could.
+bool ClockFit::was_set(std::int64_t timestamp_ns, std::int64_t offset_ns) const {
+  const Block& last = blocks_.back();
+  if (timestamp_ns < last.begin_ns) return true;
+  const double drift = kMostDrift * static_cast<double>(timestamp_ns - last.timestamp_ns);
+  return static_cast<double>(last.offset_ns) - static_cast<double>(offset_ns) >
+         static_cast<double>(kMostWaitNs) + std::max(0.0, drift);
 }
 
 void ClockFit::fit() {

@@ -41,6 +41,7 @@ class ClockFit {
     double slope = 0;
     double slope_sigma = 0;
   };
+  [[nodiscard]] bool was_set(std::int64_t timestamp_ns, std::int64_t offset_ns) const;
   void fit();
   std::deque<Block> blocks_;
   std::optional<Line> line_;

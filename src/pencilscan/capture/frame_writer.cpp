@@ -7,6 +7,7 @@
 #include "pencilscan/capture/sensor_pixels.h"
 #include "pencilscan/core/check.h"
 #include "pencilscan/core/error.h"
+#include "pencilscan/core/formatted.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/io/image.h"
 #include "pencilscan/io/partial_folder.h"
@@ -32,6 +33,12 @@ RecordedCamera expected(const CameraGroup& cameras, std::size_t c, const Camera&
   camera.bit_depth = layout && layout->bits > 8 ? 16 : 8;
   camera.exposure_us = settings.exposure_us.value_or(0);
   return camera;
+}
+
+std::string layout_text(const cv::Mat& picture) {
+  return size_text(picture.cols, picture.rows) + " px of " + std::to_string(picture.channels()) +
+         (picture.channels() == 1 ? " channel" : " channels") + " and " +
+         std::to_string(8 * picture.elemSize1()) + " bits";
 }
 
 nlohmann::ordered_json attributes_of(const CameraGroup& cameras, bool shared_clock) {
@@ -123,9 +130,10 @@ void FrameWriter::write(const Row& row, std::size_t camera) {
     return;
   }
   if (picture.type() != types_[camera] || picture.size() != sizes_[camera])
-    throw StageError(cameras_.name(camera) +
-                     ": its pictures are not of the size and format that "
-                     "it was set to");
+    throw StageError(cameras_.name(camera) + ": its pictures are " + layout_text(picture) +
+                     ", and the recording was begun for " +
+                     layout_text(cv::Mat(sizes_[camera], types_[camera], cv::Scalar())) +
+                     ": state its pixel_format, or record into a folder");
   zarr_->write(row.number, camera, picture, utc);
 }
 

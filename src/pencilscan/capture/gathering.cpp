@@ -136,7 +136,11 @@ void FrameGathering::add(std::size_t camera, CameraFrame frame) {
 void FrameGathering::add_incomplete(std::size_t camera, const CameraFrame& frame) {
   const Mark& mark = last_whole_[camera];
   if (mark.number < 0 || frame.number < 0) return;
-  const std::int64_t time = mark.time_ns + (frame.number - mark.number) * period_ns_;
+  // GigE Vision numbers frames from 1 to 65535, and begins anew.
+  constexpr std::int64_t kNumbers = 65535;
+  std::int64_t ahead = frame.number - mark.number;
+  if (ahead < 0) ahead += kNumbers;
+  const std::int64_t time = mark.time_ns + ahead * period_ns_;
   const std::string why = frame.remark.empty() ? to_string(frame.status) : frame.remark;
   for (Open& open : open_) {
     if (!together(time, open.time_ns) || open.heard[camera] != 0) continue;

@@ -116,6 +116,28 @@ TEST(ClockFit, StartsAnewWhenTheClockIsSet) {
   EXPECT_EQ(clock.host_from_camera(2 * kSecond), 7 * kSecond);
 }
 
+TEST(ClockFit, StartsAnewWhenTheClockJumpsForward) {
+  for (const std::int64_t jump : {kSecond, 3600 * kSecond, 1'700'000'000 * kSecond}) {
+    ClockFit clock;
+    for (int k = 0; k < 80; ++k) {
+      const std::int64_t taken = k * 100 * kMs;
+      const std::int64_t stamp = taken + (k < 40 ? 0 : jump);
+      clock.add(stamp, taken + 20 * kMs);
+      EXPECT_NEAR(static_cast<double>(clock.host_from_camera(stamp) - taken), 20.0 * kMs, kMs)
+          << jump << " " << k;
+    }
+  }
+}
+
+TEST(ClockFit, PicturesThatWaitedAreNoNewClock) {
+  ClockFit clock;
+  for (int k = 0; k < 36; ++k) {
+    const std::int64_t taken = k * 100 * kMs;
+    clock.add(taken, taken + (k >= 10 && k < 15 ? 400 : 20) * kMs);
+  }
+  EXPECT_TRUE(clock.drift());  // of three seconds and a half: none of them was given up
+}
+
 TEST(FrameGathering, PutsPicturesTogetherByTimeAndNotByNumber) {
   // As fake cameras of Aravis do: equal numbers up to a period apart.
   std::vector<Source> sources(3);

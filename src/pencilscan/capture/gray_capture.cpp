@@ -342,7 +342,7 @@ GrayCaptureReport capture_gray_codes(LiveCameras& cameras, ProjectorScreen& scre
   screen.show_all({});
   for (std::size_t p = 0; p < projectors; ++p) {
     const std::string& name = screen.projectors()[p].name;
-    if (fs::exists(out / name)) {
+    if (fs::exists(out / name) && !fs::is_empty(out / name)) {
       ++report.resumed;
       continue;
     }

@@ -255,7 +255,9 @@ void add_capture_command(CLI::App& app) {
   command->add_option("--rate", options->rate_hz, "Frames per second")->check(above_zero());
   command->add_option("--seconds", options->seconds, "Record so long (default: until Ctrl-C)")
       ->check(above_zero());
-  command->add_option("--frames", options->frames, "Record so many frames")
+  command
+      ->add_option("--frames", options->frames,
+                   "Record so many frames, those that --whole-only leaves out among them")
       ->check(any_number<std::size_t>());
   command->add_flag(
       "--still", options->still,
