@@ -205,10 +205,11 @@ class Bounds {
     return difference(files_.devices[c.device].device.device_from_world * base_from_files.inverse(),
                       c.in_base);
   }
-  /// 1: at the bound.
+  /// 1: at the bound. Of one device at the origin no length tells how large a shift is.
   [[nodiscard]] double share(const PoseDifference& off) const {
-    return std::max(off.turn_deg / options_.most_turn_deg,
-                    off.shift / (options_.most_shift_share * reach_));
+    const double by_turn = off.turn_deg / options_.most_turn_deg;
+    if (!(reach_ > 0)) return by_turn;
+    return std::max(by_turn, off.shift / (options_.most_shift_share * reach_));
   }
 
  private:

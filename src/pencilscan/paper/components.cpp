@@ -51,6 +51,7 @@ ComponentResult solve_one(const Rig& rig, const GridGraph& graph, int component,
   if (linear.solved && options != nullptr) {
     const MultiviewSolution multiview = sweep_component(rig, graph, linear, indices, *options);
     result.report = multiview.report;
+    if (multiview.report.sweep_cost.empty()) return result;
     const double scale = options->cost == MultiviewCost::kNormalized
                              ? 0.15 * options->search_radius_px
                              : std::max(1e-9, *std::min_element(multiview.report.sweep_cost.begin(),

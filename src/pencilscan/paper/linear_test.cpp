@@ -60,6 +60,18 @@ TEST_F(TwoProjectors, MultiviewFindsEveryLineWhereLinearMisses) {
   for (const ComponentReport& report : labeling.components) EXPECT_GT(report.margin, 0);
 }
 
+TEST_F(TwoProjectors, WhatLiesNowhereInTheVolumeHasNoLines) {
+  const std::vector<GridGraph> graphs = {graph(0, 60, 0.3, 3), graph(1, 60, 0.3, 4)};
+  rig.volume->center += Vec3(0, 0, 50 * rig.volume->radius);
+  for (const MultiviewCost cost : {MultiviewCost::kNormalized, MultiviewCost::kPublished}) {
+    MultiviewOptions options;
+    options.cost = cost;
+    const Labeling labeling = solve_multiview(rig, graphs, options);
+    for (const auto& runs : labeling.runs) EXPECT_TRUE(runs.empty());
+    for (const ComponentReport& report : labeling.components) EXPECT_FALSE(report.reason.empty());
+  }
+}
+
 TEST_F(TwoProjectors, TriangulatedPointsLieOnTheSurface) {
   const std::vector<GridGraph> graphs = {graph(0, 60, 0, 5)};
   Labeling labeling;

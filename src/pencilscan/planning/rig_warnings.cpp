@@ -248,8 +248,8 @@ class Collector {
       warn(severe, "coplanar_axes",
            "the line directions of " + name(axes.first) + " and " + name(axes.second) +
                " lie in one plane (skewness " + formatted(axes.skewness, "%.3f") + ", axes " +
-               formatted(axes.distance_mm, "%.0f") +
-               " mm apart): equation (6) keeps a free parameter for this pair, as for "
+               formatted(axes.distance_mm) + " " + unit_name(rig_) +
+               " apart): equation (6) keeps a free parameter for this pair, as for "
                "mirror-symmetric diagonal lines; raise one of the two or roll it differently");
     }
   }

@@ -125,7 +125,7 @@ void check_scene(const Rig& rig, const TriangleMesh& mesh, const std::string& na
   }
   const BoundingBox box = bounding_box(mesh);
   std::ostringstream extent;
-  extent << "[" << box.low.transpose() << "] to [" << box.high.transpose() << "] mm";
+  extent << "[" << box.low.transpose() << "] to [" << box.high.transpose() << "]";
   throw InputError(name, "vertices", extent.str(),
                    "must lie in the view of at least one camera (--fit moves them there)");
 }
