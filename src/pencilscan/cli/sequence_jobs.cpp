@@ -11,6 +11,7 @@
 #include "pencilscan/cli/interruption.h"
 #include "pencilscan/cli/reconstruct_options.h"
 #include "pencilscan/core/error.h"
+#include "pencilscan/core/name_list.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/jobs/finish.h"
 #include "pencilscan/jobs/slurm.h"
@@ -86,6 +87,11 @@ void report_sequence(const CommonOptions& common, const fs::path& out) {
   warn_of(strays_warning(out, read_run_inputs(out).frames));
   for (const SequenceEvent& event : summary.watch.events)
     warn_of(when_text(event, summary.rows) + ": " + event.text);
+  if (!summary.watch.not_watched.empty())
+    warn_of(
+        "whether these were moved is not seen, for most frames have too few of their crossings: " +
+        name_list(summary.watch.not_watched, kNamedFrames) +
+        "; rig check judges several frames together");
   print_figures(common, summary_figures(out, summary));
   if (!summary.holes.empty()) {
     throw StageError(std::to_string(summary.holes.size()) + " of " +

@@ -232,6 +232,13 @@ TEST_F(Jobs, SlurmGetsAnArrayOfWhatIsAskedForAndAJobThatFinishes) {
   EXPECT_THAT(scripts.array, HasSubstr("pro'\\''gram' reconstruct '--rig' 'a rig'"));
   EXPECT_THAT(scripts.finish, HasSubstr("sequence finish --out"));
   EXPECT_THAT(scripts.finish, HasSubstr("--resubmit --rounds 1"));
+  const fs::path out = job.out;
+  job.out = out.parent_path() / "run 50%a";
+  EXPECT_THAT(slurm_scripts(job, std::vector<std::size_t>{0}, 0).array,
+              HasSubstr("run 50%%a.job/"));
+  job.out = out.parent_path() / "a \" b";
+  EXPECT_THROW((void)slurm_scripts(job, std::vector<std::size_t>{0}, 0), InputError);
+  job.out = out;
   job.scheduler = {"a\nb"};
   EXPECT_THROW((void)slurm_scripts(job, std::vector<std::size_t>{0}, 0), InputError);
 }

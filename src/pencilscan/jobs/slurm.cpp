@@ -20,11 +20,23 @@ std::string sbatch_line(const std::string& option) {
   return "#SBATCH " + option + "\n";
 }
 
+/// A folder in a file name of sbatch, in which % begins a pattern.
+std::string without_patterns(const std::string& folder) {
+  std::string text;
+  for (const char c : folder) text += c == '%' ? "%%" : std::string(1, c);
+  return text;
+}
+
 std::string script_head(const Job& job, const std::string& name, const std::string& log) {
+  for (const fs::path& path : {job.directory, job.out}) {
+    if (path.string().find('"') != std::string::npos)
+      throw InputError("--out", "", path.string(), "must have no \" with --slurm");
+  }
   std::string text = "#!/bin/sh\n";
   text += sbatch_line("--job-name=" + name);
   text += sbatch_line("--chdir=\"" + job.directory.string() + "\"");
-  text += sbatch_line("--output=\"" + (job_folder(job.out) / log).string() + "\"");
+  text += sbatch_line("--output=\"" + without_patterns(job_folder(job.out).string()) + "/" + log +
+                      "\"");
   text += sbatch_line("--open-mode=append");
   for (const std::string& option : job.scheduler) text += sbatch_line(option);
   return text;

@@ -159,6 +159,7 @@ void write_summary(const fs::path& out, const SequenceSummary& summary) {
   object["events"] = ordered_json::array();
   for (const SequenceEvent& event : summary.watch.events)
     object["events"].push_back(event_json(event, summary.rows));
+  object["not_watched"] = summary.watch.not_watched;
   object["table"] = ordered_json::array();
   for (const FrameRow& row : summary.rows)
     object["table"].push_back(row_json(row, summary.devices));

@@ -21,7 +21,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kBadInput = 2;     // exit codes of pencilscan
+constexpr int kBadInput = 2;   // exit codes of pencilscan
+constexpr int kSignals = 128;  // of a shell: what a signal ended, and its number
+constexpr int kLastSignal = 64;
 constexpr int kHostLost = 255;   // of ssh itself
 constexpr int kNoProgram = 126;  // of a shell, and 127: not there, or not to be run
 constexpr int kTrialsPerHost = 2;
@@ -136,7 +138,7 @@ class TaskQueue {
     }
   }
   void ended(Slot& slot, int status) {
-    const int code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+    const int code = WIFEXITED(status) ? WEXITSTATUS(status) : kSignals + WTERMSIG(status);
     const std::string who =
         "task " + std::to_string(slot.task) + (slot.host.empty() ? "" : " on " + slot.host);
     const bool host_lost =
@@ -149,8 +151,8 @@ class TaskQueue {
                                "every task needs input that it can read");
       if (slot.host.empty()) throw refused;
       refuse(slot, who, refused);
-    } else if (code >= 128) {
-      put_back(slot.task, who + " was ended by signal " + std::to_string(code - 128));
+    } else if (code > kSignals && code <= kSignals + kLastSignal) {
+      put_back(slot.task, who + " was ended by signal " + std::to_string(code - kSignals));
     } else if (code != 0 && !went_through(job_.out, slot.task, slot.log_before)) {
       ended_early(slot, who);
     } else {

@@ -1,6 +1,7 @@
 #include "pencilscan/jobs/watch.h"
 
 #include <algorithm>
+#include <cmath>
 #include <iterator>
 #include <set>
 
@@ -118,6 +119,22 @@ std::vector<FoundChange> take_together(std::vector<FoundChange>& found) {
   return together;
 }
 
+std::vector<std::string> without_crossings(std::span<const FrameRow> rows,
+                                           const SequenceDevices& devices) {
+  std::vector<std::string> names;
+  for (std::size_t d = 0; d < devices.cameras.size() + devices.projectors.size(); ++d) {
+    std::size_t done = 0;
+    std::size_t known = 0;
+    for (const FrameRow& row : rows) {
+      if (row.status.state != FrameState::kDone) continue;
+      ++done;
+      if (std::isfinite(row.device_crossing_px[d])) ++known;
+    }
+    if (done > 1 && 2 * known < done) names.push_back(bare_name(devices, d));
+  }
+  return names;
+}
+
 }  // namespace
 
 std::string when_text(const SequenceEvent& event, std::span<const FrameRow> rows) {
@@ -129,6 +146,7 @@ std::string when_text(const SequenceEvent& event, std::span<const FrameRow> rows
 
 WatchReport watch_sequence(std::span<const FrameRow> rows, const SequenceDevices& devices) {
   WatchReport report;
+  report.not_watched = without_crossings(rows, devices);
   const std::vector<WatchedFigure> all = watched_figures(devices);
   std::vector<FoundChange> found = find_watched_changes(rows, devices, all, report.odd);
   drop_explained(found);

@@ -33,6 +33,9 @@ struct OddFrame {
 struct WatchReport {
   std::vector<SequenceEvent> events;  ///< by first frame
   std::vector<OddFrame> odd;
+  /// Devices that most frames say too little of to see whether they were moved: fewer crossings
+  /// than a median is taken of.
+  std::vector<std::string> not_watched;
 };
 
 /// Watches every camera's and projector's figures over the frames that are done (changes.h). A

@@ -54,6 +54,9 @@ class Watch : public ::testing::Test {
     return watch_sequence(rows_, devices_);
   }
   std::vector<SequenceEvent> events() { return watch().events; }
+  void lose_crossings(std::size_t device, std::size_t frames) {
+    for (std::size_t k = 0; k < frames; ++k) rows_[k].device_crossing_px[device] = kUnknownFigure;
+  }
   void expect_one_moved(const std::string& frame, const std::string& camera) {
     const auto found = events();
     ASSERT_THAT(found, SizeIs(1));
@@ -69,6 +72,15 @@ class Watch : public ::testing::Test {
   std::vector<FrameRow> rows_;
   SequenceDevices devices_{{"cam0", "cam1", "cam2"}, {"proj0", "proj1", "proj2"}};
 };
+
+TEST_F(Watch, DevicesOfWhichFramesSayTooLittleAreNamed) {
+  lose_crossings(1, kFrames / 2);
+  EXPECT_THAT(watch().not_watched, IsEmpty());
+  lose_crossings(1, kFrames / 2 + 1);
+  lose_crossings(5, kFrames);
+  EXPECT_THAT(watch().not_watched,
+              ::testing::ElementsAre(devices_.cameras[1], devices_.projectors[2]));
+}
 
 TEST_F(Watch, NothingHappens) {
   const WatchReport report = watch();
