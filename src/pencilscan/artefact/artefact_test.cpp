@@ -388,6 +388,22 @@ TEST(ArtefactUnits, OfPointsAreDoubtedWhereNoArtefactIsSoLarge) {
   EXPECT_THAT(of_ball(0.001, both), ElementsAre(HasSubstr("probably in metres;")));
 }
 
+TEST(ArtefactWarnings, WhatIsNotOfTheShapeAskedForIsTold) {
+  ArtefactPoints cube;
+  ArtefactPoints faces;
+  Random random(3);
+  for (int i = 0; i < 3000; ++i) {
+    Vec3 x(random.uniform(-50, 50), random.uniform(-50, 50), random.uniform(-50, 50));
+    x[i % 3] = i % 2 == 0 ? 50 : -50;
+    cube.points.push_back(x);
+    faces.points.emplace_back(x.x(), x.y(), i % 2 == 0 ? 6 : -6);
+  }
+  EXPECT_THAT(artefact_warnings(measure_sphere(cube, nullptr, {}), {}),
+              ::testing::ElementsAre(HasSubstr("mm from the sphere that fits them best")));
+  EXPECT_THAT(artefact_warnings(measure_plate(faces, nullptr, {}), {}),
+              Contains(HasSubstr("mm from the plane that fits them best")));
+}
+
 TEST(ArtefactWarnings, AnUnknownUnitIsToldOfEveryArtefact) {
   Rig rig;
   rig.unit_known = false;

@@ -5,6 +5,7 @@
 #include "pencilscan/artefact/find_shapes.h"
 #include "pencilscan/core/formatted.h"
 #include "pencilscan/core/length_units.h"
+#include "pencilscan/core/median.h"
 #include "pencilscan/core/name_list.h"
 
 namespace pencilscan {
@@ -45,6 +46,26 @@ void warn_of_coverage(double coverage, const std::string& what,
                      " has points near it, and less than " +
                      formatted(100 * kLittleCoverage, "%.3g") +
                      " % says little of the whole: measure it from more sides");
+}
+
+/// That half of the points lie farther from the fitted shape than a point counts as near it: 1 % of
+/// its size (docs/figures.md). No label or scale that is wrong makes that of the shape asked for.
+void warn_of_shape(std::vector<double> distances, double size_mm, const std::string& shape,
+                   const std::string& hint, std::vector<std::string>& warnings) {
+  constexpr double kNear = 0.01;
+  if (distances.empty()) return;
+  const double usual = upper_median(std::move(distances));
+  if (usual <= kNear * size_mm) return;
+  warnings.push_back("half of the points lie more than " + formatted(usual, "%.3g") +
+                     " mm from the " + shape + " that fits them best: they are hardly one, " +
+                     hint);
+}
+
+template <class Shape>
+std::vector<double> distances_of(const ArtefactPoints& points, const Shape& distance) {
+  std::vector<double> distances;
+  for (const Vec3& x : points.points) distances.push_back(std::abs(distance(x)));
+  return distances;
 }
 
 bool has_stated_size(const BallFigures& ball, double diameter_mm) {
@@ -97,6 +118,11 @@ std::vector<std::string> artefact_warnings(const BallFigures& ball,
                                            const ArtefactOptions& options) {
   std::vector<std::string> warnings = unit_warnings(ball.points);
   warn_of_unit(2 * ball.trimmed.radius, "the ball", ball.points, warnings);
+  const auto distance = [&](const Vec3& x) { return signed_distance(ball.trimmed, x); };
+  const std::size_t before = warnings.size();
+  warn_of_shape(distances_of(ball.points, distance), 2 * ball.trimmed.radius, "sphere",
+                "or much else is among them", warnings);
+  if (warnings.size() > before) return warnings;  // its size is that of no ball
   warn_of_size(ball, "the ball", options, warnings);
   warn_of_coverage(ball.coverage, "the ball", warnings);
   return warnings;
@@ -131,6 +157,11 @@ std::vector<std::string> artefact_warnings(const PlateFigures& plate,
   constexpr double kNoticed = (1 + kSizeTolerance) * (1 + kSizeTolerance);
   std::vector<std::string> warnings = unit_warnings(plate.points);
   warn_of_unit(plate.surface.length_mm, "the plate", plate.points, warnings);
+  const auto distance = [&](const Vec3& x) { return plate.trimmed.signed_distance(x); };
+  warn_of_shape(distances_of(plate.points, distance), plate.surface.length_mm, "plane",
+                options.plate_thickness_mm ? "or two faces, farther apart than --thickness says"
+                                           : "or two faces of a plate: then state its --thickness",
+                warnings);
   warn_of_coverage(plate.coverage, "the plate", warnings);
   if (!options.plate_length_mm || !options.plate_width_mm || !plate.points.unit_known)
     return warnings;
