@@ -189,6 +189,14 @@ function fromBase64(text: string): Uint8Array<ArrayBuffer> {
   return bytes;
 }
 
+/** By its first bytes; empty for others than those that parts hold. */
+export function pictureType(bytes: Uint8Array): string {
+  const head = String.fromCharCode(...bytes.subarray(0, 12));
+  if (head.startsWith('\xff\xd8\xff')) return 'image/jpeg';
+  if (head.startsWith('\x89PNG')) return 'image/png';
+  return head.startsWith('RIFF') && head.endsWith('WEBP') ? 'image/webp' : '';
+}
+
 function interleave<T extends Float32Array | Uint8Array>(x: T, y: T, z: T): T {
   const all = new (x.constructor as new (length: number) => T)(3 * x.length);
   for (let i = 0; i < x.length; ++i) {
@@ -353,7 +361,8 @@ export class Source {
   }
 
   async imageUrl(result: number, part: string): Promise<string> {
-    return URL.createObjectURL(new Blob([await this.bytes(result, part)], {type: 'image/jpeg'}));
+    const bytes = await this.bytes(result, part);
+    return URL.createObjectURL(new Blob([bytes], {type: pictureType(bytes)}));
   }
 
   depth(result: number, camera: number): Promise<DepthMap> {

@@ -1,4 +1,6 @@
 // The name, the digits and the unit of every figure: the same wherever the page shows it.
+import type {RigJson} from './data';
+import {Device} from './device';
 import {format, percent} from './dom';
 
 export interface FigureText {
@@ -12,6 +14,30 @@ export function significant(value: number): string {
   if (value === 0 || Math.abs(value) >= 1000) return format(Math.round(value));
   const text = value.toPrecision(3);
   return text.includes('e') ? format(value) : text;
+}
+
+const kSteps = 1e4; // of the last decimal within the extent, at least
+
+/** As many decimals as the size of the scene deserves: 0.01 for 150. Three digits where it is not known (0). */
+export function lengthText(value: number, extent: number): string {
+  if (!Number.isFinite(value)) return '–';
+  if (!(extent > 0 && Number.isFinite(extent))) return significant(value);
+  const decimals = Math.ceil(Math.log10(kSteps / extent) - 1e-9);
+  return value.toFixed(Math.min(Math.max(decimals, 0), 20));
+}
+
+/** The coordinates of a place; they are the scale themselves where the extent is not known. */
+export function placeText(xyz: readonly number[], extent: number): string {
+  const scale = extent > 0 ? extent : Math.max(...xyz.map(Math.abs));
+  return xyz.map((x) => lengthText(x, scale)).join(', ');
+}
+
+/** Half the size of the scene: its volume's radius, or else the largest coordinate of a device; 0: not known. */
+export function extentOf(rig: RigJson | null): number {
+  const radius = rig?.volume?.radius ?? 0;
+  if (radius > 0 || !rig) return radius;
+  const places = [...rig.cameras, ...rig.projectors].flatMap((device) => new Device(device).center);
+  return Math.max(0, ...places.map(Math.abs).filter(Number.isFinite));
 }
 
 const count = (value: number): string => format(Math.round(value));

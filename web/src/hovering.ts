@@ -3,7 +3,7 @@ import type {App} from './app';
 import {kColorModes, isScaled, type ColorMode} from './coloring';
 import type {Mesh} from './data';
 import {h} from './dom';
-import {figureText, type FigureName} from './figure_text';
+import {extentOf, figureText, placeText, type FigureName} from './figure_text';
 import {kHoles} from './palette';
 import type {Picture3d} from './scene';
 
@@ -66,7 +66,8 @@ export class Hovering {
   }
 
   private place(xyz: number[]): string {
-    return `${xyz.map((value) => value.toFixed(2)).join(', ')} ${this.app.rig?.unit ?? 'mm'}`;
+    const {rig} = this.app;
+    return `${placeText(xyz, extentOf(rig))} ${rig?.unit ?? 'mm'}`;
   }
 
   private figure(mode: FigureName, value: number | undefined): string[] {

@@ -2,7 +2,8 @@
 import type {App} from './app';
 import type {Curves, DepthMap, Points} from './data';
 import {h} from './dom';
-import {category, kStates, kUndecided, lightColor, sequential, type Named, type Rgb} from './palette';
+import {lengthText, significant} from './figure_text';
+import {category, css, kStates, kUndecided, lightColor, sequential, type Named, type Rgb} from './palette';
 
 export type Layer = 'local' | 'projector' | 'color' | 'confidence' | 'undecided' | 'none';
 
@@ -131,10 +132,11 @@ export function layerLegend(app: App, layer: Layer): {title: string; named: Name
   }
 }
 
-/** Near is bright; the range and the source of the depth are in the canvas' dataset. */
+/** Near is bright, and so is one depth everywhere; range (where anything is known) and source are in the canvas' dataset. */
 export function depthPicture(map: DepthMap): HTMLCanvasElement {
   let [low, high] = [Infinity, -Infinity];
   for (const z of map.depth) {
+    if (!Number.isFinite(z)) continue;
     if (z < low) low = z;
     if (z > high) high = z;
   }
@@ -142,10 +144,24 @@ export function depthPicture(map: DepthMap): HTMLCanvasElement {
   const context = canvas.getContext('2d')!;
   const pixels = context.createImageData(map.columns, map.rows);
   map.depth.forEach((z, i) => {
-    const [r, g, b] = Number.isFinite(z) ? sequential((high - z) / (high - low)) : [24, 24, 28];
+    const [r, g, b] = Number.isFinite(z) ? sequential(high > low ? (high - z) / (high - low) : 1) : [24, 24, 28];
     pixels.data.set([r, g, b, 255], 4 * i);
   });
   context.putImageData(pixels, 0, 0);
-  Object.assign(canvas.dataset, {low: String(low), high: String(high), source: map.source});
+  Object.assign(canvas.dataset, {source: map.source}, low <= high && {low: String(low), high: String(high)});
   return canvas;
+}
+
+/** What the colours of a depthPicture() say. */
+export function depthLegend({dataset}: HTMLCanvasElement, unit: string): HTMLElement[] {
+  const title = h('strong', {}, `Depth (${dataset.source})`);
+  if (dataset.low === undefined) return [title, h('span', {}, 'not known anywhere')];
+  const [low, high] = [Number(dataset.low), Number(dataset.high)];
+  if (low === high) {
+    return [title, h('span', {class: 'key'}, h('i', {style: `background:${css(sequential(1))}`}), `${significant(low)} ${unit}`)];
+  }
+  const stops = [1, 0.75, 0.5, 0.25, 0].map((x) => css(sequential(x)));
+  const end = (z: number) => lengthText(z, 100 * (high - low)); // a hundredth of the range shows
+  return [title, h('span', {class: 'ramp', style: `background:linear-gradient(90deg,${stops.join(',')})`}),
+    h('span', {class: 'ramp-ends'}, h('span', {}, end(low)), h('span', {}, `${end(high)} ${unit}`))];
 }

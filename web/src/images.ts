@@ -1,9 +1,9 @@
 // The image panel: one camera's picture with layers, zoom, and a click that selects.
 import type {App} from './app';
 import {byId, choice, h} from './dom';
-import {crossingsPath, depthPicture, kLayers, layerLegend, layerPaths, type ColoredPath, type Layer} from './image_layers';
+import {crossingsPath, depthLegend, depthPicture, kLayers, layerLegend, layerPaths, type ColoredPath, type Layer} from './image_layers';
 import {ImageView} from './image_view';
-import {css, kHoles, sequential, type Named} from './palette';
+import {css, kHoles, type Named} from './palette';
 
 type Base = 'picture' | 'holes' | 'depth';
 
@@ -197,12 +197,7 @@ export class Images {
     if (curves) keys(curves.title, curves.named);
     if (this.base === 'holes' && this.bitmap) keys('Ground', kHoles.slice(0, 8));
     if (this.base === 'depth' && this.bitmap instanceof HTMLCanvasElement) {
-      const {low, high, source} = this.bitmap.dataset;
-      const stops = [1, 0.75, 0.5, 0.25, 0].map((x) => css(sequential(x)));
-      children.push(h('strong', {}, `Depth (${source})`),
-        h('span', {class: 'ramp', style: `background:linear-gradient(90deg,${stops.join(',')})`}),
-        h('span', {class: 'ramp-ends'}, h('span', {}, Number(low).toFixed(0)),
-          h('span', {}, `${Number(high).toFixed(0)} ${this.app.rig?.unit ?? 'mm'}`)));
+      children.push(...depthLegend(this.bitmap, this.app.rig?.unit ?? 'mm'));
     }
     this.legend.replaceChildren(...children);
     this.legend.hidden = children.length === 0;

@@ -1,7 +1,7 @@
 // What is known of the selected point, in words, and how every camera sees it.
 import type {App} from './app';
 import {byId, h} from './dom';
-import {figureText} from './figure_text';
+import {extentOf, figureText, placeText} from './figure_text';
 import {css, kStates, lightColor} from './palette';
 
 const kCrop = 44; // image px shown around the point
@@ -63,8 +63,7 @@ export class Inspector {
       fact('Line', `${line} of ${pattern.lines} `,
         h('i', {class: 'swatch', style: `background:${css(lightColor(color))}`}), ` ${color}, local ID ${line % pattern.sequence.length}`);
     } else fact(app.source.index.results[app.result]?.scan ? 'Panel column or row' : 'Line', String(line));
-    const [x, y, z] = app.position(i);
-    fact('3-D point', `${x.toFixed(2)}, ${y.toFixed(2)}, ${z.toFixed(2)} ${unit}`);
+    fact('3-D point', `${placeText(app.position(i), extentOf(app.rig))} ${unit}`);
     fact('Sigma', figureText('sigma', points.sigma[i], unit));
     fact('Confidence', figureText('confidence', points.confidence[i] / 255));
     if (points.distance) fact('Distance to truth', figureText('distance', points.distance[i], unit));

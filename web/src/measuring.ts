@@ -3,7 +3,7 @@ import {Group, Vector3} from 'three';
 import {clear, drawMarker, drawSegments} from './devices3d';
 import type {Vec3} from './device';
 import {h} from './dom';
-import {significant} from './figure_text';
+import {lengthText, significant} from './figure_text';
 import {angleBetween, fitPlane, type Plane} from './plane_fit';
 
 export type Measure = 'distance' | 'angle';
@@ -14,6 +14,7 @@ const kColor = 0xffd23f;
 export interface Measured {
   position: Float32Array | null; // places that planes are fitted to
   radius: number; // of the whole shape
+  extent: number; // of the scene: how many decimals lengths have
   eye: Vec3;
   unit: string;
 }
@@ -85,8 +86,9 @@ export class Measuring {
   private distanceText(): string {
     const {marks} = this;
     if (marks.length < 2) return marks.length ? 'Click the second place.' : 'Click two places on the shape.';
+    const {extent, unit} = this.ask();
     const length = Math.hypot(...marks[0].at.map((x, k) => x - marks[1].at[k]));
-    return `Distance ${length.toFixed(2)} ${this.ask().unit}`;
+    return `Distance ${lengthText(length, extent)} ${unit}`;
   }
 
   private angleText(): string {

@@ -8,6 +8,7 @@ import type {Mesh, RigJson} from './data';
 import {clear, drawDevices} from './devices3d';
 import {Device, type Vec3} from './device';
 import {byId, choice, h} from './dom';
+import {extentOf} from './figure_text';
 import {Hovering} from './hovering';
 import {LegendPanel} from './legend_panel';
 import {Measuring, type Measure} from './measuring';
@@ -62,6 +63,7 @@ export class Viewer {
   private readonly measuring = new Measuring(() => ({
     position: this.app.points?.position ?? this.currentMesh()?.position ?? null,
     radius: this.picture?.bounds.radius ?? 100,
+    extent: extentOf(this.app.rig) || (this.picture?.bounds.radius ?? 0),
     eye: (this.picture?.camera.position.toArray() ?? [0, 0, 0]) as Vec3,
     unit: this.app.rig?.unit ?? 'mm',
   }), () => this.picture?.render());
