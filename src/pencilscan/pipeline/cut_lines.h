@@ -18,6 +18,10 @@ struct CutLines {
   [[nodiscard]] double share() const {
     return inside == 0 ? 0 : static_cast<double>(cut) / static_cast<double>(inside);
   }
+  /// What was measured goes on beyond the volume. As of a room around it (joint/piece_labels.cpp):
+  /// rims of an object that fills it stay below. A bunny and a ball with half and more of them
+  /// outside: .30 each.
+  [[nodiscard]] bool are_many() const { return share() > 0.1; }
 };
 
 [[nodiscard]] CutLines lines_cut_by_volume(const Rig& rig, std::span<const GridGraph> graphs,

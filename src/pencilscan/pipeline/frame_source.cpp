@@ -116,7 +116,7 @@ FrameSource FrameSource::open(const Rig& rig, const fs::path& path) {
   Recording recording = Recording::open(path);
   source.closed_ = recording.is_closed();
   FrameSets sets = group_frames(recording);
-  source.left_out_ = left_out_warnings(recording, sets);
+  source.left_out_ = recording_warnings(recording, sets);
   auto recorded = std::make_shared<Recorded>(std::move(recording), std::move(sets));
   bool any = false;
   for (const Camera& camera : rig.cameras) {

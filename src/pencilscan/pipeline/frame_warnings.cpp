@@ -134,10 +134,7 @@ std::vector<Warning> missing_lines_warnings(const Rig& rig,
 }
 
 std::optional<Warning> volume_warning(const Rig& rig, const CutLines& lines) {
-  // As of a room around the volume (joint/piece_labels.cpp): rims of an object that fills it stay
-  // below. A bunny and a ball with half and more of them outside: .30 each.
-  constexpr double kMany = 0.1;
-  if (lines.share() <= kMany) return std::nullopt;
+  if (!lines.are_many()) return std::nullopt;
   return Warning{WarningCode::kVolumeCuts,
                  "what was measured goes on beyond the volume, whose edge cuts " +
                      formatted(100 * lines.share(), "%.0f") +

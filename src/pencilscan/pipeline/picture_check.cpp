@@ -8,6 +8,7 @@
 #include "pencilscan/core/formatted.h"
 #include "pencilscan/core/median.h"
 #include "pencilscan/core/parallel.h"
+#include "pencilscan/pipeline/cut_lines.h"
 #include "pencilscan/pipeline/picture_trial.h"
 #include "pencilscan/pipeline/shown_lines.h"
 #include "pencilscan/pipeline/view_agreement.h"
@@ -110,9 +111,10 @@ std::optional<std::pair<int, int>> exchanged_pair(
   return std::pair(static_cast<int>(a), static_cast<int>(b));
 }
 
-/// Cameras of which too few curves got a name, and the shares of the others that have enough.
+/// Cameras of which too few curves got a name, and the others that have enough, with their shares.
 struct Suspects {
   std::vector<Suspect> cameras;
+  std::vector<std::size_t> others;
   std::vector<double> of_others;
 };
 
@@ -123,6 +125,7 @@ Suspects suspects_of(const Rig& rig, const Frame& frame, const Labeling& labelin
     if (frame.images[c].empty() || !points.are_enough()) continue;
     const double share = points.named_share();
     if (share >= kFewNamed) {
+      found.others.push_back(c);
       found.of_others.push_back(share);
       continue;
     }
@@ -159,6 +162,60 @@ void try_remedies(const PictureTrial& trial, double usual, std::vector<Suspect>&
           trial.telling_points(other.camera, s.light));
     }
   }
+}
+
+/// A fault that no fewer pictures have than there are others may be that of all of them: wrong ones
+/// get names by chance, too. Those of the others that get more once it is undone.
+std::vector<PictureFinding> shared_fault(const Rig& rig, const Frame& frame,
+                                         const PictureTrial& trial,
+                                         const std::vector<Suspect>& suspects,
+                                         std::vector<std::size_t> others) {
+  // Whether they show what the others measured (ShownLines) says nothing once most are wrong.
+  for (const Suspect& s : suspects)
+    if (s.best_named == 0) others.push_back(s.camera);
+  std::vector<PictureFinding> findings;
+  for (const Remedy& remedy : remedies()) {
+    std::vector<double> named;
+    for (const Suspect& s : suspects)
+      if (s.best_named > 0 && s.best.fault == remedy.fault) named.push_back(s.best_named);
+    if (named.size() < 2 || named.size() < others.size()) continue;
+    const double usual = upper_median(std::move(named));
+    for (const std::size_t c : others) {
+      const cv::Mat light = linear_light(rig.cameras[c], frame.images[c]);
+      const double alone = trial.telling_points(c, light).named_share();
+      const TellingPoints undone = trial.telling_points(c, remedy.undo(light));
+      if (undone.are_enough() && undone.named_share() > alone &&
+          undone.named_share() >= kFarLess * usual)
+        findings.push_back({remedy.fault, static_cast<int>(c), -1});
+    }
+  }
+  return findings;
+}
+
+/// What the other cameras measured goes on beyond the volume.
+bool others_see_beyond_volume(const Rig& rig, const PointResult& found, std::size_t camera) {
+  CutLines others;
+  for (std::size_t c = 0; c < found.graphs.size(); ++c) {
+    if (c == camera) continue;
+    const CutLines lines = lines_cut_by_volume(rig, {&found.graphs[c], 1}, found.labeling);
+    others.inside += lines.inside;
+    others.cut += lines.cut;
+  }
+  return others.are_many();
+}
+
+/// The picture gets names as the others do once the volume is larger: what this camera sees lies
+/// beyond that of the rig.
+bool fits_larger_volume(const Rig& rig, const PointResult& found, const Suspect& suspect,
+                        double usual, const PointOptions& options) {
+  constexpr double kLarger = 2;
+  if (!rig.volume || !others_see_beyond_volume(rig, found, suspect.camera)) return false;
+  Rig larger = rig;
+  larger.volume->radius *= kLarger;
+  const TellingPoints points =
+      PictureTrial(larger, options).telling_points(suspect.camera, suspect.light);
+  return points.are_enough() && points.named_share() >= kFarMore * suspect.alone &&
+         points.named_share() >= kFarLess * usual;
 }
 
 }  // namespace
@@ -233,20 +290,31 @@ std::vector<PictureFinding> misplaced_pictures(const Rig& rig, const Frame& fram
     const PairAgreement said = agreement.with_others(c);
     return said.same + said.apart >= kFewPoints && said.share() < kPlainContradiction;
   };
-  std::vector<PictureFinding> findings;
+  std::vector<PictureFinding> findings = shared_fault(rig, frame, trial, suspects, asked.others);
+  const auto is_found = [&](std::size_t camera) {
+    return std::any_of(findings.begin(), findings.end(), [&](const PictureFinding& f) {
+      return static_cast<std::size_t>(f.camera) == camera;
+    });
+  };
   std::vector<PictureFinding> unfit;
   std::size_t fit = others;
   for (const Suspect& s : suspects) {
     if (s.best_named > 0) {
       findings.push_back(s.best);
+    } else if (is_found(s.camera)) {
+      continue;
     } else if (s.shown.fits()) {
       ++fit;
-    } else if (s.share < kFarLess * usual && (s.shown.misfits() || is_contradicted(s.camera))) {
+    } else if (s.share < kFarLess * usual && (s.shown.misfits() || is_contradicted(s.camera)) &&
+               !fits_larger_volume(rig, found, s, usual, options)) {
       unfit.push_back(misfit(rig, found, s.camera));
     }
   }
   // Where most do not fit, their pictures are not what is wrong.
   if (unfit.size() < fit) findings.insert(findings.end(), unfit.begin(), unfit.end());
+  std::stable_sort(
+      findings.begin(), findings.end(),
+      [](const PictureFinding& a, const PictureFinding& b) { return a.camera < b.camera; });
   return findings;
 }
 

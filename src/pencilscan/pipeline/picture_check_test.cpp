@@ -220,6 +220,24 @@ TEST_F(PictureCheck, TurnedAndMirroredPicturesAreNamed) {
   expect_said(with(3, flipped(3, 0)), {"camera cam3: its picture is mirrored, top for bottom"});
 }
 
+TEST_F(PictureCheck, AFaultOfMostPicturesIsAskedOfAll) {
+  Frame frame = *frame_;
+  for (std::size_t c = 0; c < frame.images.size(); ++c) frame.images[c] = flipped(c, -1);
+  std::string why;
+  try {
+    (void)sample::labelled_points(*rig_, frame);
+  } catch (const NothingFound& nothing) {
+    why = nothing.what();
+  }
+  for (const Camera& camera : rig_->cameras)
+    EXPECT_THAT(why, HasSubstr(camera.name + ": its picture is turned by half a turn"));
+}
+
+TEST_F(PictureCheck, CamerasThatSeeMuchBeyondTheVolumeAreNotAccused) {
+  const double radius = rig_->volume->radius;
+  EXPECT_THAT(said_of(frame_of(make_sphere(0.7 * radius, 48, {radius, 0, 0}))), IsEmpty());
+}
+
 TEST_F(PictureCheck, ExchangedColorsAreNamed) {
   expect_said(with(5, bgr(5)), {"camera cam5: its picture has red and blue exchanged"});
   Frame frame = *frame_;

@@ -51,6 +51,17 @@ std::string host_name() {
   return ::gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "host";
 }
 
+/// No result has one; a power failure leaves files that were never written to the disk so.
+bool has_empty_file(const fs::path& folder) {
+  std::error_code error;
+  for (fs::recursive_directory_iterator it(folder, error), end; !error && it != end;
+       it.increment(error)) {
+    std::error_code ignored;
+    if (it->is_regular_file(ignored) && it->file_size(ignored) == 0) return true;
+  }
+  return false;
+}
+
 }  // namespace
 
 std::string RunInputs::settings() const {
@@ -125,7 +136,7 @@ FrameStatus frame_status(const fs::path& out, const std::string& frame, const st
     return status;
   }
   if (has_report) {
-    status.state = FrameState::kDone;
+    if (!has_empty_file(folder)) status.state = FrameState::kDone;
     return status;
   }
   const json failure = json_if_any(folder / kFailureFile).value_or(json());

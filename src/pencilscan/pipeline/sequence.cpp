@@ -115,13 +115,18 @@ Rig refined_rig(const Rig& rig, const FrameSource& frames, const fs::path& out,
   const std::vector<std::size_t> picked = refinement_frames(frames.size());
   std::vector<FrameCurves> curves;
   std::vector<std::string> names;
-  for (const std::size_t i : picked) {
-    tell_steps(progress, "lines for the rig: frame", names.size(), picked.size());
-    PointOptions joint = options.output.frame.points;
-    joint.method = JointOptions{};
-    PointResult detected = detect_stored_frame(rig, frames.read(rig, i), joint);
-    curves.push_back({std::move(detected.families), std::move(detected.graphs)});
-    names.push_back(frames.name(i));
+  PointOptions joint = options.output.frame.points;
+  joint.method = JointOptions{};
+  for (std::size_t k = 0; k < picked.size(); ++k) {
+    tell_steps(progress, "lines for the rig: frame", k, picked.size());
+    try {
+      PointResult detected = detect_stored_frame(rig, frames.read(rig, picked[k]), joint);
+      curves.push_back({std::move(detected.families), std::move(detected.graphs)});
+      names.push_back(frames.name(picked[k]));
+    } catch (const InputError&) {
+      // A broken frame tells nothing of the rig; it is a failed one by itself.
+      if (names.empty() && k + 1 == picked.size()) throw;
+    }
   }
   if (progress) progress("refining the rig", 0);
   RigRefinementOptions refinement_options;
@@ -307,8 +312,8 @@ SequenceOutcome reconstruct_sequence(const fs::path& rig_path, const fs::path& f
                                      const fs::path& out, const SequenceOptions& options,
                                      const Progress& progress) {
   auto [rig, frames] = open_input(rig_path, frames_path, out, options);
-  // One of several shards leaves the other frames to the others, and a broken one is a failed one.
-  if (!options.shard) check_images(rig, frames, progress);
+  // A broken frame is a failed one. One of several shards leaves the others' frames to them.
+  if (!options.shard) check_any_frame(rig, frames, progress);
   const std::vector<std::size_t> own = options.shard.value_or(Shard{}).frames_of(frames.size());
   const RunInputs inputs = describe_inputs(rig_path, frames, options);
   const std::vector<PictureHashes> images = picture_hashes(frames, own, options);

@@ -64,14 +64,15 @@ struct SequenceOutcome {
 
 /// Reconstructs every frame of `frames` (image folders or a recording) into `out`/<frame>:
 /// points.ply, mesh.ply, mesh_measured.ply, pictures/, timing.json, report.json; or failure.json
-/// with the reason. A frame's folder appears whole or not at all. All input is checked before the
-/// first byte is written (InputError); of a shard, all but the pictures, and a broken one is a
-/// failure of its frame. A frame that fails does not stop the others. A frame that is there already
-/// from the same rig, images and options is kept; output of anything else is an InputError unless
-/// `overwrite`. With refine_rig the rig is refined from all frames together (of a long sequence,
-/// from frames evenly picked) and written to `out`/rig.json with refinement.json; where the frames
-/// do not determine it, that is the rig as given. Several shards may run at once on one folder. A
-/// frame whose pictures change while it is made is a failed one.
+/// with the reason. A frame's folder appears whole or not at all. All input but the pictures
+/// is checked before the first byte is written (InputError), and so is that some frame's pictures
+/// can be read, but for a shard; a broken picture is a failure of its frame. A frame that fails
+/// does not stop the others. A frame that is there already from the same rig, images and options is
+/// kept; output of anything else is an InputError unless `overwrite`. With refine_rig the rig is
+/// refined from all frames together (of a long sequence, from frames evenly picked) and written to
+/// `out`/rig.json with refinement.json; where the frames do not determine it, that is the rig as
+/// given. Several shards may run at once on one folder. A frame whose pictures change while it is
+/// made is a failed one.
 [[nodiscard]] SequenceOutcome reconstruct_sequence(const std::filesystem::path& rig_path,
                                                    const std::filesystem::path& frames,
                                                    const std::filesystem::path& out,

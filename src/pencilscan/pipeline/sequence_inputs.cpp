@@ -1,6 +1,7 @@
 #include "pencilscan/pipeline/sequence_inputs.h"
 
 #include <algorithm>
+#include <exception>
 
 #include "pencilscan/core/counted_progress.h"
 #include "pencilscan/core/error.h"
@@ -158,14 +159,18 @@ std::vector<char> resumable(const fs::path& out, const RunInputs& inputs,
   return done;
 }
 
-void check_images(const Rig& rig, const FrameSource& frames, const Progress& progress) {
-  // In chunks, so that only a few decoded frames are in memory.
-  const auto chunk = static_cast<std::size_t>(thread_count());
-  for (std::size_t first = 0; first < frames.size(); first += chunk) {
-    const std::size_t count = std::min(chunk, frames.size() - first);
-    parallel_for(count, [&](std::size_t i) { frames.check(rig, first + i); });
-    tell_steps(progress, "checking: frame", first + count, frames.size());
+void check_any_frame(const Rig& rig, const FrameSource& frames, const Progress& progress) {
+  std::exception_ptr first;
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    try {
+      frames.check(rig, i);
+      return;
+    } catch (const InputError&) {
+      if (!first) first = std::current_exception();
+    }
+    if (i + 1 < frames.size()) tell_steps(progress, "checking: frame", i + 1, frames.size());
   }
+  if (first) std::rethrow_exception(first);
 }
 
 }  // namespace pencilscan

@@ -62,7 +62,7 @@ bool refuse_other_settings(const std::filesystem::path& out, const RunInputs& in
                                           const std::vector<std::string>& keys,
                                           const SequenceOptions& options);
 
-/// Reads all pictures once; InputError at the first that cannot be read.
-void check_images(const Rig& rig, const FrameSource& frames, const Progress& progress);
+/// InputError, that of the first frame, where the pictures of none can be read.
+void check_any_frame(const Rig& rig, const FrameSource& frames, const Progress& progress);
 
 }  // namespace pencilscan

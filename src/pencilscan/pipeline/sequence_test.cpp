@@ -128,6 +128,18 @@ TEST_F(Run, AFrameAppearsWholeAndTheFirstOneStays) {
   EXPECT_EQ(frame_status(out(), "000000", "t", "i").state, FrameState::kOther);
 }
 
+TEST_F(Run, AResultWithAnEmptyFileIsMadeAnew) {
+  for (const char* name : {"report.json", "points.ply", "pictures/cam0.jpg"}) {
+    FrameFolder folder(out() / name, "000000", "s", "i");
+    for (const char* file : {"report.json", "points.ply", "pictures/cam0.jpg"})
+      write_text(folder.path() / file, "{}");
+    folder.publish();
+    EXPECT_EQ(frame_status(out() / name, "000000", "s", "i").state, FrameState::kDone);
+    fs::resize_file(out() / name / "000000" / name, 0);
+    EXPECT_EQ(frame_status(out() / name, "000000", "s", "i").state, FrameState::kMissing) << name;
+  }
+}
+
 TEST_F(Run, IsNewWhileAnotherShardWritesTheFirstFile) {
   EXPECT_TRUE(is_new_run(out()));
   write_text(out() / "inputs.json.part123_0", "{");
@@ -377,9 +389,19 @@ TEST_F(Sequence, ShardsInAnyNumberGiveTheSameBytes) {
   for (const std::size_t index : {2U, 0U, 1U}) (void)run(recording(), three, Shard{index, 3});
   EXPECT_EQ(bytes(one), bytes(three));
   EXPECT_EQ(bytes(one).size(), 2 * kFrames + 2);
-  // A whole run refuses a damaged picture before it writes anything.
-  EXPECT_THAT(error_of([&] { (void)run(recording(), temporary_.path() / "none", {}); }),
-              HasSubstr("60.0.0.0"));
+  const fs::path whole = temporary_.path() / "whole";
+  (void)run(recording(), whole, {});
+  EXPECT_EQ(bytes(one), bytes(whole));
+}
+
+TEST_F(Sequence, ARunWithoutAnyFrameThatCanBeReadWritesNothing) {
+  for (std::size_t k = 2; k < kFrames; ++k) fs::remove_all(frames() / six_digits(k));
+  write_text(frames() / "000000" / "cam0.png", "no picture");
+  EXPECT_THAT(run(frames(), temporary_.path() / "one", {}).frames[0].failure,
+              HasSubstr("cam0.png"));
+  write_text(frames() / "000001" / "cam0.png", "no picture either");
+  EXPECT_THAT(error_of([&] { (void)run(frames(), temporary_.path() / "none", {}); }),
+              HasSubstr("000000/cam0.png"));
   EXPECT_FALSE(fs::exists(temporary_.path() / "none"));
 }
 
