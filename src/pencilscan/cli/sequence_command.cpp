@@ -153,7 +153,7 @@ void say_what_is_wrong(const Recording& recording, const FrameSets& sets,
     if (!clock.shared)
       warn_of(who + ": its clock counts from another moment; it was shifted onto the others'");
   }
-  for (const std::string& warning : left_out_warnings(recording, sets)) warn_of(warning);
+  for (const std::string& warning : recording_warnings(recording, sets)) warn_of(warning);
   for (const std::string& warning : lost_warnings(recording, lost)) warn_of(warning);
   for (const auto& [before, count] : sets.gaps)
     warn_of("before frame " + six_digits(before) + " " + std::to_string(count) +
