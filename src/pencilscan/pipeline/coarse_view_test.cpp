@@ -188,6 +188,29 @@ TEST(FrameWarnings, WhatAllDevicesMissIsNoFaultOfOne) {
   EXPECT_TRUE(device_that_is_off(of_devices)) << "such a rig still does not fit";
 }
 
+// Where noise explains more than right devices miss, one that is off stands out from its kind.
+TEST(FrameWarnings, ADeviceThatIsFarFromItsKindIsNamedBelowTheLimitOfAll) {
+  Rig rig = fine_rig(1);
+  rig.projectors.resize(4, rig.projectors[0]);
+  for (std::size_t p = 0; p < 4; ++p) rig.projectors[p].name = "proj" + std::to_string(p);
+  const std::size_t cameras = rig.cameras.size();
+  std::vector<CrossingDisagreement> of_devices(cameras + 4, {700, 0.11, 0.22, {}});
+  of_devices[cameras + 3] = {190, 0.29, 0.15, {}};
+  const auto warning = device_warning(rig, of_devices);
+  ASSERT_TRUE(warning);
+  EXPECT_EQ(warning->device, "proj3");
+  EXPECT_THAT(warning->text, ::testing::Not(::testing::HasSubstr("(or ")));
+  of_devices[0] = {150, 0.45, 0.22, {}};
+  EXPECT_THAT(device_warning(rig, of_devices).value().text,
+              ::testing::HasSubstr("(or camera " + rig.cameras[0].name));
+  of_devices[0] = {700, 0.11, 0.22, {}};
+  of_devices[cameras + 1].median_px = 0.24;
+  EXPECT_FALSE(device_warning(rig, of_devices)) << "two miss alike";
+  of_devices[cameras + 1].median_px = 0.11;
+  of_devices[cameras + 3].median_px = 0.17;
+  EXPECT_FALSE(device_warning(rig, of_devices)) << "noise explains it";
+}
+
 // A camera that turned keeps few crossings, and shares its misses with the projectors.
 TEST(FrameWarnings, TheDeviceThatMissesMostIsNamedThoughItsCrossingsAreFew) {
   const Scene scene(fine_rig(1));
