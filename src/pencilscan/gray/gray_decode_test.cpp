@@ -139,17 +139,22 @@ INSTANTIATE_TEST_SUITE_P(
                       Scene{.noise = 0.001, .rounded = false}));
 
 /// Cameras of 10, 12 or 14 bits leave their values in the low ones of 16, or fill these.
-TEST(GrayStack, ValuesOfASensorFillItsRange) {
-  const TemporaryFolder folder("gray_stack");
+Rig rig_of_one_pair() {
   Rig rig;
   rig.cameras.emplace_back();
   rig.cameras[0].name = "cam0";
   rig.cameras[0].width = rig.cameras[0].height = kSize;
-  rig.cameras[0].black_level = 64. / 65535;
   rig.projectors.emplace_back();
   rig.projectors[0].name = "proj0";
   rig.projectors[0].width = kPanelWidth;
   rig.projectors[0].height = kPanelHeight;
+  return rig;
+}
+
+TEST(GrayStack, ValuesOfASensorFillItsRange) {
+  const TemporaryFolder folder("gray_stack");
+  Rig rig = rig_of_one_pair();
+  rig.cameras[0].black_level = 64. / 65535;
   Scene scene;
   scene.rounded = false;
   const GrayImageSource images = images_of(scene);
@@ -174,15 +179,8 @@ TEST(GrayStack, ValuesOfASensorFillItsRange) {
 
 TEST(GrayStack, WithoutInversesPatternsAreComparedAsLight) {
   const TemporaryFolder folder("gray_gamma");
-  Rig rig;
-  rig.cameras.emplace_back();
-  rig.cameras[0].name = "cam0";
-  rig.cameras[0].width = rig.cameras[0].height = kSize;
+  Rig rig = rig_of_one_pair();
   rig.cameras[0].gamma = 2.2;
-  rig.projectors.emplace_back();
-  rig.projectors[0].name = "proj0";
-  rig.projectors[0].width = kPanelWidth;
-  rig.projectors[0].height = kPanelHeight;
   const Scene light{.noise = 0, .inverses = false, .rounded = false};
   Scene stored = light;
   stored.gamma = 2.2;
