@@ -50,15 +50,17 @@ void warn_of_coverage(double coverage, const std::string& what,
 
 /// That half of the points lie farther from the fitted shape than a point counts as near it: 1 % of
 /// its size (docs/figures.md). No label or scale that is wrong makes that of the shape asked for.
-void warn_of_shape(std::vector<double> distances, double size_mm, const std::string& shape,
+/// True where it is said.
+bool warn_of_shape(std::vector<double> distances, double size_mm, const std::string& shape,
                    const std::string& hint, std::vector<std::string>& warnings) {
   constexpr double kNear = 0.01;
-  if (distances.empty()) return;
+  if (distances.empty()) return false;
   const double usual = upper_median(std::move(distances));
-  if (usual <= kNear * size_mm) return;
+  if (usual <= kNear * size_mm) return false;
   warnings.push_back("half of the points lie more than " + formatted(usual, "%.3g") +
                      " mm from the " + shape + " that fits them best: they are hardly one, " +
                      hint);
+  return true;
 }
 
 template <class Shape>
@@ -119,10 +121,9 @@ std::vector<std::string> artefact_warnings(const BallFigures& ball,
   std::vector<std::string> warnings = unit_warnings(ball.points);
   warn_of_unit(2 * ball.trimmed.radius, "the ball", ball.points, warnings);
   const auto distance = [&](const Vec3& x) { return signed_distance(ball.trimmed, x); };
-  const std::size_t before = warnings.size();
-  warn_of_shape(distances_of(ball.points, distance), 2 * ball.trimmed.radius, "sphere",
-                "or much else is among them", warnings);
-  if (warnings.size() > before) return warnings;  // its size is that of no ball
+  if (warn_of_shape(distances_of(ball.points, distance), 2 * ball.trimmed.radius, "sphere",
+                    "or much else is among them", warnings))
+    return warnings;  // its size is that of no ball
   warn_of_size(ball, "the ball", options, warnings);
   warn_of_coverage(ball.coverage, "the ball", warnings);
   return warnings;

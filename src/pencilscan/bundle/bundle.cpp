@@ -81,7 +81,8 @@ class ProblemBuilder {
     for (const BoardView& seen : from_.board_views) {
       BundleDevice& device = from_.devices[seen.view.device];
       if (!device.present) continue;
-      auto* cost = new BoardCost(seen.view.pixel, sigma(seen.view), device.held, seen.position_mm);
+      auto* cost =
+          new BoardCost({seen.view.pixel, sigma(seen.view), device.held}, seen.position_mm);
       add(cost, loss_.get(), seen.view.device, from_.board_poses[seen.board].data());
       ordering_->AddElementToGroup(from_.board_poses[seen.board].data(), 1);
     }
@@ -168,7 +169,7 @@ class ProblemBuilder {
       const bool is_hub = &view == from_.tracks[t].views.data();
       const double deviation = is_hub ? view.sigma_px : sigma(view);
       // The hub's pixel is no measurement but the place where the others were taken.
-      add(new ReprojectionCost(view.pixel, deviation, device.held),
+      add(new ReprojectionCost({view.pixel, deviation, device.held}),
           is_hub ? nullptr : track_loss_.get(), view.device, from_.points[t].data());
     }
     ordering_->AddElementToGroup(from_.points[t].data(), 0);
@@ -229,7 +230,7 @@ std::optional<Vec2> view_error(const BundleDevice& device, const Vec3& point,
 
 ViewLinearization linearize(const BundleDevice& device, const Vec3& point, const TrackView& view,
                             double extra_sigma_px) {
-  const ReprojectionCost cost(view.pixel, std::hypot(view.sigma_px, extra_sigma_px), device.held);
+  const ReprojectionCost cost({view.pixel, std::hypot(view.sigma_px, extra_sigma_px), device.held});
   ViewLinearization result;
   const std::array<const double*, 3> parameters{device.pose.data(), device.inner.data(),
                                                 point.data()};

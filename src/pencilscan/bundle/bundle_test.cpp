@@ -88,10 +88,10 @@ TEST(Reprojection, DerivativesAreExactForAnyTurnAndLens) {
     const std::vector<double> pose{axis.x(), axis.y(), axis.z(), 20, -10, 800};
     const std::vector<double> board{0.3 - angle, 0.1, -0.2, 5, 6, -30};
     EXPECT_LT(
-        derivative_error(ReprojectionCost({300, 200}, 0.5, held), {pose, inner, {40, -60, 30}}),
+        derivative_error(ReprojectionCost({{300, 200}, 0.5, held}), {pose, inner, {40, -60, 30}}),
         1e-5)
         << angle;
-    EXPECT_LT(derivative_error(BoardCost({300, 200}, 0.5, held, {70, -40}), {pose, inner, board}),
+    EXPECT_LT(derivative_error(BoardCost({{300, 200}, 0.5, held}, {70, -40}), {pose, inner, board}),
               1e-5)
         << angle;
   }

@@ -67,7 +67,12 @@ void write_divided(const Rows<kColumns>& from, double sigma, double* to) {
   rows = from / sigma;
 }
 
-}  // namespace
+/// A point that a pose moves, and how it changes with the pose and with the point that is moved.
+struct MovedPoint {
+  Vec3 point;
+  Eigen::Matrix<double, 3, 6> by_pose;
+  Mat3 by_point;
+};
 
 MovedPoint moved_point(const double* pose, const Vec3& point) {
   const Turn turn = turn_of(pose);
@@ -83,13 +88,13 @@ MovedPoint moved_point(const double* pose, const Vec3& point) {
   return moved;
 }
 
-std::optional<Vec2> shown_pixel(const double* pose, const double* inner, const HeldInner& held,
-                                const Vec3& point) {
-  const auto straight = straight_of(turn_of(pose).rotation * point + translation_of(pose));
-  if (!straight) return std::nullopt;
-  const Vec2 bent = distort({lens_coefficients(inner, held.denominator)}, *straight);
-  return focal_matrix(inner, held) * bent + Vec2(inner[kCx], inner[kCy]);
-}
+/// Where a device shows a point, and how that changes.
+struct ShownPoint {
+  Vec2 pixel;
+  Rows<6> by_pose;
+  Rows<kIntrinsics> by_inner;
+  Rows<3> by_point;
+};
 
 std::optional<ShownPoint> shown_point(const double* pose, const double* inner,
                                       const HeldInner& held, const Vec3& point) {
@@ -114,36 +119,54 @@ std::optional<ShownPoint> shown_point(const double* pose, const double* inner,
   return shown;
 }
 
+/// What both costs share; `parameters` and `jacobians` begin with those of the device. The
+/// derivative by the point: nothing without `jacobians`.
+struct Evaluated {
+  bool is_shown = false;
+  Rows<3> by_point = Rows<3>::Zero();
+};
+
+Evaluated evaluate(const SeenPixel& seen, const double* const* parameters, const Vec3& point,
+                   double* residual, double** jacobians) {
+  Eigen::Map<Vec2> whitened(residual);
+  if (jacobians == nullptr) {
+    const auto pixel = shown_pixel(parameters[0], parameters[1], seen.held, point);
+    if (pixel) whitened = (*pixel - seen.pixel) / seen.sigma;
+    return {pixel.has_value()};
+  }
+  const auto shown = shown_point(parameters[0], parameters[1], seen.held, point);
+  if (!shown) return {};
+  whitened = (shown->pixel - seen.pixel) / seen.sigma;
+  write_divided<6>(shown->by_pose, seen.sigma, jacobians[0]);
+  write_divided<kIntrinsics>(shown->by_inner, seen.sigma, jacobians[1]);
+  return {true, shown->by_point};
+}
+
+}  // namespace
+
+std::optional<Vec2> shown_pixel(const double* pose, const double* inner, const HeldInner& held,
+                                const Vec3& point) {
+  const auto straight = straight_of(turn_of(pose).rotation * point + translation_of(pose));
+  if (!straight) return std::nullopt;
+  const Vec2 bent = distort({lens_coefficients(inner, held.denominator)}, *straight);
+  return focal_matrix(inner, held) * bent + Vec2(inner[kCx], inner[kCy]);
+}
+
 bool ReprojectionCost::Evaluate(const double* const* parameters, double* residual,
                                 double** jacobians) const {
   const Vec3 point(parameters[2][0], parameters[2][1], parameters[2][2]);
-  Eigen::Map<Vec2> whitened(residual);
-  if (jacobians == nullptr) {
-    const auto pixel = shown_pixel(parameters[0], parameters[1], held_, point);
-    if (pixel) whitened = (*pixel - pixel_) / sigma_;
-    return pixel.has_value();
-  }
-  const auto shown = shown_point(parameters[0], parameters[1], held_, point);
-  if (!shown) return false;
-  whitened = (shown->pixel - pixel_) / sigma_;
-  write_divided<6>(shown->by_pose, sigma_, jacobians[0]);
-  write_divided<kIntrinsics>(shown->by_inner, sigma_, jacobians[1]);
-  write_divided<3>(shown->by_point, sigma_, jacobians[2]);
-  return true;
+  const Evaluated at = evaluate(seen_, parameters, point, residual, jacobians);
+  if (at.is_shown && jacobians != nullptr) write_divided<3>(at.by_point, seen_.sigma, jacobians[2]);
+  return at.is_shown;
 }
 
 bool BoardCost::Evaluate(const double* const* parameters, double* residual,
                          double** jacobians) const {
-  const MovedPoint point = moved_point(parameters[2], {position_.x(), position_.y(), 0});
-  const auto shown = shown_point(parameters[0], parameters[1], held_, point.point);
-  if (!shown) return false;
-  Eigen::Map<Vec2> whitened(residual);
-  whitened = (shown->pixel - pixel_) / sigma_;
-  if (jacobians == nullptr) return true;
-  write_divided<6>(shown->by_pose, sigma_, jacobians[0]);
-  write_divided<kIntrinsics>(shown->by_inner, sigma_, jacobians[1]);
-  write_divided<6>(shown->by_point * point.by_pose, sigma_, jacobians[2]);
-  return true;
+  const MovedPoint moved = moved_point(parameters[2], {position_.x(), position_.y(), 0});
+  const Evaluated at = evaluate(seen_, parameters, moved.point, residual, jacobians);
+  if (at.is_shown && jacobians != nullptr)
+    write_divided<6>(at.by_point * moved.by_pose, seen_.sigma, jacobians[2]);
+  return at.is_shown;
 }
 
 }  // namespace pencilscan

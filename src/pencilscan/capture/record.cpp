@@ -73,8 +73,7 @@ class Session {
   std::vector<std::int64_t> first_ns_;  ///< per camera, time of its first picture
   std::int64_t begin_ns_ = -1;          ///< frames before are not recorded
   std::int64_t end_ns_ = INT64_MAX;     ///< nor those after
-  std::size_t pulses_ = 0;
-  double next_pulse_s_ = 0;  ///< since the start
+  double next_pulse_s_ = 0;             ///< since the start
   Stopwatch since_pulse_;
   std::vector<char> answered_;  ///< per camera: a picture since then, whole or not
   Stopwatch since_start_;
@@ -99,7 +98,7 @@ GatheringOptions Session::gathering_of(const CameraGroup& cameras, const RecordO
 
 bool Session::pulse_is_due() const {
   if (!options_.software_trigger) return false;
-  if (options_.still_s <= 0 || pulses_ == 0) return since_start_.seconds() >= next_pulse_s_;
+  if (options_.still_s <= 0 || next_pulse_s_ == 0) return since_start_.seconds() >= next_pulse_s_;
   const double waited = since_pulse_.seconds();
   return (all_answered() && waited * options_.rate_hz >= 1) || waited >= options_.still_s;
 }
@@ -107,7 +106,6 @@ bool Session::pulse_is_due() const {
 void Session::pulse() {
   if (!pulse_is_due()) return;
   cameras_.group().trigger();
-  ++pulses_;
   // Pulses that a stall kept back are not made up: cameras would drop them, or crowd.
   const double period = 1 / options_.rate_hz;
   const double now = since_start_.seconds();

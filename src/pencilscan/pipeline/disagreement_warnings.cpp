@@ -58,7 +58,7 @@ constexpr double kMoreThanItsKind = 1.5;
 // spacing 2 to 3 times.
 constexpr double kOverNoise = 1.2;
 constexpr double kFarMoreThanItsKind = 2;
-constexpr std::ptrdiff_t kFewestOfAKind = 3;  // of two, either may be right
+constexpr std::size_t kFewestOfAKind = 3;  // of two, either may be right
 // A device that is off shares its misses with those of the other kind that see its lines. Where one
 // of these misses nearly as far, it may be that one.
 constexpr double kNearlyAsFar = 1.3;
@@ -89,24 +89,22 @@ double own_miss(std::size_t device, std::span<const CrossingDisagreement> of_kin
   return is_alone ? all : std::sqrt(squared(all) - common2);
 }
 
-/// The device that alone misses far more than the others of its kind do.
-std::optional<std::size_t> apart_from_its_kind(std::span<const CrossingDisagreement> of_kind) {
-  std::vector<double> misses;
-  for (const CrossingDisagreement& crossings : of_kind) misses.push_back(over_noise(crossings));
-  const auto judged = std::count_if(misses.begin(), misses.end(), [](double m) { return m > 0; });
-  if (judged < kFewestOfAKind) return std::nullopt;
-  const auto most = std::max_element(misses.begin(), misses.end());
-  const double own = std::exchange(*most, 0.0);
-  const double next = *std::max_element(misses.begin(), misses.end());
-  if (own <= kOverNoise || own <= kFarMoreThanItsKind * next) return std::nullopt;
-  return static_cast<std::size_t>(most - misses.begin());
+/// The one that misses most of some devices.
+std::size_t farthest(std::span<const CrossingDisagreement> devices) {
+  return static_cast<std::size_t>(
+      std::max_element(devices.begin(), devices.end(),
+                       [](const auto& a, const auto& b) { return over_noise(a) < over_noise(b); }) -
+      devices.begin());
 }
 
-std::size_t farthest(std::span<const CrossingDisagreement> of_kind) {
-  return static_cast<std::size_t>(
-      std::max_element(of_kind.begin(), of_kind.end(),
-                       [](const auto& a, const auto& b) { return over_noise(a) < over_noise(b); }) -
-      of_kind.begin());
+/// Whether one device alone misses far more than the others of its kind do.
+bool one_stands_apart(std::span<const CrossingDisagreement> of_kind) {
+  std::vector<double> misses;
+  for (const CrossingDisagreement& crossings : of_kind)
+    if (const double miss = over_noise(crossings); miss > 0) misses.push_back(miss);
+  if (misses.size() < kFewestOfAKind) return false;
+  std::sort(misses.rbegin(), misses.rend());
+  return misses[0] > kOverNoise && misses[0] > kFarMoreThanItsKind * misses[1];
 }
 
 /// Which devices may be the one that is off, the likelier one first: the one that stands out from
@@ -116,12 +114,12 @@ std::vector<std::size_t> devices_apart(std::span<const CrossingDisagreement> of_
   if (of_devices.size() <= cameras || cameras == 0) return {};
   const auto of_cameras = of_devices.first(cameras);
   const auto of_projectors = of_devices.subspan(cameras);
+  if (!one_stands_apart(of_cameras) && !one_stands_apart(of_projectors)) return {};
   const std::size_t camera = farthest(of_cameras);
   const std::size_t projector = cameras + farthest(of_projectors);
   std::vector<std::size_t> either{camera, projector};
   const auto miss = [&](std::size_t d) { return over_noise(of_devices[d]); };
   if (miss(projector) > miss(camera)) std::swap(either[0], either[1]);
-  if (!apart_from_its_kind(of_cameras) && !apart_from_its_kind(of_projectors)) return {};
   if (miss(either[0]) > kNearlyAsFar * miss(either[1])) either.pop_back();
   return either;
 }
@@ -147,11 +145,10 @@ std::optional<std::size_t> device_far_off(std::span<const CrossingDisagreement> 
 
 std::optional<std::size_t> device_that_is_off(
     std::span<const CrossingDisagreement> device_crossings) {
-  const auto most =
-      std::max_element(device_crossings.begin(), device_crossings.end(),
-                       [](const auto& a, const auto& b) { return over_noise(a) < over_noise(b); });
-  if (most == device_crossings.end() || !(over_noise(*most) > kFarOverNoise)) return std::nullopt;
-  return static_cast<std::size_t>(most - device_crossings.begin());
+  if (device_crossings.empty()) return std::nullopt;
+  const std::size_t most = farthest(device_crossings);
+  if (!(over_noise(device_crossings[most]) > kFarOverNoise)) return std::nullopt;
+  return most;
 }
 
 std::string misses_text(const Device& device, const CrossingDisagreement& crossings) {

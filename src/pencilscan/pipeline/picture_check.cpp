@@ -111,11 +111,10 @@ std::optional<std::pair<int, int>> exchanged_pair(
   return std::pair(static_cast<int>(a), static_cast<int>(b));
 }
 
-/// Cameras of which too few curves got a name, and the others that have enough, with their shares.
+/// Cameras of which too few curves got a name, and the rest, that have enough.
 struct Suspects {
   std::vector<Suspect> cameras;
-  std::vector<std::size_t> others;
-  std::vector<double> of_others;
+  std::vector<Suspect> rest;
 };
 
 Suspects suspects_of(const Rig& rig, const Frame& frame, const Labeling& labeling) {
@@ -123,16 +122,10 @@ Suspects suspects_of(const Rig& rig, const Frame& frame, const Labeling& labelin
   for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
     const TellingPoints points = telling_points(labeling, c);
     if (frame.images[c].empty() || !points.are_enough()) continue;
-    const double share = points.named_share();
-    if (share >= kFewNamed) {
-      found.others.push_back(c);
-      found.of_others.push_back(share);
-      continue;
-    }
-    Suspect suspect;
-    suspect.camera = c;
-    suspect.share = share;
-    found.cameras.push_back(std::move(suspect));
+    Suspect camera;
+    camera.camera = c;
+    camera.share = points.named_share();
+    (camera.share >= kFewNamed ? found.rest : found.cameras).push_back(std::move(camera));
   }
   return found;
 }
@@ -164,32 +157,41 @@ void try_remedies(const PictureTrial& trial, double usual, std::vector<Suspect>&
   }
 }
 
+/// The picture by itself: its light, and what gets names without the others.
+void look_at_alone(const Rig& rig, const Frame& frame, const PictureTrial& trial, Suspect& s) {
+  s.light = linear_light(rig.cameras[s.camera], frame.images[s.camera]);
+  s.alone = trial.telling_points(s.camera, s.light).named_share();
+}
+
 /// A fault that no fewer pictures have than there are others may be that of all of them: wrong ones
-/// get names by chance, too. Those of the others that get more once it is undone.
-std::vector<PictureFinding> shared_fault(const Rig& rig, const Frame& frame,
-                                         const PictureTrial& trial,
-                                         const std::vector<Suspect>& suspects,
-                                         std::vector<std::size_t> others) {
-  // Whether they show what the others measured (ShownLines) says nothing once most are wrong.
-  for (const Suspect& s : suspects)
-    if (s.best_named == 0) others.push_back(s.camera);
-  std::vector<PictureFinding> findings;
+/// get names by chance, too. Finds it in those of the others that get more once it is undone;
+/// whether they show what the others measured (ShownLines) says nothing once most are wrong.
+/// `rest`: the cameras that were no suspects.
+void find_shared_fault(const Rig& rig, const Frame& frame, const PictureTrial& trial,
+                       std::vector<Suspect>& suspects, std::vector<Suspect>& rest) {
   for (const Remedy& remedy : remedies()) {
     std::vector<double> named;
-    for (const Suspect& s : suspects)
-      if (s.best_named > 0 && s.best.fault == remedy.fault) named.push_back(s.best_named);
+    std::vector<Suspect*> others;
+    for (Suspect& s : suspects) {
+      if (s.best_named == 0)
+        others.push_back(&s);
+      else if (s.best.fault == remedy.fault)
+        named.push_back(s.best_named);
+    }
+    for (Suspect& s : rest)
+      if (s.best_named == 0) others.push_back(&s);
     if (named.size() < 2 || named.size() < others.size()) continue;
     const double usual = upper_median(std::move(named));
-    for (const std::size_t c : others) {
-      const cv::Mat light = linear_light(rig.cameras[c], frame.images[c]);
-      const double alone = trial.telling_points(c, light).named_share();
-      const TellingPoints undone = trial.telling_points(c, remedy.undo(light));
-      if (undone.are_enough() && undone.named_share() > alone &&
-          undone.named_share() >= kFarLess * usual)
-        findings.push_back({remedy.fault, static_cast<int>(c), -1});
-    }
+    parallel_for(others.size(), [&](std::size_t i) {
+      Suspect& s = *others[i];
+      if (s.light.empty()) look_at_alone(rig, frame, trial, s);
+      const TellingPoints undone = trial.telling_points(s.camera, remedy.undo(s.light));
+      const double share = undone.named_share();
+      if (!undone.are_enough() || share <= s.alone || share < kFarLess * usual) return;
+      s.best = {remedy.fault, static_cast<int>(s.camera), -1};
+      s.best_named = share;
+    });
   }
-  return findings;
 }
 
 /// What the other cameras measured goes on beyond the volume.
@@ -274,35 +276,31 @@ std::vector<PictureFinding> misplaced_pictures(const Rig& rig, const Frame& fram
   std::vector<Suspect>& suspects = asked.cameras;
   if (suspects.empty()) return {};
   const auto points = points_by_camera(rig, some_points(rig, found));
-  const std::size_t others = asked.of_others.size();
-  const double usual = others == 0 ? 2 * kFewNamed : upper_median(std::move(asked.of_others));
+  const std::size_t others = asked.rest.size();
+  std::vector<double> of_others;
+  for (const Suspect& s : asked.rest) of_others.push_back(s.share);
+  const double usual = others == 0 ? 2 * kFewNamed : upper_median(std::move(of_others));
   const PictureTrial trial(rig, options);
   parallel_for(suspects.size(), [&](std::size_t i) {
     Suspect& s = suspects[i];
-    const Camera& camera = rig.cameras[s.camera];
-    s.light = linear_light(camera, frame.images[s.camera]);
-    s.alone = trial.telling_points(s.camera, s.light).named_share();
+    look_at_alone(rig, frame, trial, s);
     s.shown = shown_lines(rig, found.families, found.graphs[s.camera], points);
   });
   try_remedies(trial, usual, suspects);
+  find_shared_fault(rig, frame, trial, suspects, asked.rest);
   const ViewAgreement agreement(rig, points);
   const auto is_contradicted = [&](std::size_t c) {
     const PairAgreement said = agreement.with_others(c);
     return said.same + said.apart >= kFewPoints && said.share() < kPlainContradiction;
   };
-  std::vector<PictureFinding> findings = shared_fault(rig, frame, trial, suspects, asked.others);
-  const auto is_found = [&](std::size_t camera) {
-    return std::any_of(findings.begin(), findings.end(), [&](const PictureFinding& f) {
-      return static_cast<std::size_t>(f.camera) == camera;
-    });
-  };
+  std::vector<PictureFinding> findings;
+  for (const Suspect& s : asked.rest)
+    if (s.best_named > 0) findings.push_back(s.best);
   std::vector<PictureFinding> unfit;
   std::size_t fit = others;
   for (const Suspect& s : suspects) {
     if (s.best_named > 0) {
       findings.push_back(s.best);
-    } else if (is_found(s.camera)) {
-      continue;
     } else if (s.shown.fits()) {
       ++fit;
     } else if (s.share < kFarLess * usual && (s.shown.misfits() || is_contradicted(s.camera)) &&
