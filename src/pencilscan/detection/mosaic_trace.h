@@ -23,7 +23,7 @@ enum class Greens {
   kEven,  ///< x + y is even: GRBG, GBRG
 };
 [[nodiscard]] Greens greens_of(const Mosaic& mosaic);
-/// Those of a picture of one channel, any depth: over blocks of 32 x 32 px the two green places
+/// Those of a picture of one channel, any depth: over blocks of 16 x 16 px the two green places
 /// have the same mean, and red has not that of blue. Nothing where noise hides it, or without a
 /// mosaic.
 [[nodiscard]] Greens greens_of(const cv::Mat& samples);

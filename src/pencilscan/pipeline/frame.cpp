@@ -9,6 +9,7 @@
 #include "pencilscan/pipeline/disagreement_warnings.h"
 #include "pencilscan/pipeline/frame_warnings.h"
 #include "pencilscan/pipeline/light_warnings.h"
+#include "pencilscan/pipeline/line_naming.h"
 #include "pencilscan/pipeline/sensor_frame.h"
 #include "pencilscan/surface/manifold.h"
 
@@ -130,7 +131,15 @@ FrameResult measure_frame(const Rig& rig, const Frame& frame, PointResult lines,
   const Frame right = without(frame, result.points.left_out);
   result.shape = measure_shape(rig, right, result.points, options.shape, links, clock);
   if (links.only_hands_on) return result;
+  std::vector<TellingPoints> named;
+  for (std::size_t c = 0; c < rig.cameras.size(); ++c)
+    named.push_back(telling_points(result.points.labeling, c));
   result = match_on_surface(rig, std::move(result), options.points, clock);
+  if (result.points.is_on_surface) {
+    for (Warning& warning :
+         missing_lines_warnings(rig, right, result.points.labeling.expected, named))
+      result.points.warnings.push_back(std::move(warning));
+  }
   clock("confirmation",
         [&] { result = finish_shape(rig, std::move(result), options.shape.fusion); });
   end_points(rig, frame, options.points, result.points);

@@ -180,8 +180,6 @@ FrameResult match_on_surface(const Rig& rig, FrameResult result, const PointOpti
     for (const GridGraph& graph : points.graphs)
       if (graph.curves.empty())
         points.labeling.expected[static_cast<std::size_t>(graph.camera)].clear();
-    for (Warning& warning : missing_lines_warnings(rig, points.labeling.expected))
-      points.warnings.push_back(std::move(warning));
     std::vector<MeasuredPoint> triangulated =
         triangulate(rig, points.graphs, points.labeling, options.triangulation);
     SettledPoints settled = settle_on_surface(

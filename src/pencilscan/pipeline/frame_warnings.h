@@ -8,6 +8,7 @@
 #include "pencilscan/core/warning.h"
 #include "pencilscan/pipeline/cut_lines.h"
 #include "pencilscan/pipeline/frame.h"
+#include "pencilscan/pipeline/line_naming.h"
 
 namespace pencilscan {
 
@@ -23,9 +24,12 @@ namespace pencilscan {
 [[nodiscard]] Warning naming_warning(const std::string& doubt);
 
 /// Cameras and projectors that have hardly any of the lines that the measured surface lets expect,
-/// where the others have theirs. `expected`: per camera and projector.
+/// where the others have theirs; of a camera, fewer than half do where the solution named as few of
+/// its lines, or where its picture is out of focus. `expected`: per camera and projector; `named`:
+/// per camera, by the solution.
 [[nodiscard]] std::vector<Warning> missing_lines_warnings(
-    const Rig& rig, std::span<const std::vector<ExpectedLines>> expected);
+    const Rig& rig, const Frame& frame, std::span<const std::vector<ExpectedLines>> expected,
+    std::span<const TellingPoints> named);
 
 /// That the volume cuts what was measured.
 [[nodiscard]] std::optional<Warning> volume_warning(const Rig& rig, const CutLines& lines);

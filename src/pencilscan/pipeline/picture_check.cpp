@@ -1,14 +1,15 @@
 #include "pencilscan/pipeline/picture_check.h"
 
 #include <algorithm>
+#include <cmath>
 #include <functional>
-#include <numbers>
 #include <opencv2/imgproc.hpp>
 
 #include "pencilscan/core/formatted.h"
 #include "pencilscan/core/median.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/pipeline/cut_lines.h"
+#include "pencilscan/pipeline/line_contrast.h"
 #include "pencilscan/pipeline/picture_trial.h"
 #include "pencilscan/pipeline/shown_lines.h"
 #include "pencilscan/pipeline/view_agreement.h"
@@ -63,21 +64,9 @@ struct Suspect {
   double best_named = 0;
 };
 
-/// How wide a camera's lines are: the median over its curves' points, of the lines' width at the
-/// volume's centre in its picture; 0 without curves.
-double usual_line_width(const Rig& rig, const GridGraph& graph) {
-  return median_of_points({&graph, 1}, &CurvePoint::width_px) /
-         pixels_at_center(rig, rig.camera(graph.camera), line_width(rig));
-}
-
-PictureFinding misfit(const Rig& rig, const PointResult& found, std::size_t camera) {
-  std::vector<double> of_others;
-  for (std::size_t c = 0; c < found.graphs.size(); ++c)
-    if (const double width = usual_line_width(rig, found.graphs[c]); c != camera && width > 0)
-      of_others.push_back(width);
+PictureFinding misfit(const Rig& rig, const Frame& frame, std::size_t camera) {
   PictureFinding finding{PictureFault::kDoesNotFit, static_cast<int>(camera), -1};
-  const double own = usual_line_width(rig, found.graphs[camera]);
-  if (own > 0 && !of_others.empty()) finding.line_width = own / upper_median(std::move(of_others));
+  finding.contrast = line_contrasts(rig, frame)[camera];
   return finding;
 }
 
@@ -261,12 +250,11 @@ std::string describe(const Rig& rig, const PictureFinding& finding) {
       break;
   }
   const std::string misfit = "does not fit the rig as the others' do: ";
-  const std::string moved = "the camera was moved, or the picture is of another moment or rig";
-  // A blur as wide as the lines.
-  if (finding.line_width > std::numbers::sqrt2)
-    return who + misfit + "its lines are " + formatted(finding.line_width, "%.1f") +
-           " times as wide as theirs, so it is out of focus; or " + moved + out;
-  return who + misfit + moved + out;
+  if (is_out_of_focus(finding.contrast))
+    return who + misfit + "its lines stand out " +
+           formatted(1 / std::sqrt(finding.contrast), "%.1f") +
+           " times less than theirs, so it is out of focus, or its lens is fogged" + out;
+  return who + misfit + "the camera was moved, or the picture is of another moment or rig" + out;
 }
 
 std::vector<PictureFinding> misplaced_pictures(const Rig& rig, const Frame& frame,
@@ -299,13 +287,16 @@ std::vector<PictureFinding> misplaced_pictures(const Rig& rig, const Frame& fram
   std::vector<PictureFinding> unfit;
   std::size_t fit = others;
   for (const Suspect& s : suspects) {
+    // Lines that lie along a camera's way stay on each other, so that it shows many of them from
+    // where it does not stand; what it measures then lies in front of what the others did.
+    const bool is_elsewhere = s.share < kFarLess * usual && is_contradicted(s.camera);
     if (s.best_named > 0) {
       findings.push_back(s.best);
-    } else if (s.shown.fits()) {
+    } else if (s.shown.fits() && !is_elsewhere) {
       ++fit;
-    } else if (s.share < kFarLess * usual && (s.shown.misfits() || is_contradicted(s.camera)) &&
+    } else if ((is_elsewhere || (s.share < kFarLess * usual && s.shown.misfits())) &&
                !fits_larger_volume(rig, found, s, usual, options)) {
-      unfit.push_back(misfit(rig, found, s.camera));
+      unfit.push_back(misfit(rig, frame, s.camera));
     }
   }
   // Where most do not fit, their pictures are not what is wrong.
@@ -349,7 +340,7 @@ std::vector<PictureFinding> contradicting_pictures(const Rig& rig, const Frame& 
                         named < kFewer * upper_median(std::move(of_others));
   points[alone].clear();
   if (count < 3 || !is_plain || ViewAgreement(rig, points).doubtful_pairs() > 0) return {};
-  return {misfit(rig, found, alone)};
+  return {misfit(rig, frame, alone)};
 }
 
 bool points_lie_on_lines(const Rig& rig, const PointResult& found) {

@@ -30,7 +30,7 @@ struct PictureFinding {
   int camera = 0;
   int other = -1;                 ///< the camera that has the same picture, or that it is of
   Greens greens = Greens::kNone;  ///< of the mosaic in the picture
-  double line_width = 1;          ///< of its lines, of what the other cameras' lines let expect
+  double contrast = 1;  ///< of its lines, of what is usual in the others (line_contrast.h)
 };
 
 /// One sentence for the user: which camera, what is wrong, what to do.

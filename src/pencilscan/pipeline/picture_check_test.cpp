@@ -16,10 +16,12 @@
 #include "pencilscan/pipeline/disagreement_warnings.h"
 #include "pencilscan/pipeline/frame_warnings.h"
 #include "pencilscan/pipeline/light_warnings.h"
+#include "pencilscan/pipeline/line_contrast.h"
 #include "pencilscan/pipeline/sample_frame.h"
 #include "pencilscan/pipeline/sequence.h"
 #include "pencilscan/planning/ring.h"
 #include "pencilscan/recording/frame_folders.h"
+#include "pencilscan/rig/object_space.h"
 #include "pencilscan/rig/sample_devices.h"
 #include "pencilscan/simulation/simulated_object.h"
 
@@ -78,6 +80,10 @@ class PictureCheck : public testing::Test {
     const std::vector<std::string> said = said_of(frame);
     ASSERT_EQ(said.size(), parts.size()) << testing::PrintToString(said);
     for (std::size_t i = 0; i < parts.size(); ++i) EXPECT_THAT(said[i], HasSubstr(parts[i]));
+  }
+  /// Most lines of each camera have names.
+  static std::vector<TellingPoints> usual_names() {
+    return std::vector<TellingPoints>(rig_->cameras.size(), {4000, 1000});
   }
   static Frame with(std::size_t camera, const cv::Mat& picture) {
     Frame frame = *frame_;
@@ -269,7 +275,7 @@ TEST_F(PictureCheck, OfFewLinesThatAreExpectedNextToAllHaveToBeMissing) {
   const auto are_missing = [](std::size_t points, std::size_t named) {
     const std::vector<std::vector<ExpectedLines>> expected{
         {{4000, 3200}, {points, named}, {3000, 2400}}};
-    return !missing_lines_warnings(*rig_, expected).empty();
+    return !missing_lines_warnings(*rig_, *frame_, expected, usual_names()).empty();
   };
   EXPECT_TRUE(are_missing(4000, 200));
   EXPECT_TRUE(are_missing(1600, 0));
@@ -283,24 +289,71 @@ TEST_F(PictureCheck, ACameraOutOfFocusIsSaidToBe) {
   Frame frame = *frame_;
   frame.images[2] = cv::Mat();  // the fixture keeps its own
   cv::GaussianBlur(frame_->images[2], frame.images[2], {}, 6);
-  expect_said(frame,
-              {"camera cam2: its picture does not fit the rig as the others' do: its lines are"});
+  expect_said(
+      frame,
+      {"camera cam2: its picture does not fit the rig as the others' do: its lines stand out"});
   EXPECT_THAT(said_of(frame).front(), HasSubstr("out of focus"));
+}
+
+// Lines that a dark object or a small one shows stand out as others do, and so they do in coarser
+// pixels.
+TEST_F(PictureCheck, LinesStandOutAsMuchInEachCameraThatIsInFocus) {
+  Frame frame = *frame_;
+  frame.images[1] = 0.1 * frame_->images[1];
+  frame.images[3] = frame_->images[3].clone();
+  frame.images[3].colRange(0, 240).setTo(cv::Scalar::all(0));
+  Rig rig = *rig_;
+  for (std::size_t c : {4, 5}) {
+    Camera& camera = rig.cameras[c];
+    camera.K.topRows<2>() *= 0.75;
+    camera.width = 360;
+    camera.height = 270;
+    frame.images[c] = cv::Mat();
+    cv::resize(frame_->images[c], frame.images[c], {camera.width, camera.height}, 0, 0,
+               cv::INTER_AREA);
+  }
+  for (const double contrast : line_contrasts(rig, frame)) {
+    EXPECT_GT(contrast, 0.6);
+    EXPECT_LT(contrast, 1.6);
+  }
+  const double period = pixels_at_center(rig, rig.cameras[0], line_spacing(rig));
+  frame.images[0] = cv::Mat();
+  cv::GaussianBlur(frame_->images[0], frame.images[0], {}, 0.3 * period);
+  EXPECT_TRUE(is_out_of_focus(line_contrasts(rig, frame)[0]));
 }
 
 // Out of focus by less, lines lie over each other: next to none is found, and no picture misfits.
 TEST_F(PictureCheck, ACameraWithoutTheLinesThatOthersMeasureIsNamed) {
   std::vector<std::vector<ExpectedLines>> expected(
       rig_->cameras.size(), std::vector<ExpectedLines>(rig_->projectors.size(), {1000, 800}));
-  EXPECT_THAT(missing_lines_warnings(*rig_, expected), IsEmpty());
+  EXPECT_THAT(missing_lines_warnings(*rig_, *frame_, expected, usual_names()), IsEmpty());
   for (ExpectedLines& lines : expected[2]) lines.named = 20;
-  const std::vector<Warning> found = missing_lines_warnings(*rig_, expected);
+  const std::vector<Warning> found =
+      missing_lines_warnings(*rig_, *frame_, expected, usual_names());
   ASSERT_EQ(found.size(), 1U);
   EXPECT_EQ(found[0].device, rig_->cameras[2].name);
-  EXPECT_THAT(found[0].text, HasSubstr("2 % are in its picture (of the others' 80 %): it is out of "
-                                       "focus"));
+  EXPECT_THAT(found[0].text,
+              HasSubstr("2 % are in its picture (of the others' 80 %): it is covered"));
   expected[2].clear();  // its picture was left out
-  EXPECT_THAT(missing_lines_warnings(*rig_, expected), IsEmpty());
+  EXPECT_THAT(missing_lines_warnings(*rig_, *frame_, expected, usual_names()), IsEmpty());
+}
+
+// A camera that stands elsewhere gets names of other lines, and has a third of those expected: as
+// many as a right one that sees little. That few of all its lines had names tells them apart.
+TEST_F(PictureCheck, ACameraWithFewNamesAndFewOfTheExpectedLinesIsNamed) {
+  std::vector<std::vector<ExpectedLines>> expected(
+      rig_->cameras.size(), std::vector<ExpectedLines>(rig_->projectors.size(), {1000, 850}));
+  for (ExpectedLines& lines : expected[4]) lines.named = 350;
+  EXPECT_THAT(missing_lines_warnings(*rig_, *frame_, expected, usual_names()), IsEmpty());
+  std::vector<TellingPoints> named = usual_names();
+  named[4] = {1500, 3500};
+  const std::vector<Warning> found = missing_lines_warnings(*rig_, *frame_, expected, named);
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_EQ(found[0].device, rig_->cameras[4].name);
+  for (ExpectedLines& lines : expected[4]) lines.named = 500;
+  EXPECT_THAT(missing_lines_warnings(*rig_, *frame_, expected, named), IsEmpty());
+  for (ExpectedLines& lines : expected[4]) lines = {60, 20};  // it hardly sees what was measured
+  EXPECT_THAT(missing_lines_warnings(*rig_, *frame_, expected, named), IsEmpty());
 }
 
 /// What is left in its colours is of others that share them, and no sign that it was moved.
@@ -387,6 +440,13 @@ TEST_F(PictureCheck, MosaicsThatAreNotStatedOrOthersAreNamed) {
     EXPECT_THAT(said_of(raw, rig),
                 testing::ElementsAre(HasSubstr("green samples are those of " + right)));
   }
+  // So it is where the object is small, and its lines are in a ninth of the picture.
+  cv::Mat small = frame_->images[2].clone();
+  cv::Mat around(small.size(), CV_8UC1, cv::Scalar(255));
+  around(cv::Rect(160, 120, 160, 120)) = 0;
+  small.setTo(cv::Scalar::all(0.01), around);
+  expect_said(with(2, sampled(small, *Mosaic::from_name("GBRG"))),
+              {"one colour a pixel: state the \"mosaic\" of the camera, GRBG or GBRG"});
   // A picture of a grey camera has no mosaic.
   cv::Mat grey;
   cv::transform(frame_->images[4], grey, cv::Matx13f(0.3F, 0.6F, 0.1F));
