@@ -122,7 +122,7 @@ def print_summary(path, rows):
 
 
 def main():
-    args = common.arguments("drawn_rigs", __doc__, draws=(60, 2), first=(1, 1))
+    args = common.arguments("drawn_rigs", __doc__, draws=(60, 1), first=(1, 1))
     args.reconstruct, args.keep = "", True  # of heldout.measure()
     program = common.Program(args)
     rows = common.Rows(args.out / "results.csv", ["seed"], SETTINGS + COLUMNS, args.resume)

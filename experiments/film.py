@@ -199,5 +199,5 @@ def report(args, rows, about):
 
 
 if __name__ == "__main__":
-    arguments = common.arguments("film", __doc__, frames=(300, 6))
+    arguments = common.arguments("film", __doc__, frames=(300, 4))
     report(arguments, *run(arguments))

@@ -363,9 +363,10 @@ class PackageTest(unittest.TestCase):
 
     def test_ctrl_c_ends_the_call(self) -> None:
         script = (
-            "import pencilscan as ps, sys\n"
-            "rig = ps.ring()\n"
-            "frame = ps.simulate(rig, ps.make_sphere(120, 48), 'none')\n"
+            "import pencilscan as ps, signal\n"
+            "signal.signal(signal.SIGINT, signal.default_int_handler)\n"  # shells ignore it in the background
+            f"rig = ps.read_rig({str(self.scene.folder / 'rig.json')!r})\n"
+            "frame = ps.simulate(rig, ps.make_sphere(120, 48))\n"
             "print('ready', flush=True)\n"
             "try:\n"
             "    while True: ps.reconstruct(rig, frame)\n"
@@ -373,6 +374,7 @@ class PackageTest(unittest.TestCase):
             "    print('interrupted')\n"
         )
         child = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True)
+        self.addCleanup(child.kill)
         self.assertEqual(child.stdout.readline(), "ready\n")
         time.sleep(0.5)
         child.send_signal(signal.SIGINT)
@@ -382,8 +384,8 @@ class PackageTest(unittest.TestCase):
     def test_a_daemon_thread_at_work_does_not_keep_a_program_from_its_end(self) -> None:
         script = (
             "import pencilscan as ps, threading\n"
-            "rig = ps.ring()\n"
-            "frame = ps.simulate(rig, ps.make_sphere(120, 48), 'none')\n"
+            f"rig = ps.read_rig({str(self.scene.folder / 'rig.json')!r})\n"
+            "frame = ps.simulate(rig, ps.make_sphere(120, 48))\n"
             "begun = threading.Event()\n"
             "def work():\n"
             "    while True: ps.reconstruct(rig, frame, progress=lambda *_: begun.set())\n"
