@@ -1,9 +1,11 @@
 #!/usr/bin/python3
 """Wrong pictures: is what was done to a frame named, and is a right frame let alone?
 
-Three objects before six cameras and six projectors, eight kinds of mistakes, each done to cameras that
+Three objects before six cameras and six projectors, ten kinds of mistakes, each done to cameras that
 are drawn. A mistake is named where the warnings name the devices that it was done to, no others, and
-the fault. Right frames are those of the objects at three levels of noise and two pitches.
+the fault. Right frames are those of the objects at three levels of noise and two pitches. "turned" is a
+camera that stands 10 to 80 px beside where the rig has it, "out of focus" a blur of a third of the lines'
+distance: both may show only on the surface, so that frames have one there.
 """
 
 import json
@@ -18,7 +20,8 @@ import objects
 WORDS = {  # kind: these stand in the warning
     "exchanged": "exchange their files", "upside down": "half a turn", "mirrored": "left for right",
     "blue and red": "red and blue", "grey": "is grey", "repeated": "is the same as", "black": "is black",
-    "moved": "does not fit"}
+    "moved": "does not fit", "turned": "moved", "out of focus": "out of focus"}
+WITH_MESH = {"turned", "out of focus"}
 
 
 def spoiled(kind, pictures, random):
@@ -38,21 +41,27 @@ def spoiled(kind, pictures, random):
         move = cv2.getRotationMatrix2D((width / 2, height / 2), random.choice([0, 4]), 1)
         move[:, 2] += (width / 160) * np.sign(random.normal(size=2)) if move[0, 1] == 0 else 0
         pictures[a] = cv2.warpAffine(pictures[a], move, (width, height))
+    elif kind == "turned":  # about an axis in the picture: it moves along x or y
+        way = np.array([[1, 0, 0], [0, 1, 0]], float)
+        way[random.integers(2), 2] = random.choice([-1, 1]) * 10 * 2 ** random.uniform(0, 3)
+        pictures[a] = cv2.warpAffine(pictures[a], way, (width, height))
+    elif kind == "out of focus":
+        pictures[a] = cv2.GaussianBlur(pictures[a], (0, 0), width / 1280 * 12 / 3)
     else:
         pictures[a] = {"upside down": lambda p: p[::-1, ::-1], "mirrored": lambda p: p[:, ::-1],
                        "blue and red": lambda p: p[..., ::-1], "black": lambda p: random.integers(0, 4, p.shape).astype(p.dtype)}[kind](pictures[a])
     return pictures, {a}
 
 
-def warnings_of(program, rig, frames, out):
+def warnings_of(program, rig, frames, out, with_mesh=False):
     """Text and devices of the wrong pictures that `reconstruct` names, and its refusal if it refuses."""
     shutil.rmtree(out, ignore_errors=True)
-    done = program("reconstruct", "--rig", rig, "--frames", frames, "--out", out, "--no-mesh", "--no-pictures",
-                   may_fail=True)
+    done = program("reconstruct", "--rig", rig, "--frames", frames, "--out", out, "--no-pictures",
+                   *([] if with_mesh else ["--no-mesh"]), may_fail=True)
     if done is None:
         return program.complaint, set()
     report = json.loads((out / "000000/report.json").read_text())
-    found = [f for f in report["findings"] if f["code"] == "wrong-picture"]
+    found = [f for f in report["findings"] if f["code"] in ("wrong-picture", "missing-lines", "out-of-focus")]
     return " ".join(f["text"] for f in found), {f["device"] for f in found}
 
 
@@ -104,7 +113,8 @@ def main():
                 (frames / "000000").mkdir(parents=True)
                 for path, picture in zip(right, wrong):
                     cv2.imwrite(str(frames / "000000" / path.name), picture)
-                text, devices = warnings_of(program, folder / "scene/rig.json", frames, args.out / "result")
+                text, devices = warnings_of(program, folder / "scene/rig.json", frames, args.out / "result",
+                                            kind in WITH_MESH)
                 told = {right[c].stem for c in cameras}
                 is_named = WORDS[kind] in text and \
                     (devices == told if devices else all(d in text for d in told))
@@ -118,7 +128,8 @@ def main():
                 if rows.has(object=name, kind=f"right, {noise}, {pitch}", draw=0):
                     continue
                 folder = scene(args, program, name, pitch, noise)
-                text, _ = warnings_of(program, folder / "scene/rig.json", folder / "scene/frames", args.out / "result")
+                text, _ = warnings_of(program, folder / "scene/rig.json", folder / "scene/frames", args.out / "result",
+                                      True)
                 rows.add(object=name, kind=f"right, {noise}, {pitch}", draw=0, is_named=int(bool(text)), text=text[:300])
     wrong = [r for r in rows.rows if not r["kind"].startswith("right")]
     right = [r for r in rows.rows if r["kind"].startswith("right")]

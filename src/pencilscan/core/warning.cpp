@@ -16,6 +16,8 @@ const char* to_string(WarningCode code) {
       return "little-light";
     case WarningCode::kLinesTooClose:
       return "lines-too-close";
+    case WarningCode::kOutOfFocus:
+      return "out-of-focus";
     case WarningCode::kSaturated:
       return "saturated";
     case WarningCode::kColorsFilledIn:
@@ -52,6 +54,8 @@ const char* to_string(WarningCode code) {
       return "motion";
     case WarningCode::kVolumeCuts:
       return "volume-cuts";
+    case WarningCode::kFloorCuts:
+      return "floor-cuts";
     case WarningCode::kFloorFound:
       return "floor-found";
   }

@@ -18,7 +18,11 @@ struct Known {
 };
 
 /// What to do about warnings, by their code (core/warning.h).
-constexpr std::array<Known, 21> kKnown = {{
+constexpr std::array<Known, 23> kKnown = {{
+    {"out-of-focus",
+     "Focus the camera on the object, with the aperture at which it takes frames, and look for "
+     "mist "
+     "or fingerprints on its lens; then calibrate again, for focus moves the picture."},
     {"saturated",
      "Close the aperture or shorten the exposure until the brightest lines stay below "
      "full scale, and capture again."},
@@ -61,6 +65,10 @@ constexpr std::array<Known, 21> kKnown = {{
     {"volume-cuts",
      "Look at where the measured surface ends: if the object goes on there, state a larger volume "
      "in the rig; if that is what it stands on, state its floor."},
+    {"floor-cuts",
+     "Look at where the measured surface ends: if the object goes on there, state the floor lower; "
+     "its normal points to the object. Without a floor in the rig, the warning floor-found writes "
+     "the one that is seen."},
     {"floor-found",
      "State the floor in the rig, as the warning writes it: it is then left out, and lines close "
      "to "

@@ -27,6 +27,7 @@ class Cuts {
     const Curve& curve = graph_.curves[static_cast<std::size_t>(runs.front().curve)];
     bool is_inside = false;
     bool is_beyond = false;
+    bool is_below = false;
     for (std::size_t k = 0; k < runs.size(); ++k) {
       const LabeledRun& run = runs[k];
       const int first = std::max(run.begin - kAhead, k == 0 ? 0 : runs[k - 1].end);
@@ -39,11 +40,13 @@ class Cuts {
         if (!x) continue;
         const bool is_held = space_.holds(*x);
         is_inside |= is_held;
+        is_below |= rig_.floor && rig_.floor->height(*x) < -least_height_;
         is_beyond |= !is_held && (!rig_.floor || rig_.floor->height(*x) > least_height_);
       }
     }
     if (is_inside) ++lines.inside;
     if (is_inside && is_beyond) ++lines.cut;
+    if (is_inside && is_below) ++lines.below_floor;
   }
 
  private:

@@ -61,6 +61,8 @@ TEST(StatedFloor, LeavesTheObjectAloneWithoutFlapsBesideIt) {
     const FrameResult result = reconstruct_frame(rig, frame);
     for (const MeasuredPoint& p : result.points.points) points[stated].add(position_of(p));
     EXPECT_EQ(result.points.floor.has_value(), stated == 0);
+    for (const Warning& warning : result.points.warnings)
+      EXPECT_NE(warning.code, WarningCode::kFloorCuts) << warning.text;
     if (const auto& found = result.points.floor) {
       EXPECT_NEAR(found->floor.height(Vec3::Zero()), -kFloorHeight, 0.5);
     }

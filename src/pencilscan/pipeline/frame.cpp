@@ -9,6 +9,7 @@
 #include "pencilscan/pipeline/disagreement_warnings.h"
 #include "pencilscan/pipeline/frame_warnings.h"
 #include "pencilscan/pipeline/light_warnings.h"
+#include "pencilscan/pipeline/line_contrast.h"
 #include "pencilscan/pipeline/line_naming.h"
 #include "pencilscan/pipeline/sensor_frame.h"
 #include "pencilscan/surface/manifold.h"
@@ -74,11 +75,12 @@ void end_points(const Rig& rig, const Frame& frame, const PointOptions& options,
   state_confidence(options, result);
   Rig above = rig;  // what a floor's lines do is said of the floor
   if (result.floor) above.floor = result.floor->floor;
-  if (auto warning =
-          volume_warning(rig, lines_cut_by_volume(above, result.graphs, result.labeling)))
-    result.warnings.push_back(std::move(*warning));
+  const CutLines lines = lines_cut_by_volume(above, result.graphs, result.labeling);
+  if (auto warning = volume_warning(rig, lines)) result.warnings.push_back(std::move(*warning));
+  if (auto warning = floor_cut_warning(rig, lines)) result.warnings.push_back(std::move(*warning));
   if (auto warning = few_names_warning(result)) result.warnings.push_back(std::move(*warning));
   let_gamma_explain(result.warnings);
+  let_focus_explain(result.warnings);
   restore_light(frame, result);
 }
 
@@ -136,8 +138,7 @@ FrameResult measure_frame(const Rig& rig, const Frame& frame, PointResult lines,
     named.push_back(telling_points(result.points.labeling, c));
   result = match_on_surface(rig, std::move(result), options.points, clock);
   if (result.points.is_on_surface) {
-    for (Warning& warning :
-         missing_lines_warnings(rig, right, result.points.labeling.expected, named))
+    for (Warning& warning : missing_lines_warnings(rig, result.points.labeling.expected, named))
       result.points.warnings.push_back(std::move(warning));
   }
   clock("confirmation",

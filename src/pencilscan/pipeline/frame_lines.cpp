@@ -7,6 +7,7 @@
 #include "pencilscan/pipeline/frame.h"
 #include "pencilscan/pipeline/frame_warnings.h"
 #include "pencilscan/pipeline/light_warnings.h"
+#include "pencilscan/pipeline/line_contrast.h"
 #include "pencilscan/pipeline/line_naming.h"
 #include "pencilscan/pipeline/lost_cameras.h"
 #include "pencilscan/pipeline/picture_check.h"
@@ -119,6 +120,8 @@ PointResult check_pictures(const Rig& rig, const Frame& frame, PointResult curve
     curves.warnings.push_back(std::move(*warning));
   else if (std::string note = gamma_note(rig, frame, gammas); !note.empty())
     curves.notes.push_back(std::move(note));
+  for (Warning& warning : focus_warnings(rig, frame, curves.graphs))
+    curves.warnings.push_back(std::move(warning));
   leave_out(rig, plain_faults(rig, frame), curves);
   return curves;
 }

@@ -1,13 +1,11 @@
 #include "pencilscan/pipeline/frame_warnings.h"
 
-#include <cmath>
 #include <string>
 #include <utility>
 
 #include "pencilscan/core/formatted.h"
 #include "pencilscan/core/median.h"
 #include "pencilscan/core/name_list.h"
-#include "pencilscan/pipeline/line_contrast.h"
 
 namespace pencilscan {
 
@@ -93,7 +91,6 @@ struct MissingLines {
   double share = 0;
   double usual = 0;
   bool is_next_to_all = false;
-  double contrast = 1;  ///< of a camera (line_contrast.h)
 };
 
 /// The devices of a kind that have less than half of what is usual.
@@ -126,30 +123,9 @@ std::vector<MissingLines> missing_lines(std::span<const ExpectedLines> expected)
   return missing;
 }
 
-/// Of the cameras, with what else speaks against them.
-std::vector<MissingLines> missing_in_cameras(const Rig& rig, const Frame& frame,
-                                             std::span<const ExpectedLines> expected,
-                                             std::span<const TellingPoints> named) {
-  std::vector<MissingLines> missing = missing_lines(expected);
-  if (missing.empty()) return missing;
-  const std::vector<double> contrasts = line_contrasts(rig, frame);
-  const std::vector<char> few = have_few_names(named);
-  std::erase_if(missing, [&](MissingLines& lines) {
-    lines.contrast = contrasts[lines.device];
-    return !lines.is_next_to_all && few[lines.device] == 0 && !is_out_of_focus(lines.contrast);
-  });
-  return missing;
-}
-
-std::string why_missing_in_camera(const MissingLines& lines) {
-  if (!is_out_of_focus(lines.contrast)) return "it is covered or was moved";
-  return "it is out of focus, or its lens is fogged (lines stand out " +
-         formatted(1 / std::sqrt(lines.contrast), "%.1f") + " times less than in the others)";
-}
-
 }  // namespace
 
-std::vector<Warning> missing_lines_warnings(const Rig& rig, const Frame& frame,
+std::vector<Warning> missing_lines_warnings(const Rig& rig,
                                             std::span<const std::vector<ExpectedLines>> expected,
                                             std::span<const TellingPoints> named) {
   std::vector<ExpectedLines> of_cameras(rig.cameras.size());
@@ -171,9 +147,12 @@ std::vector<Warning> missing_lines_warnings(const Rig& rig, const Frame& frame,
          name,
          {{"share", lines.share}, {"usual_share", lines.usual}}});
   };
-  for (const MissingLines& lines : missing_in_cameras(rig, frame, of_cameras, named))
+  const std::vector<char> few = have_few_names(named);
+  for (const MissingLines& lines : missing_lines(of_cameras)) {
+    if (!lines.is_next_to_all && few[lines.device] == 0) continue;
     warn("camera", rig.cameras[lines.device].name, lines, "its picture",
-         why_missing_in_camera(lines));
+         "it is covered or was moved");
+  }
   for (const MissingLines& lines : missing_lines(of_projectors)) {
     if (!lines.is_next_to_all) continue;
     warn("projector", rig.projectors[lines.device].name, lines, "the pictures",
@@ -193,6 +172,17 @@ std::optional<Warning> volume_warning(const Rig& rig, const CutLines& lines) {
                      "; if it is what the object stands on, state \"floor\"",
                  {},
                  {{"share", lines.share()}}};
+}
+
+std::optional<Warning> floor_cut_warning(const Rig& rig, const CutLines& lines) {
+  if (!rig.floor || !lines.are_many_below()) return std::nullopt;
+  return Warning{WarningCode::kFloorCuts,
+                 "what was measured goes on below the floor that the rig states, which cuts " +
+                     formatted(100 * lines.share_below(), "%.0f") +
+                     " % of the lines above it: the floor is lower, or its normal points away from "
+                     "the object; what lies below was left out",
+                 {},
+                 {{"share", lines.share_below()}}};
 }
 
 Warning floor_warning(const FoundFloor& found) {

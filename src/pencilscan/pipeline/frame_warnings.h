@@ -25,14 +25,16 @@ namespace pencilscan {
 
 /// Cameras and projectors that have hardly any of the lines that the measured surface lets expect,
 /// where the others have theirs; of a camera, fewer than half do where the solution named as few of
-/// its lines, or where its picture is out of focus. `expected`: per camera and projector; `named`:
-/// per camera, by the solution.
+/// its lines. `expected`: per camera and projector; `named`: per camera, by the solution.
 [[nodiscard]] std::vector<Warning> missing_lines_warnings(
-    const Rig& rig, const Frame& frame, std::span<const std::vector<ExpectedLines>> expected,
+    const Rig& rig, std::span<const std::vector<ExpectedLines>> expected,
     std::span<const TellingPoints> named);
 
 /// That the volume cuts what was measured.
 [[nodiscard]] std::optional<Warning> volume_warning(const Rig& rig, const CutLines& lines);
+
+/// That the floor which the rig states cuts it; `lines`: above that floor.
+[[nodiscard]] std::optional<Warning> floor_cut_warning(const Rig& rig, const CutLines& lines);
 
 /// That the object stands on a plane, and how to state it; lengths in the rig's unit.
 [[nodiscard]] Warning floor_warning(const FoundFloor& found);

@@ -245,6 +245,18 @@ TEST_F(Laws, AVolumeThatCutsTheObjectIsNamed) {
   EXPECT_GT(cut(narrow, *frame_), 0.2);
 }
 
+TEST_F(Laws, AFloorThatCutsTheObjectIsNamed) {
+  const auto cut = [](double height) {
+    Rig rig = *rig_;
+    rig.floor = Floor{{0, 0, height}, Vec3::UnitZ()};
+    for (const Warning& warning : sample::labelled_points(rig, *frame_).warnings)
+      if (warning.code == WarningCode::kFloorCuts) return warning.figures.front().second;
+    return 0.0;
+  };
+  EXPECT_EQ(cut(-110), 0);  // below the ball of 95 mm
+  EXPECT_GT(cut(-40), 0.03);
+}
+
 /// JPEG and colours that are filled in show less gamma than there is, and never so little as none.
 TEST_F(Laws, LessThanTheStatedGammaIsNamedBelowHalfOfIt) {
   const Rig rig = with_gamma(*rig_);

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <span>
+#include <string>
 #include <vector>
 
 #include "pencilscan/pipeline/frame.h"
@@ -18,5 +20,15 @@ namespace pencilscan {
 /// rooms, renderers, projectors out of focus) right ones have .25 and more, those that were blurred
 /// by 2 px and more of a period of 6 to 12 px .046 and less.
 [[nodiscard]] constexpr bool is_out_of_focus(double contrast) { return contrast < 0.125; }
+
+/// How many times less its lines stand out, in words: "4.2 times less".
+[[nodiscard]] std::string times_less(double contrast);
+
+/// The cameras that are out of focus. `graphs`: their curves; contrast is asked only of pictures
+/// whose lines are few, or dim, beside the others'.
+[[nodiscard]] std::vector<Warning> focus_warnings(const Rig& rig, const Frame& frame,
+                                                  std::span<const GridGraph> graphs);
+/// What else is said of a camera out of focus comes of that.
+void let_focus_explain(std::vector<Warning>& warnings);
 
 }  // namespace pencilscan

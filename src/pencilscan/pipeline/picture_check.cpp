@@ -1,11 +1,9 @@
 #include "pencilscan/pipeline/picture_check.h"
 
 #include <algorithm>
-#include <cmath>
 #include <functional>
 #include <opencv2/imgproc.hpp>
 
-#include "pencilscan/core/formatted.h"
 #include "pencilscan/core/median.h"
 #include "pencilscan/core/parallel.h"
 #include "pencilscan/pipeline/cut_lines.h"
@@ -68,6 +66,24 @@ PictureFinding misfit(const Rig& rig, const Frame& frame, std::size_t camera) {
   PictureFinding finding{PictureFault::kDoesNotFit, static_cast<int>(camera), -1};
   finding.contrast = line_contrasts(rig, frame)[camera];
   return finding;
+}
+
+/// Without the points of one projector no views are in doubt, and this camera still has enough to
+/// say: the projector is what is wrong, and not the camera's picture, which would contradict with
+/// the points of all projectors.
+bool is_fault_of_projector(const Rig& rig, const std::vector<std::vector<MeasuredPoint>>& points,
+                           std::size_t camera) {
+  for (std::size_t p = 0; p < rig.projectors.size(); ++p) {
+    std::vector<std::vector<MeasuredPoint>> of_others = points;
+    for (auto& of_camera : of_others)
+      std::erase_if(of_camera, [&](const MeasuredPoint& x) {
+        return static_cast<std::size_t>(x.projector) == p;
+      });
+    const ViewAgreement agreement(rig, of_others);
+    const PairAgreement said = agreement.with_others(camera);
+    if (said.same + said.apart >= kFewPoints && agreement.doubtful_pairs() == 0) return true;
+  }
+  return false;
 }
 
 /// The two of the doubtful cameras whose pictures contradict nothing where the other one stands, if
@@ -251,9 +267,8 @@ std::string describe(const Rig& rig, const PictureFinding& finding) {
   }
   const std::string misfit = "does not fit the rig as the others' do: ";
   if (is_out_of_focus(finding.contrast))
-    return who + misfit + "its lines stand out " +
-           formatted(1 / std::sqrt(finding.contrast), "%.1f") +
-           " times less than theirs, so it is out of focus, or its lens is fogged" + out;
+    return who + misfit + "its lines stand out " + times_less(finding.contrast) +
+           " than theirs, so it is out of focus, or its lens is fogged" + out;
   return who + misfit + "the camera was moved, or the picture is of another moment or rig" + out;
 }
 
@@ -338,8 +353,9 @@ std::vector<PictureFinding> contradicting_pictures(const Rig& rig, const Frame& 
   const double named = telling_points(found.labeling, alone).named_share();
   const bool is_plain = share(alone) < kPlainContradiction || shown(alone).misfits() ||
                         named < kFewer * upper_median(std::move(of_others));
+  if (count < 3 || !is_plain || is_fault_of_projector(rig, points, alone)) return {};
   points[alone].clear();
-  if (count < 3 || !is_plain || ViewAgreement(rig, points).doubtful_pairs() > 0) return {};
+  if (ViewAgreement(rig, points).doubtful_pairs() > 0) return {};
   return {misfit(rig, frame, alone)};
 }
 
