@@ -211,6 +211,25 @@ TEST(FrameWarnings, ADeviceThatIsFarFromItsKindIsNamedBelowTheLimitOfAll) {
   EXPECT_FALSE(device_warning(rig, of_devices)) << "noise explains it";
 }
 
+// Two weaker signs together: it has few crossings, and these miss.
+TEST(FrameWarnings, AProjectorThatLacksCrossingsIsNamedWhereTheyMiss) {
+  Rig rig = fine_rig(1);
+  rig.projectors.resize(4, rig.projectors[0]);
+  for (std::size_t p = 0; p < 4; ++p) rig.projectors[p].name = "proj" + std::to_string(p);
+  const std::size_t cameras = rig.cameras.size();
+  std::vector<CrossingDisagreement> of_devices(cameras + 4, {330, 0.22, 0.26, {}});
+  of_devices[cameras + 2] = {74, 0.23, 0.144, {}};
+  const auto warning = device_warning(rig, of_devices);
+  ASSERT_TRUE(warning);
+  EXPECT_EQ(warning->device, "proj2");
+  of_devices[cameras + 2] = {74, 0.165, 0.144, {}};
+  EXPECT_FALSE(device_warning(rig, of_devices)) << "noise explains them";
+  of_devices[cameras + 2] = {190, 0.23, 0.144, {}};
+  EXPECT_FALSE(device_warning(rig, of_devices)) << "it has as many as others";
+  of_devices[cameras + 2] = {40, 0.23, 0.144, {}};
+  EXPECT_FALSE(device_warning(rig, of_devices)) << "chance";
+}
+
 // A camera that turned keeps few crossings, and shares its misses with the projectors.
 TEST(FrameWarnings, TheDeviceThatMissesMostIsNamedThoughItsCrossingsAreFew) {
   const Scene scene(fine_rig(1));

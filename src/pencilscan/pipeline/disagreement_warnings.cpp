@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "pencilscan/core/formatted.h"
+#include "pencilscan/core/median.h"
 #include "pencilscan/rig/device_list.h"
 
 namespace pencilscan {
@@ -63,9 +64,11 @@ constexpr std::size_t kFewestOfAKind = 3;  // of two, either may be right
 // of these misses nearly as far, it may be that one.
 constexpr double kNearlyAsFar = 1.3;
 
+constexpr double kLeastExpectedPx = 0.05;
+
 double over_noise(double miss_px, const CrossingDisagreement& d) {
   const double certain = std::sqrt(static_cast<double>(d.crossings) / kEnoughCrossings);
-  return miss_px / std::max(0.05, d.expected_px) * std::min(1.0, certain);
+  return miss_px / std::max(kLeastExpectedPx, d.expected_px) * std::min(1.0, certain);
 }
 
 double over_noise(const CrossingDisagreement& d) {
@@ -107,6 +110,31 @@ bool one_stands_apart(std::span<const CrossingDisagreement> of_kind) {
   return misses[0] > kOverNoise && misses[0] > kFarMoreThanItsKind * misses[1];
 }
 
+/// Whether one projector has far fewer crossings than the others, and these miss far more, while
+/// noise explains what the others miss: what has the names of other lines hardly crosses the rest.
+/// Two signs, so that each may be weaker. Of 1,787 results (as above) those of five wrong rigs have
+/// both and no right one.
+bool one_lacks_crossings(std::span<const CrossingDisagreement> of_projectors) {
+  constexpr double kFarFewer = 0.5;
+  const auto ratio = [](const CrossingDisagreement& d) {
+    return d.median_px / std::max(kLeastExpectedPx, d.expected_px);
+  };
+  std::vector<CrossingDisagreement> some;
+  std::vector<std::size_t> counts;
+  for (const CrossingDisagreement& d : of_projectors) {
+    if (d.crossings < kFewCrossings) continue;
+    some.push_back(d);
+    counts.push_back(d.crossings);
+  }
+  if (some.size() < kFewestOfAKind) return false;
+  std::sort(some.begin(), some.end(),
+            [&](const auto& a, const auto& b) { return ratio(a) > ratio(b); });
+  const auto usual = static_cast<double>(upper_median(std::move(counts)));
+  return ratio(some[0]) > kOverNoise && ratio(some[1]) < 1 &&
+         ratio(some[0]) > kMoreThanItsKind * ratio(some[1]) &&
+         static_cast<double>(some[0].crossings) < kFarFewer * usual;
+}
+
 /// Which devices may be the one that is off, the likelier one first: the one that stands out from
 /// its kind, and one of the other kind that misses nearly as far.
 std::vector<std::size_t> devices_apart(std::span<const CrossingDisagreement> of_devices,
@@ -114,7 +142,9 @@ std::vector<std::size_t> devices_apart(std::span<const CrossingDisagreement> of_
   if (of_devices.size() <= cameras || cameras == 0) return {};
   const auto of_cameras = of_devices.first(cameras);
   const auto of_projectors = of_devices.subspan(cameras);
-  if (!one_stands_apart(of_cameras) && !one_stands_apart(of_projectors)) return {};
+  if (!one_stands_apart(of_cameras) && !one_stands_apart(of_projectors) &&
+      !one_lacks_crossings(of_projectors))
+    return {};
   const std::size_t camera = farthest(of_cameras);
   const std::size_t projector = cameras + farthest(of_projectors);
   std::vector<std::size_t> either{camera, projector};

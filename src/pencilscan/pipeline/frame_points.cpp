@@ -153,7 +153,12 @@ PointResult place_points(const Rig& rig, PointResult lines, const PointOptions& 
       apart = place();
       camera = of_another_moment(apart, result);
     }
-    if (camera) result.warnings.push_back(another_moment_warning(rig, *camera, apart, false));
+    // Where a device was found to be off, what cameras see by its lines lies apart, too.
+    const bool is_explained = std::any_of(
+        result.warnings.begin(), result.warnings.end(),
+        [](const Warning& warning) { return warning.code == WarningCode::kDeviceIsOff; });
+    if (camera && !is_explained)
+      result.warnings.push_back(another_moment_warning(rig, *camera, apart, false));
     // Where the rig is off, that was said.
     if (!result.corrected && apart.all.value_or(0) > kMostApart)
       result.warnings.push_back(views_warning(*apart.all));

@@ -199,6 +199,25 @@ void find_shared_fault(const Rig& rig, const Frame& frame, const PictureTrial& t
   }
 }
 
+/// What other cameras say of a picture few of whose curves have names.
+enum class OthersSay { kFits, kNothing, kDoesNotFit };
+
+/// `said`: of what it measures, and of what the others measured.
+OthersSay others_say(const Suspect& s, double usual, const PairAgreement& said) {
+  const bool is_told = said.same + said.apart >= kFewPoints;
+  const bool is_contradicted = is_told && said.share() < kPlainContradiction;
+  const bool is_confirmed = is_told && said.share() > 1 - kPlainContradiction;
+  const bool has_far_fewer = s.share < kFarLess * usual;
+  // Lines that lie along a camera's way stay on each other, so that it shows many of them from
+  // where it does not stand; what it measures then lies in front of what the others did.
+  if (has_far_fewer && is_contradicted) return OthersSay::kDoesNotFit;
+  if (s.shown.fits()) return OthersSay::kFits;
+  // Where what it measures lies where the others measured it, that it does not show their lines is
+  // the fault of these: of a projector that is off, say.
+  return has_far_fewer && s.shown.misfits() && !is_confirmed ? OthersSay::kDoesNotFit
+                                                             : OthersSay::kNothing;
+}
+
 /// What the other cameras measured goes on beyond the volume.
 bool others_see_beyond_volume(const Rig& rig, const PointResult& found, std::size_t camera) {
   CutLines others;
@@ -292,24 +311,18 @@ std::vector<PictureFinding> misplaced_pictures(const Rig& rig, const Frame& fram
   try_remedies(trial, usual, suspects);
   find_shared_fault(rig, frame, trial, suspects, asked.rest);
   const ViewAgreement agreement(rig, points);
-  const auto is_contradicted = [&](std::size_t c) {
-    const PairAgreement said = agreement.with_others(c);
-    return said.same + said.apart >= kFewPoints && said.share() < kPlainContradiction;
-  };
   std::vector<PictureFinding> findings;
   for (const Suspect& s : asked.rest)
     if (s.best_named > 0) findings.push_back(s.best);
   std::vector<PictureFinding> unfit;
   std::size_t fit = others;
   for (const Suspect& s : suspects) {
-    // Lines that lie along a camera's way stay on each other, so that it shows many of them from
-    // where it does not stand; what it measures then lies in front of what the others did.
-    const bool is_elsewhere = s.share < kFarLess * usual && is_contradicted(s.camera);
+    const OthersSay said = others_say(s, usual, agreement.with_others(s.camera));
     if (s.best_named > 0) {
       findings.push_back(s.best);
-    } else if (s.shown.fits() && !is_elsewhere) {
+    } else if (said == OthersSay::kFits) {
       ++fit;
-    } else if ((is_elsewhere || (s.share < kFarLess * usual && s.shown.misfits())) &&
+    } else if (said == OthersSay::kDoesNotFit &&
                !fits_larger_volume(rig, found, s, usual, options)) {
       unfit.push_back(misfit(rig, frame, s.camera));
     }

@@ -501,6 +501,22 @@ TEST_F(PictureCheck, AMovedCameraIsNamed) {
   EXPECT_THAT(said[0], HasSubstr("camera cam2: its picture does not fit the rig"));
 }
 
+// Its lines have names of other lines, and what cameras measure by them contradicts the others.
+TEST_F(PictureCheck, AProjectorThatIsOffByHalfALineIsNoCamerasFault) {
+  const Frame frame = frame_of(make_box({150, 130, 170}));
+  for (std::size_t p = 0; p < rig_->projectors.size(); ++p) {
+    for (const double way : {-0.5, 0.5}) {
+      Rig moved = *rig_;
+      Projector& projector = moved.projectors[p];
+      const LinePattern& lines = projector.patterns[0];
+      Vec3 turn = Vec3::Zero();
+      turn[lines.axis == Axis::kColumn ? 1 : 0] = way * lines.pitch_px;
+      projector.device_from_world = corrected_pose(projector, {turn, Vec3::Zero()});
+      EXPECT_THAT(said_of(frame, moved), IsEmpty()) << projector.name << " " << way;
+    }
+  }
+}
+
 // So small are the pictures that crossings with right names are few, and others meet by chance.
 TEST_F(PictureCheck, ACameraThatIsTurnedByTwoPixelsIsNamed) {
   RingOptions ring;
