@@ -14,7 +14,7 @@ enum class WarningCode {
   kNoLines,         ///< a camera's picture shows none
   kLittleLight,     ///< figure "signal_to_noise": of the lines that were found
   kLinesTooClose,   ///< figure "line_spacing_px": at the volume's centre
-  kOutOfFocus,      ///< of a camera; figure "contrast": of its lines, of the others'
+  kOutOfFocus,      ///< of a camera; figure "contrast": energy of its lines, of the others'
   kSaturated,       ///< figure "share": of a camera's pixels
   kColorsFilledIn,  ///< pictures went through a mosaic and an interpolation
   kGamma,           ///< pictures are not coded as the rig says; figure "gamma" of the first camera
@@ -32,7 +32,7 @@ enum class WarningCode {
   kMissingLines,    ///< of a device; figures "share", "usual_share": of its lines, the others'
   kFewNames,        ///< figure "share": of the curve points that got their line
   kMotion,          ///< within the exposure; figures "way_mm", "way_sigma_mm"
-  kVolumeCuts,      ///< figure "share": of the named points, those where a line leaves the volume
+  kVolumeCuts,      ///< figure "share": of the named lines, those that leave the volume
   kFloorCuts,       ///< figure "share": of the lines above the stated floor, those that go on below
   kFloorFound,      ///< figures "floor_x" to "normal_z": a plane that the rig does not state
 };

@@ -21,8 +21,8 @@ struct Known {
 constexpr std::array<Known, 23> kKnown = {{
     {"out-of-focus",
      "Focus the camera on the object, with the aperture at which it takes frames, and look for "
-     "mist "
-     "or fingerprints on its lens; then calibrate again, for focus moves the picture."},
+     "mist, fingerprints or something before its lens; then calibrate again, for focus moves the "
+     "picture."},
     {"saturated",
      "Close the aperture or shorten the exposure until the brightest lines stay below "
      "full scale, and capture again."},
@@ -52,7 +52,8 @@ constexpr std::array<Known, 23> kKnown = {{
      "Run rig check with --frames on several frames: it says which device moved, or shows or sees "
      "something else than the rig states."},
     {"wrong-picture",
-     "Look at its picture below. If it is the right one, the camera was moved: rig check with "
+     "Look at its picture below. If it is the right one, the camera was moved or is out of focus: "
+     "rig check with "
      "--frames says how far; put it back, or run reconstruct with --refine-rig."},
     {"views-disagree",
      "Compare the cameras' pictures below with where the cameras stand; if they are right, check "
@@ -67,7 +68,8 @@ constexpr std::array<Known, 23> kKnown = {{
      "in the rig; if that is what it stands on, state its floor."},
     {"floor-cuts",
      "Look at where the measured surface ends: if the object goes on there, state the floor lower; "
-     "its normal points to the object. Without a floor in the rig, the warning floor-found writes "
+     "its normal must point to the object. Without a floor in the rig, the warning floor-found "
+     "writes "
      "the one that is seen."},
     {"floor-found",
      "State the floor in the rig, as the warning writes it: it is then left out, and lines close "
@@ -75,7 +77,7 @@ constexpr std::array<Known, 23> kKnown = {{
      "it are named by it."},
     {"missing-lines",
      "Look whether the projector shines, and whether its picture is the one that the rig states "
-     "(pencilscan pattern writes it); of a camera, whether its picture is sharp."},
+     "(pencilscan pattern writes it); of a camera, whether something covers it, or it was moved."},
     {"few-names",
      "Check that rig and pictures belong together: the rig's file, the names of its cameras, and "
      "what the projectors show."},

@@ -222,6 +222,9 @@ TEST(FrameWarnings, AProjectorThatLacksCrossingsIsNamedWhereTheyMiss) {
   const auto warning = device_warning(rig, of_devices);
   ASSERT_TRUE(warning);
   EXPECT_EQ(warning->device, "proj2");
+  for (std::size_t d = 0; d < cameras; ++d) of_devices[d].median_px = 0.25;
+  of_devices[cameras + 2].median_px = 0.19;
+  EXPECT_EQ(device_warning(rig, of_devices).value().device, "proj2");
   of_devices[cameras + 2] = {74, 0.165, 0.144, {}};
   EXPECT_FALSE(device_warning(rig, of_devices)) << "noise explains them";
   of_devices[cameras + 2] = {190, 0.23, 0.144, {}};

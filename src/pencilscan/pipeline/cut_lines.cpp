@@ -20,6 +20,7 @@ class Cuts {
         graph_(graph),
         camera_(rig.camera(graph.camera)),
         space_(rig),
+        volume_(space_.with_floor()),
         least_height_(line_spacing(rig)) {}
 
   /// `runs`: of one curve, in the order of its points.
@@ -40,7 +41,7 @@ class Cuts {
         if (!x) continue;
         const bool is_held = space_.holds(*x);
         is_inside |= is_held;
-        is_below |= rig_.floor && rig_.floor->height(*x) < -least_height_;
+        is_below |= rig_.floor && rig_.floor->height(*x) < -least_height_ && volume_.holds(*x);
         is_beyond |= !is_held && (!rig_.floor || rig_.floor->height(*x) > least_height_);
       }
     }
@@ -54,13 +55,13 @@ class Cuts {
   const GridGraph& graph_;
   const Camera& camera_;
   ObjectSpace space_;
+  ObjectSpace volume_;  ///< the same below the floor
   double least_height_;
 };
 
 }  // namespace
 
-CutLines lines_cut_by_volume(const Rig& rig, std::span<const GridGraph> graphs,
-                             const Labeling& labeling) {
+CutLines cut_lines(const Rig& rig, std::span<const GridGraph> graphs, const Labeling& labeling) {
   CutLines lines;
   for (const GridGraph& graph : graphs) {
     const Cuts cuts(rig, graph);

@@ -110,29 +110,32 @@ bool one_stands_apart(std::span<const CrossingDisagreement> of_kind) {
   return misses[0] > kOverNoise && misses[0] > kFarMoreThanItsKind * misses[1];
 }
 
-/// Whether one projector has far fewer crossings than the others, and these miss far more, while
+/// The one projector that has far fewer crossings than the others, and these miss far more, while
 /// noise explains what the others miss: what has the names of other lines hardly crosses the rest.
 /// Two signs, so that each may be weaker. Of 1,787 results (as above) those of five wrong rigs have
 /// both and no right one.
-bool one_lacks_crossings(std::span<const CrossingDisagreement> of_projectors) {
+std::optional<std::size_t> one_that_lacks_crossings(
+    std::span<const CrossingDisagreement> of_projectors) {
   constexpr double kFarFewer = 0.5;
-  const auto ratio = [](const CrossingDisagreement& d) {
-    return d.median_px / std::max(kLeastExpectedPx, d.expected_px);
+  const auto ratio = [&](std::size_t p) {
+    return of_projectors[p].median_px / std::max(kLeastExpectedPx, of_projectors[p].expected_px);
   };
-  std::vector<CrossingDisagreement> some;
+  std::vector<std::size_t> some;
   std::vector<std::size_t> counts;
-  for (const CrossingDisagreement& d : of_projectors) {
-    if (d.crossings < kFewCrossings) continue;
-    some.push_back(d);
-    counts.push_back(d.crossings);
+  for (std::size_t p = 0; p < of_projectors.size(); ++p) {
+    if (of_projectors[p].crossings < kFewCrossings) continue;
+    some.push_back(p);
+    counts.push_back(of_projectors[p].crossings);
   }
-  if (some.size() < kFewestOfAKind) return false;
+  if (some.size() < kFewestOfAKind) return std::nullopt;
   std::sort(some.begin(), some.end(),
-            [&](const auto& a, const auto& b) { return ratio(a) > ratio(b); });
+            [&](std::size_t a, std::size_t b) { return ratio(a) > ratio(b); });
   const auto usual = static_cast<double>(upper_median(std::move(counts)));
-  return ratio(some[0]) > kOverNoise && ratio(some[1]) < 1 &&
-         ratio(some[0]) > kMoreThanItsKind * ratio(some[1]) &&
-         static_cast<double>(some[0].crossings) < kFarFewer * usual;
+  const bool misses = ratio(some[0]) > kOverNoise && ratio(some[1]) < 1 &&
+                      ratio(some[0]) > kMoreThanItsKind * ratio(some[1]);
+  if (!misses || static_cast<double>(of_projectors[some[0]].crossings) >= kFarFewer * usual)
+    return std::nullopt;
+  return some[0];
 }
 
 /// Which devices may be the one that is off, the likelier one first: the one that stands out from
@@ -142,9 +145,10 @@ std::vector<std::size_t> devices_apart(std::span<const CrossingDisagreement> of_
   if (of_devices.size() <= cameras || cameras == 0) return {};
   const auto of_cameras = of_devices.first(cameras);
   const auto of_projectors = of_devices.subspan(cameras);
-  if (!one_stands_apart(of_cameras) && !one_stands_apart(of_projectors) &&
-      !one_lacks_crossings(of_projectors))
-    return {};
+  if (!one_stands_apart(of_cameras) && !one_stands_apart(of_projectors)) {
+    const auto projector = one_that_lacks_crossings(of_projectors);
+    return projector ? std::vector{cameras + *projector} : std::vector<std::size_t>{};
+  }
   const std::size_t camera = farthest(of_cameras);
   const std::size_t projector = cameras + farthest(of_projectors);
   std::vector<std::size_t> either{camera, projector};

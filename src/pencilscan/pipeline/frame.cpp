@@ -69,13 +69,21 @@ void state_confidence(const PointOptions& options, PointResult& result) {
   }
 }
 
+/// What of each camera's lines has a name; empty where the solution does not say what has none.
+std::vector<TellingPoints> telling_by_camera(const Labeling& labeling) {
+  std::vector<TellingPoints> telling;
+  for (std::size_t c = 0; c < labeling.undecided.size(); ++c)
+    telling.push_back(telling_points(labeling, c));
+  return telling;
+}
+
 /// What is done once no line's name changes any more.
 void end_points(const Rig& rig, const Frame& frame, const PointOptions& options,
                 PointResult& result) {
   state_confidence(options, result);
   Rig above = rig;  // what a floor's lines do is said of the floor
   if (result.floor) above.floor = result.floor->floor;
-  const CutLines lines = lines_cut_by_volume(above, result.graphs, result.labeling);
+  const CutLines lines = cut_lines(above, result.graphs, result.labeling);
   if (auto warning = volume_warning(rig, lines)) result.warnings.push_back(std::move(*warning));
   if (auto warning = floor_cut_warning(rig, lines)) result.warnings.push_back(std::move(*warning));
   if (auto warning = few_names_warning(result)) result.warnings.push_back(std::move(*warning));
@@ -133,9 +141,7 @@ FrameResult measure_frame(const Rig& rig, const Frame& frame, PointResult lines,
   const Frame right = without(frame, result.points.left_out);
   result.shape = measure_shape(rig, right, result.points, options.shape, links, clock);
   if (links.only_hands_on) return result;
-  std::vector<TellingPoints> named;
-  for (std::size_t c = 0; c < rig.cameras.size(); ++c)
-    named.push_back(telling_points(result.points.labeling, c));
+  const std::vector<TellingPoints> named = telling_by_camera(result.points.labeling);
   result = match_on_surface(rig, std::move(result), options.points, clock);
   if (result.points.is_on_surface) {
     for (Warning& warning : missing_lines_warnings(rig, result.points.labeling.expected, named))

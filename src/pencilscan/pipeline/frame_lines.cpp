@@ -120,9 +120,9 @@ PointResult check_pictures(const Rig& rig, const Frame& frame, PointResult curve
     curves.warnings.push_back(std::move(*warning));
   else if (std::string note = gamma_note(rig, frame, gammas); !note.empty())
     curves.notes.push_back(std::move(note));
-  for (Warning& warning : focus_warnings(rig, frame, curves.graphs))
-    curves.warnings.push_back(std::move(warning));
   leave_out(rig, plain_faults(rig, frame), curves);
+  for (Warning& warning : focus_warnings(rig, frame, curves))
+    curves.warnings.push_back(std::move(warning));
   return curves;
 }
 

@@ -7,6 +7,7 @@
 #include "pencilscan/pipeline/disagreement_warnings.h"
 #include "pencilscan/pipeline/frame.h"
 #include "pencilscan/pipeline/frame_warnings.h"
+#include "pencilscan/pipeline/line_contrast.h"
 #include "pencilscan/pipeline/view_agreement.h"
 #include "pencilscan/points/surface_check.h"
 #include "pencilscan/rig/object_space.h"
@@ -154,6 +155,7 @@ PointResult place_points(const Rig& rig, PointResult lines, const PointOptions& 
       camera = of_another_moment(apart, result);
     }
     // Where a device was found to be off, what cameras see by its lines lies apart, too.
+    let_focus_explain(result.warnings);
     const bool is_explained = std::any_of(
         result.warnings.begin(), result.warnings.end(),
         [](const Warning& warning) { return warning.code == WarningCode::kDeviceIsOff; });

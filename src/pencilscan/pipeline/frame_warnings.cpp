@@ -66,9 +66,10 @@ Warning naming_warning(const std::string& doubt) {
 
 namespace {
 
-/// The lesser part of what is usual. A camera that stands elsewhere by 10 to 80 px has .42 and less
-/// of the others' share of what was named, and of what the surface lets expect; right ones have .77
-/// and more of one of them (122 cameras of 32 scenes), but for one that sees a plate from its edge.
+/// A camera has far less below this share of the others' median. One that stands elsewhere by 10 to
+/// 80 px has .42 and less of the others' share of what was named, and of what the surface lets
+/// expect; right ones have .77 and more of one of them (122 cameras of 32 scenes), but for one that
+/// sees a plate from its edge.
 constexpr double kLess = 0.5;
 
 /// Cameras of which the solution named far less than of the others.
@@ -79,7 +80,7 @@ std::vector<char> have_few_names(std::span<const TellingPoints> named) {
     std::vector<double> of_others;
     for (std::size_t k = 0; k < named.size(); ++k)
       if (k != c && named[k].are_enough()) of_others.push_back(named[k].named_share());
-    if (of_others.empty()) continue;
+    if (of_others.size() < 2) continue;  // of two cameras, either may be right
     few[c] = named[c].named_share() < kLess * upper_median(std::move(of_others)) ? 1 : 0;
   }
   return few;
@@ -149,7 +150,8 @@ std::vector<Warning> missing_lines_warnings(const Rig& rig,
   };
   const std::vector<char> few = have_few_names(named);
   for (const MissingLines& lines : missing_lines(of_cameras)) {
-    if (!lines.is_next_to_all && few[lines.device] == 0) continue;
+    const bool has_few = lines.device < few.size() && few[lines.device] != 0;
+    if (!lines.is_next_to_all && !has_few) continue;
     warn("camera", rig.cameras[lines.device].name, lines, "its picture",
          "it is covered or was moved");
   }

@@ -24,8 +24,9 @@ namespace pencilscan {
 [[nodiscard]] Warning naming_warning(const std::string& doubt);
 
 /// Cameras and projectors that have hardly any of the lines that the measured surface lets expect,
-/// where the others have theirs; of a camera, fewer than half do where the solution named as few of
-/// its lines. `expected`: per camera and projector; `named`: per camera, by the solution.
+/// where the others have theirs. A camera is also named where it has less than half of the others'
+/// share, and the solution named less than half of theirs. `expected`: per camera and projector;
+/// `named`: per camera, by the solution, or empty.
 [[nodiscard]] std::vector<Warning> missing_lines_warnings(
     const Rig& rig, std::span<const std::vector<ExpectedLines>> expected,
     std::span<const TellingPoints> named);

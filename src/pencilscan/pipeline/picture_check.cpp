@@ -62,17 +62,27 @@ struct Suspect {
   double best_named = 0;
 };
 
-PictureFinding misfit(const Rig& rig, const Frame& frame, std::size_t camera) {
-  PictureFinding finding{PictureFault::kDoesNotFit, static_cast<int>(camera), -1};
-  finding.contrast = line_contrasts(rig, frame)[camera];
-  return finding;
+/// `left_out`: cameras whose pictures are plainly wrong.
+std::vector<PictureFinding> misfits(const Rig& rig, const Frame& frame,
+                                    std::span<const std::size_t> cameras,
+                                    std::span<const char> left_out) {
+  if (cameras.empty()) return {};
+  const std::vector<double> contrasts = line_contrasts(rig, frame, left_out);
+  std::vector<PictureFinding> findings;
+  for (const std::size_t c : cameras) {
+    findings.push_back({PictureFault::kDoesNotFit, static_cast<int>(c)});
+    findings.back().contrast = contrasts[c];
+  }
+  return findings;
 }
 
-/// Without the points of one projector no views are in doubt, and this camera still has enough to
-/// say: the projector is what is wrong, and not the camera's picture, which would contradict with
-/// the points of all projectors.
+/// Without the points of one projector no views are in doubt, and what this camera still measures
+/// agrees with the others: the projector is what is wrong. Of two projectors either may be right,
+/// and a camera that moved along the lines of one contradicts by those of the other alone.
 bool is_fault_of_projector(const Rig& rig, const std::vector<std::vector<MeasuredPoint>>& points,
                            std::size_t camera) {
+  constexpr double kAgrees = 0.5;  // below it views are in doubt (view_agreement.cpp)
+  if (rig.projectors.size() < 3) return false;
   for (std::size_t p = 0; p < rig.projectors.size(); ++p) {
     std::vector<std::vector<MeasuredPoint>> of_others = points;
     for (auto& of_camera : of_others)
@@ -81,7 +91,9 @@ bool is_fault_of_projector(const Rig& rig, const std::vector<std::vector<Measure
       });
     const ViewAgreement agreement(rig, of_others);
     const PairAgreement said = agreement.with_others(camera);
-    if (said.same + said.apart >= kFewPoints && agreement.doubtful_pairs() == 0) return true;
+    if (said.same + said.apart >= kFewPoints && said.share() >= kAgrees &&
+        agreement.doubtful_pairs() == 0)
+      return true;
   }
   return false;
 }
@@ -223,7 +235,7 @@ bool others_see_beyond_volume(const Rig& rig, const PointResult& found, std::siz
   CutLines others;
   for (std::size_t c = 0; c < found.graphs.size(); ++c) {
     if (c == camera) continue;
-    const CutLines lines = lines_cut_by_volume(rig, {&found.graphs[c], 1}, found.labeling);
+    const CutLines lines = cut_lines(rig, {&found.graphs[c], 1}, found.labeling);
     others.inside += lines.inside;
     others.cut += lines.cut;
   }
@@ -287,7 +299,7 @@ std::string describe(const Rig& rig, const PictureFinding& finding) {
   const std::string misfit = "does not fit the rig as the others' do: ";
   if (is_out_of_focus(finding.contrast))
     return who + misfit + "its lines stand out " + times_less(finding.contrast) +
-           " than theirs, so it is out of focus, or its lens is fogged" + out;
+           " than theirs, so it is out of focus, or its lens is fogged or covered" + out;
   return who + misfit + "the camera was moved, or the picture is of another moment or rig" + out;
 }
 
@@ -314,7 +326,7 @@ std::vector<PictureFinding> misplaced_pictures(const Rig& rig, const Frame& fram
   std::vector<PictureFinding> findings;
   for (const Suspect& s : asked.rest)
     if (s.best_named > 0) findings.push_back(s.best);
-  std::vector<PictureFinding> unfit;
+  std::vector<std::size_t> unfit;
   std::size_t fit = others;
   for (const Suspect& s : suspects) {
     const OthersSay said = others_say(s, usual, agreement.with_others(s.camera));
@@ -324,11 +336,14 @@ std::vector<PictureFinding> misplaced_pictures(const Rig& rig, const Frame& fram
       ++fit;
     } else if (said == OthersSay::kDoesNotFit &&
                !fits_larger_volume(rig, found, s, usual, options)) {
-      unfit.push_back(misfit(rig, frame, s.camera));
+      unfit.push_back(s.camera);
     }
   }
   // Where most do not fit, their pictures are not what is wrong.
-  if (unfit.size() < fit) findings.insert(findings.end(), unfit.begin(), unfit.end());
+  if (unfit.size() < fit) {
+    const std::vector<PictureFinding> all = misfits(rig, frame, unfit, found.left_out);
+    findings.insert(findings.end(), all.begin(), all.end());
+  }
   std::stable_sort(
       findings.begin(), findings.end(),
       [](const PictureFinding& a, const PictureFinding& b) { return a.camera < b.camera; });
@@ -369,7 +384,7 @@ std::vector<PictureFinding> contradicting_pictures(const Rig& rig, const Frame& 
   if (count < 3 || !is_plain || is_fault_of_projector(rig, points, alone)) return {};
   points[alone].clear();
   if (ViewAgreement(rig, points).doubtful_pairs() > 0) return {};
-  return {misfit(rig, frame, alone)};
+  return misfits(rig, frame, {&alone, 1}, found.left_out);
 }
 
 bool points_lie_on_lines(const Rig& rig, const PointResult& found) {

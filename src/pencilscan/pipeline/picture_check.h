@@ -22,7 +22,7 @@ enum class PictureFault {
   kTurned,            ///< by half a turn
   kMirrored,          ///< left and right
   kUpsideDown,        ///< mirrored top and bottom
-  kDoesNotFit,        ///< none of these: the camera was moved, or it is of another moment
+  kDoesNotFit,        ///< none of these: another moment, or the camera was moved or is out of focus
 };
 
 struct PictureFinding {

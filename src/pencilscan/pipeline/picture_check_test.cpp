@@ -312,14 +312,14 @@ TEST_F(PictureCheck, LinesStandOutAsMuchInEachCameraThatIsInFocus) {
     cv::resize(frame_->images[c], frame.images[c], {camera.width, camera.height}, 0, 0,
                cv::INTER_AREA);
   }
-  for (const double contrast : line_contrasts(rig, frame)) {
+  for (const double contrast : line_contrasts(rig, frame, {})) {
     EXPECT_GT(contrast, 0.6);
     EXPECT_LT(contrast, 1.6);
   }
   const double period = pixels_at_center(rig, rig.cameras[0], line_spacing(rig));
   frame.images[0] = cv::Mat();
   cv::GaussianBlur(frame_->images[0], frame.images[0], {}, 0.3 * period);
-  EXPECT_TRUE(is_out_of_focus(line_contrasts(rig, frame)[0]));
+  EXPECT_TRUE(is_out_of_focus(line_contrasts(rig, frame, {})[0]));
 }
 
 // What it still shows is used. That it then disagrees with the others is no sign of a move.
