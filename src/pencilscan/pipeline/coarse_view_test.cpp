@@ -188,11 +188,16 @@ TEST(FrameWarnings, WhatAllDevicesMissIsNoFaultOfOne) {
   EXPECT_TRUE(device_that_is_off(of_devices)) << "such a rig still does not fit";
 }
 
-// Where noise explains more than right devices miss, one that is off stands out from its kind.
-TEST(FrameWarnings, ADeviceThatIsFarFromItsKindIsNamedBelowTheLimitOfAll) {
+Rig rig_of_four_projectors() {
   Rig rig = fine_rig(1);
   rig.projectors.resize(4, rig.projectors[0]);
   for (std::size_t p = 0; p < 4; ++p) rig.projectors[p].name = "proj" + std::to_string(p);
+  return rig;
+}
+
+// Where noise explains more than right devices miss, one that is off stands out from its kind.
+TEST(FrameWarnings, ADeviceThatIsFarFromItsKindIsNamedBelowTheLimitOfAll) {
+  const Rig rig = rig_of_four_projectors();
   const std::size_t cameras = rig.cameras.size();
   std::vector<CrossingDisagreement> of_devices(cameras + 4, {700, 0.11, 0.22, {}});
   of_devices[cameras + 3] = {190, 0.29, 0.15, {}};
@@ -213,9 +218,7 @@ TEST(FrameWarnings, ADeviceThatIsFarFromItsKindIsNamedBelowTheLimitOfAll) {
 
 // Two weaker signs together: it has few crossings, and these miss.
 TEST(FrameWarnings, AProjectorThatLacksCrossingsIsNamedWhereTheyMiss) {
-  Rig rig = fine_rig(1);
-  rig.projectors.resize(4, rig.projectors[0]);
-  for (std::size_t p = 0; p < 4; ++p) rig.projectors[p].name = "proj" + std::to_string(p);
+  const Rig rig = rig_of_four_projectors();
   const std::size_t cameras = rig.cameras.size();
   std::vector<CrossingDisagreement> of_devices(cameras + 4, {330, 0.22, 0.26, {}});
   of_devices[cameras + 2] = {74, 0.23, 0.144, {}};
