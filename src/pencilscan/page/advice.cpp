@@ -53,8 +53,8 @@ constexpr std::array<Known, 23> kKnown = {{
      "something else than the rig states."},
     {"wrong-picture",
      "Look at its picture below. If it is the right one, the camera was moved or is out of focus: "
-     "rig check with "
-     "--frames says how far; put it back, or run reconstruct with --refine-rig."},
+     "rig check with --frames says how far it moved; put it back, or run reconstruct with "
+     "--refine-rig."},
     {"views-disagree",
      "Compare the cameras' pictures below with where the cameras stand; if they are right, check "
      "the calibration (rig check). Of paint or ribs as fine as the lines, denser lines tell more."},
@@ -69,8 +69,7 @@ constexpr std::array<Known, 23> kKnown = {{
     {"floor-cuts",
      "Look at where the measured surface ends: if the object goes on there, state the floor lower; "
      "its normal must point to the object. Without a floor in the rig, the warning floor-found "
-     "writes "
-     "the one that is seen."},
+     "writes the one that is seen."},
     {"floor-found",
      "State the floor in the rig, as the warning writes it: it is then left out, and lines close "
      "to "

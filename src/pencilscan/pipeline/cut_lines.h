@@ -28,7 +28,7 @@ struct CutLines {
   [[nodiscard]] double share_below() const {
     return inside == 0 ? 0 : static_cast<double>(below_floor) / static_cast<double>(inside);
   }
-  /// The floor is stated too high. Nothing is seen below one that is there: .003 to .009 of the
+  /// The floor is stated too high. Nothing is seen below one that is there: .003 to .010 of the
   /// lines, by wrong names. Through the lower third of two objects: .066 and .063. Chosen between;
   /// of fewer than ten chance may make as many.
   [[nodiscard]] bool are_many_below() const { return below_floor >= 10 && share_below() > 0.03; }

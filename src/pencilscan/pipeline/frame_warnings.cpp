@@ -213,8 +213,7 @@ Warning floor_warning(const FoundFloor& found) {
 
 double share_of_named_points(std::span<const GridGraph> graphs, const Labeling& labeling) {
   std::size_t points = 0;
-  for (const GridGraph& graph : graphs)
-    for (const Curve& curve : graph.curves) points += curve.points.size();
+  for (const GridGraph& graph : graphs) points += curve_points(graph);
   return points == 0 ? 1
                      : static_cast<double>(labelled_points(labeling)) / static_cast<double>(points);
 }

@@ -79,9 +79,7 @@ std::vector<Warning> focus_warnings(const Rig& rig, const Frame& frame, const Po
   std::vector<double> points;
   std::vector<double> heights;
   for (const GridGraph& graph : curves.graphs) {
-    points.push_back(0);
-    for (const Curve& curve : graph.curves)
-      points.back() += static_cast<double>(curve.points.size());
+    points.push_back(static_cast<double>(curve_points(graph)));
     heights.push_back(median_of_points({&graph, 1}, &CurvePoint::amplitude));
   }
   points = of_usual(points);

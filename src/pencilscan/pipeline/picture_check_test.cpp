@@ -13,7 +13,6 @@
 #include "pencilscan/io/frame_failure.h"
 #include "pencilscan/io/image.h"
 #include "pencilscan/io/temporary_folder.h"
-#include "pencilscan/pipeline/disagreement_warnings.h"
 #include "pencilscan/pipeline/frame_warnings.h"
 #include "pencilscan/pipeline/light_warnings.h"
 #include "pencilscan/pipeline/line_contrast.h"
@@ -80,10 +79,6 @@ class PictureCheck : public testing::Test {
     const std::vector<std::string> said = said_of(frame);
     ASSERT_EQ(said.size(), parts.size()) << testing::PrintToString(said);
     for (std::size_t i = 0; i < parts.size(); ++i) EXPECT_THAT(said[i], HasSubstr(parts[i]));
-  }
-  /// Most lines of each camera have names.
-  static std::vector<TellingPoints> usual_names() {
-    return std::vector<TellingPoints>(rig_->cameras.size(), {4000, 1000});
   }
   static Frame with(std::size_t camera, const cv::Mat& picture) {
     Frame frame = *frame_;
@@ -271,20 +266,6 @@ TEST_F(PictureCheck, AProjectorWithAnotherPatternIsNamed) {
   EXPECT_THAT(named(other, *frame_), testing::ElementsAre(rig_->projectors[2].name));
 }
 
-TEST_F(PictureCheck, OfFewLinesThatAreExpectedNextToAllHaveToBeMissing) {
-  const auto are_missing = [](std::size_t points, std::size_t named) {
-    const std::vector<std::vector<ExpectedLines>> expected{
-        {{4000, 3200}, {points, named}, {3000, 2400}}};
-    return !missing_lines_warnings(*rig_, expected, usual_names()).empty();
-  };
-  EXPECT_TRUE(are_missing(4000, 200));
-  EXPECT_TRUE(are_missing(1600, 0));
-  EXPECT_TRUE(are_missing(300, 0));
-  EXPECT_FALSE(are_missing(200, 0));
-  EXPECT_FALSE(are_missing(300, 30));
-  EXPECT_FALSE(are_missing(4000, 1100));  // as few as a right projector has
-}
-
 TEST_F(PictureCheck, ACameraOutOfFocusIsSaidToBe) {
   Frame frame = *frame_;
   frame.images[2] = cv::Mat();  // the fixture keeps its own
@@ -332,52 +313,6 @@ TEST_F(PictureCheck, ACameraALittleOutOfFocusIsNamedAndNotSaidToBeMoved) {
   for (const Warning& warning : result.points.warnings)
     if (!warning.device.empty()) said.push_back(warning.device + to_string(warning.code));
   EXPECT_THAT(said, testing::ElementsAre(rig_->cameras[2].name + "out-of-focus"));
-}
-
-TEST(Focus, ExplainsWhatElseIsSaidOfACamera) {
-  std::vector<Warning> warnings{
-      {WarningCode::kOutOfFocus, "", "a"},  {WarningCode::kDeviceIsOff, "", "a"},
-      {WarningCode::kDeviceIsOff, "", "b"}, {WarningCode::kSaturated, "", "a"},
-      {WarningCode::kOutOfFocus, "", "c"},  {WarningCode::kWrongPicture, "", "c"}};
-  let_focus_explain(warnings);
-  std::vector<std::string> left;
-  for (const Warning& warning : warnings)
-    left.push_back(warning.device + " " + to_string(warning.code));
-  EXPECT_THAT(left, testing::ElementsAre("a out-of-focus", "b device-is-off", "a saturated",
-                                         "c wrong-picture"));
-}
-
-// A camera that is covered shows next to none.
-TEST_F(PictureCheck, ACameraWithoutTheLinesThatOthersMeasureIsNamed) {
-  std::vector<std::vector<ExpectedLines>> expected(
-      rig_->cameras.size(), std::vector<ExpectedLines>(rig_->projectors.size(), {1000, 800}));
-  EXPECT_THAT(missing_lines_warnings(*rig_, expected, usual_names()), IsEmpty());
-  for (ExpectedLines& lines : expected[2]) lines.named = 20;
-  const std::vector<Warning> found = missing_lines_warnings(*rig_, expected, usual_names());
-  ASSERT_EQ(found.size(), 1U);
-  EXPECT_EQ(found[0].device, rig_->cameras[2].name);
-  EXPECT_THAT(found[0].text,
-              HasSubstr("2 % are in its picture (of the others' 80 %): it is covered"));
-  expected[2].clear();  // its picture was left out
-  EXPECT_THAT(missing_lines_warnings(*rig_, expected, usual_names()), IsEmpty());
-}
-
-// A camera that stands elsewhere gets names of other lines, and has a third of those expected: as
-// many as a right one that sees little. That few of all its lines had names tells them apart.
-TEST_F(PictureCheck, ACameraWithFewNamesAndFewOfTheExpectedLinesIsNamed) {
-  std::vector<std::vector<ExpectedLines>> expected(
-      rig_->cameras.size(), std::vector<ExpectedLines>(rig_->projectors.size(), {1000, 850}));
-  for (ExpectedLines& lines : expected[4]) lines.named = 350;
-  EXPECT_THAT(missing_lines_warnings(*rig_, expected, usual_names()), IsEmpty());
-  std::vector<TellingPoints> named = usual_names();
-  named[4] = {1500, 3500};
-  const std::vector<Warning> found = missing_lines_warnings(*rig_, expected, named);
-  ASSERT_EQ(found.size(), 1U);
-  EXPECT_EQ(found[0].device, rig_->cameras[4].name);
-  for (ExpectedLines& lines : expected[4]) lines.named = 500;
-  EXPECT_THAT(missing_lines_warnings(*rig_, expected, named), IsEmpty());
-  for (ExpectedLines& lines : expected[4]) lines = {60, 20};  // it hardly sees what was measured
-  EXPECT_THAT(missing_lines_warnings(*rig_, expected, named), IsEmpty());
 }
 
 /// What is left in its colours is of others that share them, and no sign that it was moved.
@@ -563,79 +498,6 @@ TEST_F(PictureCheck, ACameraThatIsLeftOutGivesNoColor) {
   ASSERT_FALSE(colors.empty());
   const auto is_green = [](const std::array<float, 3>& c) { return c[1] > 1.05F * c[0]; };
   EXPECT_EQ(std::count_if(colors.begin(), colors.end(), is_green), 0);
-}
-
-TEST(DepthWarning, IsSaidWhereNothingElseExplainsIt) {
-  const auto depth = [](double scale, std::optional<double> shared) {
-    ConsistencyReport report;
-    report.sigma_scale = scale;
-    report.shared_scale = shared;
-    return report;
-  };
-  EXPECT_FALSE(depth_warning(depth(2.4, 1.0), {}));
-  const auto of_places = depth_warning(depth(4.3, 0.4), {});
-  ASSERT_TRUE(of_places);
-  EXPECT_EQ(of_places->code, WarningCode::kViewsDisagree);
-  EXPECT_THAT(of_places->text, HasSubstr("lie apart by 4.3 times"));
-  EXPECT_THAT(of_places->text, testing::Not(HasSubstr("the rig is a little off")));
-  EXPECT_TRUE(depth_warning(depth(4.3, std::nullopt), {}));
-  const auto of_patches = depth_warning(depth(2.4, 1.3), {});
-  ASSERT_TRUE(of_patches);
-  EXPECT_THAT(of_patches->text, HasSubstr("the rig is a little off"));
-  std::vector<Warning> said(1);
-  said[0].code = WarningCode::kSaturated;
-  EXPECT_TRUE(depth_warning(depth(4.3, 1.3), said));
-  // Noise of colours that are filled in repeats itself, and is no patch.
-  said[0].code = WarningCode::kColorsFilledIn;
-  EXPECT_FALSE(depth_warning(depth(3.1, 0.98), said));
-  EXPECT_TRUE(depth_warning(depth(3.1, 1.3), said));
-  for (const WarningCode code :
-       {WarningCode::kRigIsOff, WarningCode::kViewsDisagree, WarningCode::kGamma}) {
-    said[0].code = code;
-    EXPECT_FALSE(depth_warning(depth(4.3, 1.3), said));
-  }
-}
-
-TEST(GammaFinding, ComesFirstAndExplainsThatViewsDisagree) {
-  const auto codes = [](std::vector<Warning> warnings) {
-    let_gamma_explain(warnings);
-    std::vector<WarningCode> result;
-    for (const Warning& warning : warnings) result.push_back(warning.code);
-    return result;
-  };
-  using Code = WarningCode;
-  using testing::ElementsAre;
-  EXPECT_THAT(
-      codes({{Code::kSaturated}, {Code::kRigIsOff}, {Code::kGamma}, {Code::kViewsDisagree}}),
-      ElementsAre(Code::kGamma, Code::kSaturated, Code::kRigIsOff));
-  EXPECT_THAT(codes({{Code::kSaturated}, {Code::kRigIsOff}}),
-              ElementsAre(Code::kSaturated, Code::kRigIsOff));
-}
-
-TEST(FewNames, IsSaidBelowATenthOfTheLines) {
-  PointResult result;
-  EXPECT_FALSE(few_names_warning(result));
-  result.graphs.resize(2);
-  result.graphs[1].curves.resize(1);
-  result.graphs[1].curves[0].points.resize(1000);
-  result.labeling.runs.resize(2);
-  result.labeling.runs[1].push_back({0, 0, 99, {}});
-  const auto warning = few_names_warning(result);
-  ASSERT_TRUE(warning);
-  EXPECT_THAT(warning->text, HasSubstr("only 9.9 % of the lines"));
-  result.labeling.runs[1][0].end = 100;
-  EXPECT_FALSE(few_names_warning(result));
-}
-
-TEST(FewNames, SayNothingOfTheRig) {
-  CrossingDisagreement crossings;
-  crossings.crossings = 40;
-  crossings.median_px = 0.3;
-  crossings.expected_px = 0.05;
-  EXPECT_TRUE(deny_rig(crossings, 0.5));
-  EXPECT_FALSE(deny_rig(crossings, 0.06));
-  crossings.median_px = 0.06;
-  EXPECT_FALSE(deny_rig(crossings, 0.5));
 }
 
 TEST(PlainFaults, ColorsOfAPictureOfManyPixelsAreSeen) {
